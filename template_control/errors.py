@@ -1,0 +1,21 @@
+"""Errors a user can cause; each carries one line that names the culprit and the mend."""
+
+
+class TemplateControlError(ValueError):
+    """Base of every error this library raises for bad input."""
+
+
+class ParameterError(TemplateControlError):
+    """A number out of its range, or not finite."""
+
+
+class GaitError(TemplateControlError):
+    """A gait that does not exist: no step of the template returns to the wanted state."""
+
+
+class RobotError(TemplateControlError):
+    """A robot description that cannot be read or is not a planar biped."""
+
+
+class RecordError(TemplateControlError):
+    """A file that is not a recorded run, or a folder a run cannot be written to."""

@@ -1,0 +1,395 @@
+"""The hybrid automaton of Fig. 2 and Table I as data.
+
+Nothing here integrates anything: the compiled kernel, the planner and the robot's
+controller all read these tables, so "what comes after touchdown" is written once.
+
+A leg is *rear* or *front*. In single stance the stance leg is the rear one, because the
+leg that touches down next lands in front of it; at the rear leg's liftoff the front leg
+takes its place (:attr:`Reset.SHIFT`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+
+class Phase(IntEnum):
+    """Primary phases of motion (Section II-A): flight, single stance, double stance."""
+
+    F = 0
+    SS = 1
+    DS = 2
+
+
+class Slot(IntEnum):
+    """Places of the control vector u of a stride, in order.
+
+    ``TOUCHDOWN_ANGLE`` is alpha [rad] from the ground to the leg. The other slots are leg
+    stiffnesses [N/m]: before and after the stride's (virtual) bottom, and the two of the
+    front leg in a walk-to-run stride.
+    """
+
+    TOUCHDOWN_ANGLE = 0
+    K_SC = 1
+    K_SD = 2
+    K_SC_WR = 3
+    K_SD_WR = 4
+
+
+class Event(IntEnum):
+    """Transition guards; each is a scalar function that fires when it *rises* through 0.
+
+    With CoM (x, y), toes c1 (rear) and c2 (front), leg lengths l1, l2:
+
+    ===================  =====================================================
+    TOUCHDOWN            l0 sin(alpha) - y
+    REAR_LIFTOFF         l1 - l0
+    FRONT_LIFTOFF        l2 - l0
+    APEX                 -dy/dt
+    BOTTOM               d(l1^2)/dt: rear (only) leg turns to decompression
+    VIRTUAL_BOTTOM       d/dt of the squared distance to the midpoint of the toes
+    VLO                  x - c1: the stance leg is vertical
+    PASSED_FRONT_FOOT    x - c2: the CoM is over the front foot, rear leg still down
+    FALL                 -y
+    BACKWARD             -dx/dt
+    ===================  =====================================================
+    """
+
+    TOUCHDOWN = 0
+    REAR_LIFTOFF = 1
+    FRONT_LIFTOFF = 2
+    APEX = 3
+    BOTTOM = 4
+    VIRTUAL_BOTTOM = 5
+    VLO = 6
+    PASSED_FRONT_FOOT = 7
+    FALL = 8
+    BACKWARD = 9
+
+
+class Reset(IntEnum):
+    """What happens to the toes when an edge is taken.
+
+    ``PLACE_REAR`` and ``PLACE_FRONT`` put a toe where the stretched leg at the touchdown
+    angle meets the ground, x + l0 cos(alpha); ``SHIFT`` makes the front toe the rear one.
+    """
+
+    NONE = 0
+    PLACE_REAR = 1
+    PLACE_FRONT = 2
+    SHIFT = 3
+
+
+class Outcome(IntEnum):
+    """How a stride ended: at its section, or why it did not."""
+
+    SECTION = 0
+    FALL = 1
+    UNWANTED_FLIGHT = 2
+    BACKWARD = 3
+    NO_TOUCHDOWN = 4
+    NO_LIFTOFF = 5
+    TIMEOUT = 6
+
+    @property
+    def reason(self) -> str:
+        """The outcome in words."""
+        return _REASONS[self]
+
+
+_REASONS = {
+    Outcome.SECTION: "reached its section",
+    Outcome.FALL: "the CoM fell to the ground",
+    Outcome.UNWANTED_FLIGHT: "the last foot left the ground in a walking phase",
+    Outcome.BACKWARD: "the CoM turned backward",
+    Outcome.NO_TOUCHDOWN: "the swing leg never touched down",
+    Outcome.NO_LIFTOFF: "the CoM passed the front foot before the rear leg lifted off",
+    Outcome.TIMEOUT: "no event within the time limit",
+}
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A transition: when ``event`` fires, apply ``reset`` and go to ``target``.
+
+    Attributes:
+        event: the guard.
+        target: name of the successor node, or the failure the stride ends with.
+        reset: what happens to the toes.
+        guard: the guard's name in Fig. 2 (empty for failures).
+        section: True where a stride ends (VLO or apex), and the next begins at ``target``.
+    """
+
+    event: Event
+    target: str | Outcome
+    reset: Reset = Reset.NONE
+    guard: str = ""
+    section: bool = False
+
+
+@dataclass(frozen=True)
+class Node:
+    """A circle of Fig. 2, ``phase_subphase^gait``; leg stiffness is constant in it.
+
+    Attributes:
+        name: the node's name, such as ``"DS_sc^w"``.
+        phase: flight, single or double stance.
+        rear: stiffness slot of the rear (in single stance: the only) leg, None in the air.
+        front: stiffness slot of the front leg, None in the air.
+        edges: the ways out, failures included.
+    """
+
+    name: str
+    phase: Phase
+    rear: Slot | None
+    front: Slot | None
+    edges: tuple[Edge, ...]
+
+    def edge(self, event: Event) -> Edge | None:
+        """The first edge that ``event`` fires, or None."""
+        return next((e for e in self.edges if e.event is event), None)
+
+
+@dataclass(frozen=True)
+class Automaton:
+    """Nodes of the walking and running gaits and of both transition strides."""
+
+    nodes: tuple[Node, ...]
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Node name to position in :attr:`nodes`."""
+        return {node.name: i for i, node in enumerate(self.nodes)}
+
+    def node(self, name: str) -> Node:
+        """The node called ``name``.
+
+        Raises:
+            KeyError: if there is none.
+        """
+        return self.nodes[self.index[name]]
+
+    def successor(self, name: str, event: Event) -> str:
+        """Name of the node that follows ``name`` when ``event`` fires.
+
+        Raises:
+            KeyError: if ``event`` is no way out of it, or ends the stride in failure.
+        """
+        edge = self.node(name).edge(event)
+        if edge is None or isinstance(edge.target, Outcome):
+            raise KeyError(f"{event.name} leads nowhere from {name}")
+        return edge.target
+
+
+_SINGLE_STANCE_FAILURES = (
+    Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+_AWAITING_TOUCHDOWN_FAILURES = (
+    Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+_DOUBLE_STANCE_FAILURES = (
+    Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.PASSED_FRONT_FOOT, Outcome.NO_LIFTOFF),
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+_RUNNING_STANCE_FAILURES = (
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+_FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
+
+
+def _walking() -> tuple[Node, ...]:
+    """VLO -> touchdown -> virtual bottom -> rear liftoff -> VLO."""
+    return (
+        Node(
+            "SS_av^w",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^w", Reset.PLACE_FRONT, "G_t^w"),
+                *_AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sc^w",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "DS_sd^w", Reset.NONE, "G_b^w"),
+                # The paper assumes a virtual bottom in every double stance; a short one of a
+                # disturbed walker ends without.
+                Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^w"),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sd^w",
+            Phase.DS,
+            Slot.K_SD,
+            Slot.K_SD,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^w"),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_bv^w",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^w", section=True),
+                *_SINGLE_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
+def _running() -> tuple[Node, ...]:
+    """Apex -> touchdown -> bottom -> liftoff -> apex."""
+    return (
+        Node(
+            "F_aa^r",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^r", Reset.PLACE_REAR, "G_t^r"), *_FLIGHT_FAILURES),
+        ),
+        Node(
+            "SS_sc^r",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^r", Reset.NONE, "G_b^r"), *_RUNNING_STANCE_FAILURES),
+        ),
+        Node(
+            "SS_sd^r",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.NONE, "G_l^r"),
+                *_RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "F_ba^r",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *_FLIGHT_FAILURES),
+        ),
+    )
+
+
+def _walk_to_run() -> tuple[Node, ...]:
+    """The WRT stride: the rear leg walks, the front leg runs (Section IV-C1)."""
+    return (
+        Node(
+            "SS_av^wr",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
+                *_AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sc^wr",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sd^wr",
+            Phase.DS,
+            Slot.K_SD,
+            Slot.K_SC_WR,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_sc^wr",
+            Phase.SS,
+            Slot.K_SC_WR,
+            None,
+            (
+                Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *_RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_sd^wr",
+            Phase.SS,
+            Slot.K_SD_WR,
+            None,
+            (
+                Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.NONE, "G_f^wr"),
+                *_RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "F_ba^wr",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *_FLIGHT_FAILURES),
+        ),
+    )
+
+
+def _run_to_walk() -> tuple[Node, ...]:
+    """The RWT stride: apex -> touchdown -> bottom -> VLO (Section IV-C2)."""
+    return (
+        Node(
+            "F_aa^rw",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^rw", Reset.PLACE_REAR, "G_t^rw"), *_FLIGHT_FAILURES),
+        ),
+        Node(
+            "SS_sc^rw",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^rw", Reset.NONE, "G_b^rw"), *_RUNNING_STANCE_FAILURES),
+        ),
+        Node(
+            "SS_sd^rw",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^rw", section=True),
+                *_SINGLE_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
+AUTOMATON = Automaton((*_walking(), *_running(), *_walk_to_run(), *_run_to_walk()))
+"""The one automaton of the library."""
+
+STRIDE_START = {"w": "SS_av^w", "r": "F_aa^r", "wr": "SS_av^wr", "rw": "F_aa^rw"}
+"""First node of each kind of stride (superscripts of Table I)."""
+
+NUM_SLOTS = len(Slot)

@@ -1,0 +1,139 @@
+"""Walking gaits: period-one fixed points of the VLO return map, symmetric in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from template_control.errors import GaitError
+from template_control.slip.automaton import STRIDE_START, Outcome
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.stride import Workspace, controls, run, vlo_return_map
+
+Array = NDArray[np.float64]
+
+_SCAN = 120
+
+
+@dataclass(frozen=True)
+class WalkingGait:
+    """A passive symmetric walking gait.
+
+    Attributes:
+        name: for tables and records.
+        parameters: the template.
+        vlo: (3,) dx/dt, y, dy/dt at VLO; dy/dt is 0 [m/s, m, m/s].
+        controls: (5,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
+        step_length: [m].
+        step_duration: [s].
+    """
+
+    name: str
+    parameters: SlipParameters
+    vlo: Array
+    controls: Array
+    step_length: float
+    step_duration: float
+
+    @property
+    def mean_speed(self) -> float:
+        """Step length over step duration [m/s]."""
+        return self.step_length / self.step_duration
+
+    @property
+    def energy(self) -> float:
+        """Mechanical energy at VLO, the stance spring's included [J]."""
+        return vlo_energy(self.parameters, self.vlo)
+
+
+def vlo_energy(parameters: SlipParameters, z: Array) -> float:
+    """E = m v^2 / 2 + m g y + k0 (l0 - y)^2 / 2 at the VLO state z (3,) [J]."""
+    p = parameters
+    kinetic = 0.5 * p.mass * (z[0] ** 2 + z[2] ** 2)
+    spring = 0.5 * p.leg_stiffness * (p.rest_length - z[1]) ** 2
+    return float(kinetic + p.mass * p.gravity * z[1] + spring)
+
+
+def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingGait:
+    stride = run(parameters, STRIDE_START["w"], [0.0, z[1], z[0], z[2]], u)
+    if not stride.completed or np.max(np.abs(stride.state[[2, 1, 3]] - z)) > 1e-6:
+        raise GaitError(f"gait {name!r} does not return to its VLO state: {stride.outcome.reason}")
+    return WalkingGait(name, parameters, z, u, float(stride.state[0]), stride.duration)
+
+
+def _returns(parameters: SlipParameters, z: Array, u: Array, workspace: Workspace) -> float:
+    """Vertical speed at the next VLO, NaN where there is none; zero for a symmetric gait."""
+    z_next, outcome = vlo_return_map(parameters, z, u, workspace)
+    return float(z_next[2]) if outcome is Outcome.SECTION else np.nan
+
+
+def _symmetric_roots(
+    parameters: SlipParameters,
+    make: Callable[[float], tuple[Array, Array]],
+    values: Array,
+) -> list[tuple[Array, Array]]:
+    """All (z, u) = make(value) on the grid ``values`` that return to themselves."""
+    workspace = Workspace()
+
+    def residual(value: float) -> float:
+        return _returns(parameters, *make(value), workspace)
+
+    found = []
+    samples = [residual(v) for v in values]
+    for lo, hi, f_lo, f_hi in zip(values, values[1:], samples, samples[1:], strict=False):
+        if not (np.isfinite(f_lo) and np.isfinite(f_hi)) or f_lo * f_hi > 0.0:
+            continue
+        z, u = make(brentq(residual, lo, hi, xtol=1e-14, rtol=1e-14))
+        z_next, outcome = vlo_return_map(parameters, z, u, workspace)
+        # A vertical speed that returns to zero need not be the symmetric step.
+        if outcome is Outcome.SECTION and np.max(np.abs(z_next - z)) < 1e-6:
+            found.append((z, u))
+    return found
+
+
+def gait_at(
+    parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
+) -> WalkingGait:
+    """The symmetric gait with this touchdown angle [rad] and speed at VLO [m/s].
+
+    Raises:
+        GaitError: if there is none.
+    """
+    k0, l0 = parameters.leg_stiffness, parameters.rest_length
+    u = controls(touchdown_angle, k0, k0)
+    heights = np.linspace(l0 * np.sin(touchdown_angle) + 1e-5 * l0, l0 * (1 - 1e-5), _SCAN)
+    roots = _symmetric_roots(parameters, lambda y: (np.array([vlo_speed, y, 0.0]), u), heights)
+    if not roots:
+        raise GaitError(
+            f"no walking gait with touchdown angle {np.degrees(touchdown_angle):.2f} deg"
+            f" and {vlo_speed:g} m/s at VLO: try an angle of 64 to 72 deg and 0.8 to 1.2 m/s"
+        )
+    return _gait(name, parameters, *roots[0])
+
+
+def gait_from_energy(
+    parameters: SlipParameters, height: float, energy: float, name: str = "paper"
+) -> WalkingGait:
+    """The symmetric gait with this VLO height [m] and energy [J] (as Section IV-D).
+
+    Raises:
+        GaitError: if there is none.
+    """
+    p = parameters
+    spring = 0.5 * p.leg_stiffness * (p.rest_length - height) ** 2
+    squared = 2.0 / p.mass * (energy - spring - p.mass * p.gravity * height)
+    top = np.arcsin(min(height / p.rest_length, 1.0))
+    if not squared > 0.0:
+        raise GaitError(f"energy {energy:g} J leaves no speed at a VLO height of {height:g} m")
+    z = np.array([np.sqrt(squared), height, 0.0])
+    k0 = p.leg_stiffness
+    roots = _symmetric_roots(
+        parameters, lambda a: (z, controls(a, k0, k0)), np.linspace(0.9, top - 1e-4, _SCAN)
+    )
+    if not roots:
+        raise GaitError(f"no walking gait with VLO height {height:g} m and energy {energy:g} J")
+    return _gait(name, parameters, *roots[-1])
