@@ -137,3 +137,48 @@ def gait_from_energy(
     if not roots:
         raise GaitError(f"no walking gait with VLO height {height:g} m and energy {energy:g} J")
     return _gait(name, parameters, *roots[-1])
+
+
+def _nominal_angle(mean_speed: float, rest_length: float, gravity: float) -> float:
+    """Touchdown angle [rad] at which a mean speed is walked: steeper when slower.
+
+    66 deg from 1.1 m/s up and 68 deg at 0.9 m/s (for l0 = 1 m), where the steps are long
+    enough in time for a swing leg to follow.
+    """
+    dimensionless = mean_speed / np.sqrt(gravity * rest_length)
+    return float(np.radians(np.interp(dimensionless, [0.255, 0.287, 0.351], [69.0, 68.0, 66.0])))
+
+
+def gait_for_speed(
+    parameters: SlipParameters, mean_speed: float, name: str = "walk"
+) -> WalkingGait:
+    """The symmetric gait with this mean forward speed [m/s].
+
+    Raises:
+        GaitError: if there is none.
+    """
+    p = parameters
+    if not (np.isfinite(mean_speed) and mean_speed > 0.0):
+        raise GaitError(f"speed is {mean_speed!r} m/s: give a positive number")
+    unit = np.sqrt(p.gravity * p.rest_length)
+    angle = _nominal_angle(mean_speed, p.rest_length, p.gravity)
+
+    def surplus(vlo_speed: float) -> float:
+        try:
+            return gait_at(p, angle, vlo_speed, name).mean_speed - mean_speed
+        except GaitError:
+            return np.nan
+
+    # The mean speed grows with the speed at VLO; find two neighbours around the wanted one.
+    speeds = unit * np.linspace(0.2, 0.45, 26)
+    values = np.array([surplus(s) for s in speeds])
+    for lo, hi, f_lo, f_hi in zip(speeds, speeds[1:], values, values[1:], strict=False):
+        if f_lo <= 0.0 <= f_hi:
+            return gait_at(p, angle, float(brentq(surplus, lo, hi, xtol=1e-10)), name)
+    reachable = values[np.isfinite(values)] + mean_speed
+    hint = (
+        f"between {reachable.min():.2f} and {reachable.max():.2f} m/s"
+        if reachable.size
+        else "another"
+    )
+    raise GaitError(f"no walking gait at a mean speed of {mean_speed:g} m/s: give one {hint}")

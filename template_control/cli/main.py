@@ -1,0 +1,39 @@
+"""Entry point of ``template-control``: one module a command."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from template_control.cli import walk
+from template_control.errors import TemplateControlError
+
+_COMMANDS = (walk,)
+_USER_ERROR = 2
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    parser = argparse.ArgumentParser(
+        prog="template-control",
+        description="Bipedal SLIP templates, their control, and robots that follow them.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for module in _COMMANDS:
+        module.add_parser(commands)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; returns the exit status (2 for a user's mistake, told in one line)."""
+    options = build_parser().parse_args(arguments)
+    try:
+        return int(options.run(options))
+    except TemplateControlError as error:
+        print(f"template-control: {error}", file=sys.stderr)
+        return _USER_ERROR
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,257 @@
+"""``template-control walk``: a robot follows the SLIP template in PyBullet."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from template_control.embedding.controller import EmbeddingOptions
+from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.modified import ModifiedPlanner
+from template_control.embedding.planner import Planner
+from template_control.errors import ParameterError, RecordError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.quiet import stdout_to_stderr
+from template_control.plant.record import Record
+from template_control.plant.simulation import SimulationOptions, perturbed_start, simulate
+from template_control.plant.summary import summarise
+from template_control.robot.library import ROBOTS, load_robot
+from template_control.slip.gait import WalkingGait, gait_at, gait_for_speed, gait_from_energy
+from template_control.slip.parameters import SlipParameters
+from template_control.view.figures import save_figures
+
+_PLANNERS: dict[str, type[LqrPlanner] | type[ModifiedPlanner]] = {
+    "lqr": LqrPlanner,
+    "modified": ModifiedPlanner,
+}
+_CONE_MARGIN = 0.9  # the controller trusts this share of the friction
+_LONG = 200  # steps beyond which samples are thinned
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command's options."""
+    parser = commands.add_parser(
+        "walk",
+        help="walk a robot that follows the SLIP template, headless, and report",
+        description=(
+            "Walk a robot in PyBullet: a planner on the SLIP template chooses each step, a"
+            " whole-body QP makes the robot follow it. Ends with a table, and a folder with the"
+            " run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input."
+        ),
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument(
+        "--robot",
+        default="five-link",
+        metavar="NAME|URDF",
+        help=f"a shipped robot ({', '.join(ROBOTS)}) or the path of a planar URDF",
+    )
+    parser.add_argument("--steps", type=int, default=50, help="steps to walk, VLO to VLO")
+    parser.add_argument(
+        "--gait",
+        choices=("walk", "paper"),
+        default="walk",
+        help="walk: touchdown angle 66 deg, 1.1 m/s at VLO; paper: the equilibrium of"
+        " Section IV-D, 0.9818 m and 826 J",
+    )
+    parser.add_argument(
+        "--speed",
+        type=float,
+        metavar="M/S",
+        help="mean forward speed of the gait instead of the walk gait's own 1.21 m/s",
+    )
+    parser.add_argument(
+        "--planner",
+        choices=tuple(_PLANNERS),
+        default="lqr",
+        help="lqr: LQR on the VLO state with an offset estimate; modified: the paper's"
+        " modified walking controller, equation (38)",
+    )
+    parser.add_argument(
+        "--friction", type=float, default=0.7, help="Coulomb friction between feet and ground"
+    )
+    parser.add_argument(
+        "--mass-scale",
+        type=float,
+        default=1.0,
+        help="masses of the simulated robot over those the controller knows",
+    )
+    parser.add_argument(
+        "--torque-scale", type=float, default=1.0, help="share of the URDF's torque limits to use"
+    )
+    parser.add_argument(
+        "--seed",
+        type=int,
+        help="perturb the initial state by up to 5 %% in speed and 2 cm in height, drawn with"
+        " this seed; without it the walk starts on the gait",
+    )
+    parser.add_argument(
+        "--output", type=Path, default=Path("runs/walk"), help="folder for run.npz and figures"
+    )
+    parser.add_argument(
+        "--record-every",
+        type=int,
+        metavar="N",
+        help=f"keep every n-th sample in run.npz; by default 1 up to {_LONG} steps, then 5",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
+    )
+    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Walk as told; returns 0, or 1 after a fall."""
+    _check(options)
+    folder = _writable(options.output)
+    robot = load_robot(options.robot)
+    parameters = SlipParameters(mass=robot.mass, gravity=robot.gravity)
+    gait = _gait(options, parameters)
+    planner: Planner = _PLANNERS[options.planner](gait)
+    every = options.record_every or (1 if options.steps <= _LONG else 5)
+    simulation = SimulationOptions(
+        steps=options.steps,
+        plant=PlantOptions(friction=options.friction, mass_scale=options.mass_scale),
+        embedding=EmbeddingOptions(
+            friction=_CONE_MARGIN * options.friction, torque_scale=options.torque_scale
+        ),
+        start=None if options.seed is None else perturbed_start(gait.vlo, options.seed),
+        record_every=every,
+    )
+    console = Console(stderr=True)
+    with stdout_to_stderr():
+        with _progress(console, options.steps) as advance:
+            record = simulate(robot, planner, simulation, advance)
+        path = record.save(folder / "run.npz")
+        if not options.no_figures:
+            save_figures(record, folder)
+    figures = summarise(record, str(path))
+    if options.json:
+        print(json.dumps(figures))
+    else:
+        print_table(figures, record)
+    return 1 if record.fell else 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Ranges of the numbers a user gives.
+
+    Raises:
+        ParameterError: naming the option and its range.
+    """
+    for name, low, high in (
+        ("steps", 1, 1_000_000),
+        ("friction", 0.05, 5.0),
+        ("mass_scale", 0.5, 2.0),
+        ("torque_scale", 0.01, 10.0),
+        ("speed", 0.01, 10.0),
+        ("record_every", 1, 1_000_000),
+        ("seed", 0, 2**63),
+    ):
+        value = getattr(options, name)
+        if value is None:
+            continue
+        if not (math.isfinite(value) and low <= value <= high):
+            flag = "--" + name.replace("_", "-")
+            raise ParameterError(f"{flag} is {value:g}: give a number from {low:g} to {high:g}")
+    if options.speed is not None and options.gait != "walk":
+        raise ParameterError(f"--speed does not go with --gait {options.gait}: leave one out")
+
+
+def _gait(options: argparse.Namespace, parameters: SlipParameters) -> WalkingGait:
+    if options.gait == "paper":
+        return gait_from_energy(parameters, 0.9818, 826.0)
+    if options.speed is not None:
+        return gait_for_speed(parameters, options.speed)
+    return gait_at(parameters, np.radians(66.0), 1.1)
+
+
+def _writable(folder: Path) -> Path:
+    """The folder, made if need be.
+
+    Raises:
+        RecordError: if nothing can be written there.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".write-probe"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise RecordError(
+            f"cannot write to {folder}: {error.strerror}; give another --output"
+        ) from None
+    return folder
+
+
+@contextmanager
+def _progress(console: Console, steps: int) -> Iterator[Any]:
+    """A progress bar on standard error; yields the function that sets the steps done."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task("walking", total=steps)
+        yield lambda done: progress.update(task, completed=done)
+
+
+def print_table(figures: dict[str, Any], record: Record) -> None:
+    """The summary as a table on standard output."""
+    table = Table(title=f"{figures['robot']}, gait {figures['gait']}", show_header=False)
+    table.add_column()
+    table.add_column(justify="right")
+
+    def row(name: str, text: str) -> None:
+        table.add_row(name, text)
+
+    row("steps", f"{figures['steps']}")
+    row("falls", "0" if not figures["fell"] else f"1: {figures['fall_reason']}")
+    row("duration", f"{figures['duration']:.2f} s")
+    row("mean speed", f"{figures['mean_speed']:.3f} m/s")
+    for name, key in (("VLO target", "vlo_target"), ("VLO, last 50 steps", "vlo_mean_last_50")):
+        z = figures[key]
+        if z is not None:
+            row(
+                name,
+                f"{z['speed']:.4f} m/s  {z['height']:.4f} m  {z['vertical_speed']:+.4f} m/s",
+            )
+    rms, worst = figures["com_error_rms"], figures["com_error_max"]
+    for axis in ("x", "y"):
+        row(
+            f"CoM error in {axis}, RMS / max",
+            f"{1e3 * rms[axis]:.2f} / {1e3 * worst[axis]:.2f} mm",
+        )
+    for joint, torque in figures["joint_torque"].items():
+        row(
+            f"{joint} torque, peak / RMS of limit",
+            f"{torque['peak']:.0f} / {torque['rms']:.0f} of {torque['limit']:.0f} N m",
+        )
+    row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
+    row("QP failures", f"{figures['qp_failures']}")
+    row("steps planned as best reachable", f"{figures['steps_not_reached']}")
+    for name, key in (
+        ("control tick", "control_tick_seconds"),
+        ("QP solve", "qp_solve_seconds"),
+        ("plan", "plan_seconds"),
+    ):
+        t = figures[key]
+        row(f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us")
+    row("real-time factor", f"{figures['real_time_factor']:.1f}")
+    row("record", figures["record"])
+    Console().print(table)
+    if record.metadata["interrupted"]:
+        Console().print("interrupted: the run up to here is saved")

@@ -1,0 +1,310 @@
+"""The controller that makes the robot walk like the template (Fig. 11).
+
+It stands in a node of the automaton, moves along the automaton's edges when the robot
+fires them, plans at VLO (and re-plans where a foot has landed), and turns the plan into
+references for the whole-body QP, parameterised by the direction from the rear stance foot
+to the CoM (beta of Section V-B).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.guards import Sensed, fired
+from template_control.embedding.load import LoadEstimate, LoadOptions
+from template_control.embedding.plan import Plan, at_phase, chain
+from template_control.embedding.planner import Decision, Planner
+from template_control.embedding.references import leg_forces, pd, unloading_cap
+from template_control.embedding.swing_foot import SwingFoot, SwingOptions
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.automaton import AUTOMATON, STRIDE_START, Node, Phase, Reset
+from template_control.slip.stride import Workspace, run
+from template_control.whole_body.solver import Solution, WholeBodyQp
+from template_control.whole_body.tasks import (
+    DOUBLE_STANCE_WEIGHTS,
+    SINGLE_STANCE_WEIGHTS,
+    Gains,
+    Row,
+    TaskStack,
+    Weights,
+)
+
+Array = NDArray[np.float64]
+
+_VLO_STATE = [2, 1, 3]  # dx/dt, y, dy/dt of a state x, y, dx/dt, dy/dt
+_NO_CAP = np.full(1, np.inf)
+
+
+@dataclass(frozen=True)
+class EmbeddingOptions:
+    """Tuning of the embedding; the defaults walk the five-link robot.
+
+    Attributes:
+        gains: PD gains of (45).
+        single_stance, double_stance: task weights.
+        swing: shape of the swing.
+        load: tuning of the load estimate.
+        friction: coefficient the QP's cones are built with.
+        torque_scale: share of the URDF's torque limits that may be used.
+        trunk_pitch: where the trunk is held [rad].
+    """
+
+    gains: Gains = field(default_factory=Gains)
+    single_stance: Weights = SINGLE_STANCE_WEIGHTS
+    double_stance: Weights = DOUBLE_STANCE_WEIGHTS
+    swing: SwingOptions = field(default_factory=SwingOptions)
+    load: LoadOptions = field(default_factory=LoadOptions)
+    friction: float = 0.63
+    torque_scale: float = 1.0
+    trunk_pitch: float = 0.0
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What the controller knew and chose at a VLO.
+
+    Attributes:
+        time: of the VLO [s].
+        state: (3,) dx/dt (angular-momentum based), y, dy/dt.
+        decision: the planner's choice for the step that begins.
+        offset: (3,) the planner's offset estimate.
+        load: the load factor.
+        plan_seconds: wall-clock time of the plan.
+    """
+
+    time: float
+    state: Array
+    decision: Decision
+    offset: Array
+    load: float
+    plan_seconds: float
+
+
+class EmbeddingController:
+    """Joint torques from measured state and foot contacts, one tick at a time.
+
+    Args:
+        robot: the (nominal) model; every tick updates it.
+        planner: chooses each step's controls and owns the gait.
+        options: tuning.
+
+    Attributes:
+        node: the automaton's node the robot is in.
+        rear, front: indices of the feet; in single stance the rear one carries.
+        steps: one report a VLO, the start's included.
+        reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
+        template_forces: (2, 2) leg forces of the template at this phase [N], rear and front.
+        swing: reference of the swing foot.
+    """
+
+    def __init__(
+        self, robot: PlanarBiped, planner: Planner, options: EmbeddingOptions | None = None
+    ) -> None:
+        self.robot = robot
+        self.planner = planner
+        self.options = options or EmbeddingOptions()
+        o = self.options
+        self.parameters = planner.gait.parameters
+        self.qp = WholeBodyQp(robot, o.friction, o.torque_scale)
+        self.tasks = TaskStack(robot.nv)
+        self.swing = SwingFoot(o.swing)
+        self.load = LoadEstimate(o.load, robot.gravity)
+        self.rear, self.front = 0, 1
+        self.node: Node = AUTOMATON.node(STRIDE_START["w"])
+        self.reference = np.zeros(6)
+        self.template_forces = np.zeros((2, 2))
+        self.phase_time = 0.0
+        self.steps: list[StepReport] = []
+        self.time = 0.0
+        self._sensed = Sensed(np.zeros(4), np.zeros(2))
+        self._rows = {
+            Phase.SS: np.array(o.single_stance.rows),
+            Phase.DS: np.array(o.double_stance.rows),
+        }
+        self._workspace = Workspace()
+        self._plan: Plan
+        self._plan_toe = 0.0
+
+    def start(self, rear: int) -> None:
+        """Begin at a VLO over foot ``rear``; the robot's model must be up to date.
+
+        The other foot is taken to be in the middle of its swing.
+        """
+        self.rear, self.front = rear, 1 - rear
+        self.node = AUTOMATON.node(STRIDE_START["w"])
+        r = self.robot
+        swung = 0.5 * (self.planner.gait.step_duration)
+        self.swing.start(r.foot_position[self.front], r.foot_velocity[self.front], swung)
+        self._sensed.swing_time = swung
+        self._sense(np.zeros(2, dtype=bool))
+        self._decide()
+
+    def tick(self, q: Array, v: Array, contact: NDArray[np.bool_], dt: float) -> Solution:
+        """Torques for the next ``dt`` seconds.
+
+        Args:
+            q, v: (nv,) measured configuration and velocity.
+            contact: (2,) whether each foot touches the ground.
+            dt: control period [s].
+
+        Raises:
+            ParameterError: if the state is not finite.
+        """
+        r = self.robot
+        r.update(q, v)
+        self._sensed.swing_time += dt
+        self._sense(contact)
+        self._advance()
+        x, y = self._sensed.state[0] - self._sensed.toes[0], self._sensed.state[1]
+        plan = self._plan
+        self.phase_time, row = at_phase(
+            plan.cx, plan.cy, plan.meta, self._plan_toe, x, y, self.phase_time + dt, self.reference
+        )
+        self._track_com(x, y, dt)
+        trunk = self.options.gains.trunk
+        self.tasks.desired[Row.TRUNK] = pd(
+            0.0, self.options.trunk_pitch, 0.0, q[2], v[2], trunk[0], trunk[1]
+        )
+        leg_forces(
+            plan.meta[row],
+            self.reference[0] + self._plan_toe,
+            self.reference[1],
+            self.parameters.rest_length,
+            self.template_forces,
+        )
+        self.time += dt
+        return self._solve_double() if self.node.phase is Phase.DS else self._solve_single(dt)
+
+    # -- the automaton ----------------------------------------------------------------
+
+    def _sense(self, contact: NDArray[np.bool_]) -> None:
+        r, s = self.robot, self._sensed
+        ground = r.foot_position[self.rear, 1]
+        height = r.com[1] - ground
+        s.toes[0], s.toes[1] = r.foot_position[self.rear, 0], r.foot_position[self.front, 0]
+        s.state[0], s.state[1] = r.com[0], height
+        # The swing leg's angular momentum makes dx/dt of the CoM swing within a step while
+        # the momentum about the foot, which is what the template predicts, does not.
+        s.state[2] = r.com_velocity[0] + r.angular_momentum / (r.mass * height)
+        s.state[3] = r.com_velocity[1]
+        s.front_contact = bool(contact[self.front])
+
+    def _advance(self) -> None:
+        """Take the first edge of the present node that the robot fires."""
+        p = self.parameters
+        for edge in self.node.edges:
+            if not isinstance(edge.target, str):
+                continue
+            if not fired(
+                edge.event,
+                self._sensed,
+                self.phase_time,
+                self._plan.liftoff,
+                p.rest_length,
+                p.gravity,
+            ):
+                continue
+            self.node = AUTOMATON.node(edge.target)
+            if edge.reset is Reset.SHIFT:
+                self._lift_off()
+            elif edge.reset is Reset.PLACE_FRONT:
+                self._replan()
+            if edge.section:
+                self._decide()
+            return
+
+    def _lift_off(self) -> None:
+        """The front foot becomes the rear one; the plan goes on from its toe."""
+        self._plan_toe = self._plan.front_toe
+        self.rear, self.front = self.front, self.rear
+        r, s = self.robot, self._sensed
+        s.toes[0], s.toes[1] = s.toes[1], s.toes[0]
+        s.swing_time = 0.0
+        self.swing.start(r.foot_position[self.front], r.foot_velocity[self.front])
+
+    # -- planning ---------------------------------------------------------------------
+
+    def _decide(self) -> None:
+        """At VLO: learn from the step that ended, choose the next one's controls."""
+        z = self._sensed.state[_VLO_STATE].copy()
+        begin = time.perf_counter()
+        if self.steps:
+            self.planner.observe(self.steps[-1].decision, z)
+            self.load.end_step()
+        decision = self.planner.decide(z)
+        seconds = time.perf_counter() - begin
+        self.steps.append(
+            StepReport(
+                self.time, z, decision, self.planner.offset.copy(), self.load.factor, seconds
+            )
+        )
+        self._replan()
+
+    def _replan(self) -> None:
+        """Template path from here to the touchdown after the next VLO."""
+        p, s = self.parameters, self._sensed
+        toes = (float(s.toes[0]), float(s.toes[1]))
+        decision = self.steps[-1].decision
+        first = run(p, self.node.name, s.state, decision.controls, toes, workspace=self._workspace)
+        strides = [first]
+        if first.completed:
+            # The next foothold must be known when the swing begins, before the next VLO.
+            ahead = self.planner.decide(first.state[_VLO_STATE])
+            strides.append(
+                run(
+                    p,
+                    first.node,
+                    first.state,
+                    ahead.controls,
+                    (float(first.toes[0]), float(first.toes[1])),
+                    workspace=self._workspace,
+                )
+            )
+        self._plan = chain(strides)
+        self._plan_toe = toes[0]
+        self.phase_time = 0.0
+
+    # -- control ----------------------------------------------------------------------
+
+    def _track_com(self, x: float, y: float, dt: float) -> None:
+        ref, s, d = self.reference, self._sensed, self.tasks.desired
+        kp, kd = self.options.gains.com
+        self.tasks.read(self.robot, self.front, y)
+        d[Row.COM_X] = pd(ref[4], ref[0], ref[2], x, s.state[2], kp, kd)
+        d[Row.COM_Y] = pd(ref[5], ref[1], ref[3], y, s.state[3], kp, kd)
+        self.load.observe(d[Row.COM_Y] - ref[5], dt)
+
+    def _solve_double(self) -> Solution:
+        r, o = self.robot, self.options
+        forces = self.template_forces
+        cap = np.array([unloading_cap(forces[0, 1], r.mass * r.gravity), np.inf])
+        return self.qp.solve(
+            self.tasks,
+            o.double_stance,
+            self._rows[Phase.DS],
+            (self.rear, self.front),
+            forces.ravel(),
+            cap,
+            self.load.factor,
+        )
+
+    def _solve_single(self, dt: float) -> Solution:
+        r, o, swing, d = self.robot, self.options, self.swing, self.tasks.desired
+        swing.advance(self._plan.foothold, self._plan.touchdown - self.phase_time, dt)
+        position, velocity = r.foot_position[self.front], r.foot_velocity[self.front]
+        kp, kd = o.gains.swing
+        for row, axis, i in ((Row.SWING_X, swing.x, 0), (Row.SWING_Y, swing.y, 1)):
+            d[row] = pd(axis[2], axis[0], axis[1], position[i], velocity[i], kp, kd)
+        return self.qp.solve(
+            self.tasks,
+            o.single_stance,
+            self._rows[Phase.SS],
+            (self.rear,),
+            self.template_forces[0],
+            _NO_CAP,
+            self.load.factor,
+        )

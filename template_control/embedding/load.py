@@ -1,0 +1,58 @@
+"""How much heavier the robot is than its model says, learnt from the vertical feedback."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class LoadOptions:
+    """Tuning of the load estimate.
+
+    Attributes:
+        gain: share of a step's mean feedback that enters the estimate.
+        dead_zone: mean feedback over g that counts as none; a step of the nominal robot
+            has up to this much, from the swing leg, and must not be learnt.
+        step_bound: largest change of the factor in one step; a push is no load.
+        bounds: of the factor.
+    """
+
+    gain: float = 0.7
+    dead_zone: float = 0.02
+    step_bound: float = 0.05
+    bounds: tuple[float, float] = (0.7, 1.4)
+
+
+class LoadEstimate:
+    """Ratio of the real to the modelled weight.
+
+    Over a whole step the feedback part of the CoM's vertical acceleration averages to
+    nothing, unless forces computed with the model's mass do not carry the robot. All joint
+    torques are then scaled by the factor learnt here; the model itself stays nominal.
+
+    Attributes:
+        factor: the estimate, 1 at first.
+    """
+
+    def __init__(self, options: LoadOptions, gravity: float) -> None:
+        self.options = options
+        self.factor = 1.0
+        self._gravity = gravity
+        self._sum = 0.0
+        self._time = 0.0
+
+    def observe(self, feedback: float, dt: float) -> None:
+        """Add the vertical feedback acceleration [m/s^2] of one tick."""
+        self._sum += feedback * dt
+        self._time += dt
+
+    def end_step(self) -> None:
+        """Learn from the step that just ended."""
+        if self._time == 0.0:
+            return
+        o = self.options
+        mean = self._sum / self._time / self._gravity
+        change = min(o.gain * max(abs(mean) - o.dead_zone, 0.0), o.step_bound)
+        factor = self.factor + (change if mean > 0.0 else -change)
+        self.factor = min(max(factor, o.bounds[0]), o.bounds[1])
+        self._sum = self._time = 0.0

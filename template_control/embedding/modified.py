@@ -1,0 +1,91 @@
+"""The paper's own planner: the modified walking controller once a step at VLO."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planner import Decision
+from template_control.slip.automaton import AUTOMATON, STRIDE_START, Outcome, Slot
+from template_control.slip.gait import WalkingGait
+from template_control.slip.modified_walking import search_angle
+from template_control.slip.stride import Workspace
+from template_control.slip.tables import TABLES
+
+Array = NDArray[np.float64]
+
+_NODE = AUTOMATON.index[STRIDE_START["w"]]
+
+
+@dataclass(frozen=True)
+class ModifiedOptions:
+    """Bounds of the search.
+
+    Attributes:
+        angle_range: touchdown angle relative to the gait's [rad].
+        stiffness_range: kappa_2 over k0.
+        top_margin: alpha stays this far [rad] below asin(y / l0).
+        tolerance: distance from the gait's VLO state, in SI units, that counts as reached.
+    """
+
+    angle_range: tuple[float, float] = (-0.14, 0.08)
+    stiffness_range: tuple[float, float] = (0.5, 1.5)
+    top_margin: float = 0.01
+    tolerance: float = 0.05
+
+
+class ModifiedPlanner:
+    """kappa_1 = k0, kappa_2 by equation (38), alpha by search on the exact map.
+
+    Args:
+        gait: to reach at the next VLO.
+        options: bounds.
+
+    Attributes:
+        offset: zero; the paper's planner learns nothing.
+    """
+
+    def __init__(self, gait: WalkingGait, options: ModifiedOptions | None = None) -> None:
+        self.gait = gait
+        self.options = options or ModifiedOptions()
+        self.offset: Array = np.zeros(3)
+        self._workspace = Workspace()
+        k0 = gait.parameters.leg_stiffness
+        self._stiffness = np.array(self.options.stiffness_range) * k0
+
+    def decide(self, z: Array) -> Decision:
+        """Controls for a step from VLO state ``z`` (3,); see :class:`Planner`."""
+        p, w, o = self.gait.parameters, self._workspace, self.options
+        nominal = float(self.gait.controls[Slot.TOUCHDOWN_ANGLE])
+        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
+        high = min(nominal + o.angle_range[1], top)
+        angles = np.array([min(nominal + o.angle_range[0], high), high])
+        outcome, alpha, kappa_2, residual = search_angle(
+            TABLES,
+            _NODE,
+            z,
+            self.gait.vlo,
+            min(nominal, high),
+            angles,
+            p.leg_stiffness,
+            self._stiffness,
+            p.mass,
+            p.gravity,
+            p.rest_length,
+            w.cx,
+            w.cy,
+            w.meta,
+            w.events,
+            w.work,
+            w.z_next,
+        )
+        controls = self.gait.controls.copy()
+        controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2
+        feasible = outcome == Outcome.SECTION
+        reached = feasible and residual < o.tolerance**2
+        return Decision(controls, w.z_next.copy(), feasible, reached)
+
+    def observe(self, decision: Decision, z: Array) -> None:
+        """The paper's planner plans every step afresh."""

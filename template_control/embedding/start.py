@@ -1,0 +1,101 @@
+"""The robot's state at a VLO of the template: where a run begins."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import RobotError
+from template_control.robot.planar_biped import BASE_DOF, PlanarBiped
+
+Array = NDArray[np.float64]
+
+_OUTPUTS = 7  # CoM (2), trunk (1), both feet (4)
+
+
+def state_at_vlo(
+    robot: PlanarBiped,
+    z: Array,
+    stance: int,
+    swing_position: Array,
+    swing_velocity: Array,
+    pitch: float = 0.0,
+) -> tuple[Array, Array]:
+    """(q, v) with the CoM over the stance foot at x = 0 and the VLO state ``z``.
+
+    Args:
+        robot: the model; its last update is overwritten.
+        z: (3,) dx/dt, y, dy/dt; dx/dt is the angular momentum about the foot over m y.
+        stance: index of the stance foot.
+        swing_position, swing_velocity: (2,) of the swing foot [m, m/s].
+        pitch: of the trunk, at rest [rad].
+
+    Raises:
+        RobotError: if the legs do not reach.
+    """
+    if robot.nv != _OUTPUTS:
+        raise RobotError(
+            f"{robot.name} has {robot.nv} coordinates: only five-link bipeds start here"
+        )
+    swing = 1 - stance
+    q = np.zeros(robot.nv)
+    q[1] = 0.8 * z[1]
+    q[2] = pitch
+    for leg in robot.legs:
+        q[[BASE_DOF + leg[0], BASE_DOF + leg[1]]] = -0.4, 0.8
+    zero = np.zeros(robot.nv)
+
+    def residual() -> Array:
+        return np.concatenate(
+            (
+                robot.com - [0.0, z[1]],
+                [q[2] - pitch],
+                robot.foot_position[stance],
+                robot.foot_position[swing] - swing_position,
+            )
+        )
+
+    def jacobian() -> Array:
+        rows = np.zeros((_OUTPUTS, robot.nv))
+        rows[0:2] = robot.com_jacobian
+        rows[2, 2] = 1.0
+        r = robot.foot_radius
+        for i, foot in enumerate((stance, swing)):
+            rows[3 + 2 * i : 5 + 2 * i] = robot.foot_jacobian[foot]
+            # The lowest point's path, not that of the material point which touches there.
+            rows[3 + 2 * i, 2] += r
+            rows[3 + 2 * i, [BASE_DOF + j for j in robot.legs[foot]]] += r
+        return rows
+
+    for _ in range(50):
+        robot.update(q, zero)
+        error = residual()
+        if np.max(np.abs(error)) < 1e-12:
+            break
+        q -= np.linalg.solve(jacobian(), error)
+    else:
+        raise RobotError(f"{robot.name}: the legs do not reach a CoM height of {z[1]:g} m")
+    limits = robot.model
+    if np.any(q < limits.lowerPositionLimit) or np.any(q > limits.upperPositionLimit):
+        raise RobotError(f"{robot.name}: a VLO at height {z[1]:g} m needs joints beyond limits")
+
+    # Velocities: dx/dt of the CoM follows from the angular momentum about the stance foot.
+    rows = np.zeros((_OUTPUTS, robot.nv))
+    rows[0:2] = robot.com_jacobian
+    rows[0] += _angular_momentum_row(robot, q) / (robot.mass * z[1])
+    rows[2, 2] = 1.0
+    rows[3:5] = robot.foot_jacobian[stance]
+    rows[5:7] = robot.foot_jacobian[swing]
+    v = np.linalg.solve(rows, [z[0], z[2], 0.0, 0.0, 0.0, *swing_velocity])
+    robot.update(q, v)
+    return q, v
+
+
+def _angular_momentum_row(robot: PlanarBiped, q: Array) -> Array:
+    """(nv,) row that maps v to the angular momentum about the CoM; it is linear in v."""
+    row = np.zeros(robot.nv)
+    for i, unit in enumerate(np.eye(robot.nv)):
+        robot.update(q, unit)
+        row[i] = robot.angular_momentum
+    robot.update(q, np.zeros(robot.nv))
+    return row

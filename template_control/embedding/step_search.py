@@ -1,0 +1,178 @@
+"""Compiled look-ahead on the exact VLO map: what an LQR step is worth, and a better one.
+
+A step is judged two steps ahead: it is taken on the exact map, the step after it by the
+(bounded) LQR law, and the state then reached is priced with the LQR's cost-to-go.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from template_control.slip.kernel import MAX_EVENTS, MAX_SEGMENTS, vlo_map
+from template_control.slip.tables import Tables
+from template_control.slip.taylor import ORDER
+
+Array = NDArray[np.float64]
+
+FALL_PRICE = 1e6
+"""Price of a second step that fails; a first step that fails costs twice that."""
+
+
+class Law(NamedTuple):
+    """A bounded linear law u = u_s - K (z - z_s) and what it needs to be judged.
+
+    Attributes:
+        target: (3,) z_s, dx/dt, y, dy/dt.
+        control: (3,) u_s: alpha [rad], kappa_1/k0, kappa_2/k0.
+        gain: (3, 3) K.
+        cost: (3, 3) cost-to-go about ``target``.
+        offset: (3,) what the robot adds to the template's next VLO state.
+        lower, upper: (3,) bounds of u.
+        top_margin: alpha stays this far [rad] below asin(y / l0).
+        mass, gravity, rest_length, stiffness: the template.
+    """
+
+    target: Array
+    control: Array
+    gain: Array
+    cost: Array
+    offset: Array
+    lower: Array
+    upper: Array
+    top_margin: float
+    mass: float
+    gravity: float
+    rest_length: float
+    stiffness: float
+
+
+class Scratch(NamedTuple):
+    """Arrays the kernel writes to."""
+
+    cx: Array
+    cy: Array
+    meta: Array
+    events: Array
+    work: Array
+
+
+def scratch() -> Scratch:
+    """New arrays for one thread."""
+    return Scratch(
+        np.zeros((MAX_SEGMENTS, ORDER + 1)),
+        np.zeros((MAX_SEGMENTS, ORDER + 1)),
+        np.zeros((MAX_SEGMENTS, 7)),
+        np.zeros((MAX_EVENTS, 8)),
+        np.zeros((2, 4, ORDER + 1)),
+    )
+
+
+@njit(cache=True)
+def bounded(law: Law, z: Array, u: Array) -> None:
+    """Clip controls ``u`` (3,) in place to what is admissible at VLO state ``z`` (3,)."""
+    for i in range(3):
+        u[i] = min(max(u[i], law.lower[i]), law.upper[i])
+    top = np.arcsin(min(z[1] / law.rest_length, 1.0)) - law.top_margin
+    u[0] = min(u[0], top)
+
+
+@njit(cache=True)
+def linear(law: Law, z: Array, u: Array) -> None:
+    """The law's bounded controls at ``z`` into ``u``."""
+    for i in range(3):
+        u[i] = law.control[i]
+        for j in range(3):
+            u[i] -= law.gain[i, j] * (z[j] - law.target[j])
+    bounded(law, z, u)
+
+
+@njit(cache=True)
+def step(tables: Tables, node: int, law: Law, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
+    """One step from ``z`` with controls ``u``, the robot's offset included; the Outcome."""
+    controls = np.zeros(5)
+    controls[0] = u[0]
+    controls[1], controls[2] = u[1] * law.stiffness, u[2] * law.stiffness
+    outcome = vlo_map(
+        tables,
+        node,
+        z,
+        controls,
+        law.mass,
+        law.gravity,
+        law.rest_length,
+        s.cx,
+        s.cy,
+        s.meta,
+        s.events,
+        s.work,
+        z_next,
+    )
+    for i in range(3):
+        z_next[i] += law.offset[i]
+    return outcome
+
+
+@njit(cache=True)
+def _cost_to_go(law: Law, z: Array) -> float:
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += (z[i] - law.target[i]) * law.cost[i, j] * (z[j] - law.target[j])
+    return total
+
+
+@njit(cache=True)
+def price(
+    tables: Tables, node: int, law: Law, s: Scratch, z: Array, u: Array, first: Array
+) -> float:
+    """Cost of taking ``u`` at ``z``; the state after one step into ``first`` (3,)."""
+    second = np.empty(3)
+    u2 = np.empty(3)
+    if step(tables, node, law, s, z, u, first) != 0:
+        return 2.0 * FALL_PRICE
+    linear(law, first, u2)
+    if step(tables, node, law, s, first, u2, second) != 0:
+        return FALL_PRICE + _cost_to_go(law, first)
+    return _cost_to_go(law, second) + 0.3 * _cost_to_go(law, first)
+
+
+@njit(cache=True)
+def search(
+    tables: Tables,
+    node: int,
+    law: Law,
+    s: Scratch,
+    z: Array,
+    spread: Array,
+    best: Array,
+    first: Array,
+) -> float:
+    """Improve ``best`` (3,) in place over a shrinking grid in alpha and kappa_2; its price.
+
+    Args:
+        spread: (2,) half-widths of the first grid in alpha [rad] and kappa_2/k0.
+        best: start of the search, and its result.
+        first: (3,) overwritten with the state after the step.
+    """
+    u = np.empty(3)
+    z1 = np.empty(3)
+    cheapest = price(tables, node, law, s, z, best, first)
+    width_alpha, width_kappa = spread[0], spread[1]
+    for _ in range(3):
+        c0, c2 = best[0], best[2]
+        for i in range(-2, 3):
+            for j in range(-1, 2):
+                u[0], u[1], u[2] = c0 + 0.5 * i * width_alpha, best[1], c2 + j * width_kappa
+                bounded(law, z, u)
+                cost = price(tables, node, law, s, z, u, z1)
+                if cost < cheapest:
+                    cheapest = cost
+                    best[:] = u
+                    first[:] = z1
+        width_alpha *= 0.4
+        width_kappa *= 0.4
+    return cheapest

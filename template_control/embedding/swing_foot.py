@@ -1,0 +1,100 @@
+"""Swing foot: a quintic to the next foothold, re-aimed at every tick.
+
+At each tick the path is the quintic from the present reference (position, velocity,
+acceleration) to the foothold in the time the template still needs to get there, so a
+foothold or a touchdown time that moves leaves no step in the reference. The foot rises to
+its clearance in the first half of the swing and comes down in the second, with a small
+downward speed at the end, so that it meets the ground for certain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SwingOptions:
+    """Shape of the swing.
+
+    Attributes:
+        clearance: height of the foot at mid-swing [m].
+        landing_speed: downward speed at touchdown [m/s].
+        horizon: below this time to go [s] the path is no longer re-aimed.
+        lead: the foot is above its foothold this long before touchdown [s], so that it
+            comes down at rest relative to the ground.
+    """
+
+    clearance: float = 0.05
+    landing_speed: float = 0.2
+    horizon: float = 0.02
+    lead: float = 0.03
+
+
+@njit(cache=True)
+def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
+    """Advance (position, velocity, acceleration) by ``dt`` along the quintic to its target.
+
+    Args:
+        state: (3,) overwritten.
+        target, speed: position and velocity after ``time`` [s]; the acceleration there is 0.
+    """
+    p, v, a = state[0], state[1], state[2]
+    # In tau = t / time: c0..c5 with c0 = p, c1 = v T, c2 = a T^2 / 2.
+    c1, c2 = v * time, 0.5 * a * time * time
+    d = target - p - c1 - c2
+    e = speed * time - c1 - 2.0 * c2
+    f = -2.0 * c2
+    c3 = 10.0 * d - 4.0 * e + 0.5 * f
+    c4 = -15.0 * d + 7.0 * e - f
+    c5 = 6.0 * d - 3.0 * e + 0.5 * f
+    s = dt / time
+    state[0] = p + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+    state[1] = (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / time
+    state[2] = (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / time**2
+
+
+class SwingFoot:
+    """Reference of the swing foot; it persists from liftoff to touchdown.
+
+    Attributes:
+        x, y: (3,) position, velocity, acceleration [m, m/s, m/s^2] in the world.
+    """
+
+    def __init__(self, options: SwingOptions) -> None:
+        self.options = options
+        self.x = np.zeros(3)
+        self.y = np.zeros(3)
+        self._elapsed = 0.0
+
+    def start(self, position: Array, velocity: Array, elapsed: float = 0.0) -> None:
+        """Begin a swing at the foot's present position and velocity (2,)."""
+        self.x[:] = position[0], velocity[0], 0.0
+        self.y[:] = position[1], velocity[1], 0.0
+        self._elapsed = elapsed
+
+    def advance(self, foothold: float, time_to_go: float, dt: float) -> None:
+        """Move the reference by ``dt`` towards ``foothold``, due in ``time_to_go`` [s]."""
+        o = self.options
+        if time_to_go <= o.horizon or not np.isfinite(foothold):
+            self._coast(dt)
+        else:
+            quintic_step(self.x, foothold, 0.0, max(time_to_go - o.lead, o.horizon), dt)
+            # Rising while less than half of the swing is over.
+            rising = 0.5 * (time_to_go - self._elapsed)
+            if rising > o.horizon:
+                quintic_step(self.y, o.clearance, 0.0, rising, dt)
+            else:
+                quintic_step(self.y, 0.0, -o.landing_speed, time_to_go, dt)
+        self._elapsed += dt
+
+    def _coast(self, dt: float) -> None:
+        """Overdue or nearly there: hold the horizontal position, keep coming down."""
+        for axis, speed in ((self.x, 0.0), (self.y, -self.options.landing_speed)):
+            axis[1], axis[2] = speed, 0.0
+            axis[0] += speed * dt

@@ -1,0 +1,177 @@
+"""The plant: the robot in PyBullet, headless, driven by joint torques and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import ParameterError
+from template_control.plant.quiet import stdout_to_stderr
+from template_control.robot.planar_biped import BASE_DOF, PlanarBiped
+
+with stdout_to_stderr():  # PyBullet announces its build time on standard output
+    import pybullet
+
+Array = NDArray[np.float64]
+
+_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE  # the default recomputes inertias from shapes
+
+
+@dataclass(frozen=True)
+class PlantOptions:
+    """What the world is like.
+
+    Attributes:
+        friction: Coulomb coefficient between foot and ground.
+        time_step: physics step [s].
+        mass_scale: every link's mass and inertia times this (the controller is not told).
+    """
+
+    friction: float = 0.7
+    time_step: float = 1e-3
+    mass_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "time_step", "mass_scale"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ParameterError(f"plant option {name} is {value!r}: give a positive number")
+
+
+class BulletPlant:
+    """A PyBullet world in DIRECT mode with flat ground at height 0 and one robot.
+
+    Args:
+        robot: whose URDF to load and whose joint order to speak.
+        options: friction, physics step, mass error.
+
+    Attributes:
+        client, body: PyBullet's handles of the world and the robot.
+        joints: PyBullet's joint indices in the order of q.
+    """
+
+    def __init__(self, robot: PlanarBiped, options: PlantOptions) -> None:
+        self.robot = robot
+        self.options = options
+        self.client = pybullet.connect(pybullet.DIRECT)
+        p, c = pybullet, self.client
+        p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
+        p.setTimeStep(options.time_step, physicsClientId=c)
+        plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=c)
+        self._ground = p.createMultiBody(0, plane, physicsClientId=c)
+        self.body = p.loadURDF(str(robot.path), useFixedBase=True, flags=_FLAGS, physicsClientId=c)
+        info = [
+            p.getJointInfo(self.body, i, physicsClientId=c)
+            for i in range(p.getNumJoints(self.body, physicsClientId=c))
+        ]
+        by_name = {row[1].decode(): row[0] for row in info}
+        by_link = {row[12].decode(): row[0] for row in info}
+        # Pinocchio sorts sibling joints by name, Bullet keeps the file's order.
+        names = list(robot.model.names)[1:]
+        self.joints = [by_name[name] for name in names]
+        self._actuated = self.joints[BASE_DOF:]
+        self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
+        self._trunk = self.joints[BASE_DOF - 1]
+        self._configure(len(info))
+
+    def _configure(self, joints: int) -> None:
+        p, c, body = pybullet, self.client, self.body
+        friction = self.options.friction
+        # One property a call: a combined call silently drops some of them.
+        p.changeDynamics(self._ground, -1, lateralFriction=1.0, physicsClientId=c)
+        p.changeDynamics(self._ground, -1, restitution=0.0, physicsClientId=c)
+        for link in range(-1, joints):
+            for name, value in (
+                ("lateralFriction", friction),  # Bullet multiplies the two bodies' values
+                ("restitution", 0.0),
+                ("linearDamping", 0.0),
+                ("angularDamping", 0.0),
+                ("jointDamping", 0.0),
+                ("maxJointVelocity", 1e4),
+            ):
+                p.changeDynamics(body, link, **{name: value}, physicsClientId=c)
+            if self.options.mass_scale != 1.0:
+                dynamics = p.getDynamicsInfo(body, link, physicsClientId=c)
+                mass, inertia = dynamics[0], dynamics[2]
+                scale = self.options.mass_scale
+                p.changeDynamics(body, link, mass=mass * scale, physicsClientId=c)
+                p.changeDynamics(
+                    body,
+                    link,
+                    localInertiaDiagonal=[i * scale for i in inertia],
+                    physicsClientId=c,
+                )
+        for joint in self.joints:
+            p.setJointMotorControl2(body, joint, p.VELOCITY_CONTROL, force=0.0, physicsClientId=c)
+
+    def reset(self, q: Array, v: Array) -> None:
+        """Place the robot at (q, v); only for the start of a run."""
+        for joint, position, velocity in zip(self.joints, q, v, strict=True):
+            pybullet.resetJointState(
+                self.body, joint, position, velocity, physicsClientId=self.client
+            )
+
+    def read(self, q: Array, v: Array) -> None:
+        """Write the measured configuration and velocity (nv,) into ``q`` and ``v``."""
+        states = pybullet.getJointStates(self.body, self.joints, physicsClientId=self.client)
+        for i, state in enumerate(states):
+            q[i] = state[0]
+            v[i] = state[1]
+
+    def contact_forces(self, out: Array) -> None:
+        """Write the ground's force on each foot (2, 2) [N], x and y, into ``out``.
+
+        Averages over the last physics step: the first sample of a touchdown is an impulse
+        divided by that step.
+        """
+        out[:] = 0.0
+        for contact in pybullet.getContactPoints(
+            self.body, self._ground, physicsClientId=self.client
+        ):
+            foot = self._feet.get(contact[3])
+            if foot is None:
+                continue
+            out[foot, 1] += contact[9]
+            out[foot, 0] += contact[10] * contact[11][0] + contact[12] * contact[13][0]
+
+    def trunk_touches_ground(self) -> bool:
+        """True where the trunk itself lies on the ground."""
+        return bool(
+            pybullet.getContactPoints(
+                self.body, self._ground, self._trunk, -1, physicsClientId=self.client
+            )
+        )
+
+    def step(self, torque: Array, push: float = 0.0) -> None:
+        """Advance one physics step.
+
+        Args:
+            torque: (nu,) joint torques [N m].
+            push: horizontal disturbance on the trunk's centre of mass [N].
+        """
+        p, c = pybullet, self.client
+        p.setJointMotorControlArray(
+            self.body, self._actuated, p.TORQUE_CONTROL, forces=torque, physicsClientId=c
+        )
+        if push:
+            p.applyExternalForce(
+                self.body,
+                self._trunk,
+                [push, 0.0, 0.0],
+                [0.0, 0.0, 0.0],
+                p.LINK_FRAME,
+                physicsClientId=c,
+            )
+        p.stepSimulation(physicsClientId=c)
+
+    def close(self) -> None:
+        """Disconnect; the plant is unusable afterwards."""
+        pybullet.disconnect(self.client)
+
+    def __enter__(self) -> BulletPlant:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

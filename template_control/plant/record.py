@@ -1,0 +1,137 @@
+"""A recorded run: what it holds, how it is written and read.
+
+``run.npz`` holds one array a field of :class:`Record` and the metadata as JSON text.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import RecordError
+
+Array = NDArray[np.float64]
+
+FORMAT = "template-control run 1"
+
+
+@dataclass(frozen=True)
+class Record:
+    """A run of a robot; T samples, S VLO states, SI units, world frame with y up.
+
+    Attributes:
+        time: (T,) [s].
+        q, v: (T, nv) measured configuration and velocity.
+        torque: (T, nu) joint torques applied after the sample [N m].
+        com, com_velocity: (T, 2).
+        angular_momentum: (T,) about the CoM, forward pitch positive [kg m^2/s].
+        template_com, template_velocity: (T, 2) the template at the robot's phase.
+        foot: (T, 2, 2) lowest points of the feet.
+        joint: (T, nu, 2) positions of the actuated joints.
+        contact_force: (T, 2, 2) the ground's force on each foot during the step before the
+            sample, averaged over the physics step [N].
+        template_force: (T, 2, 2) the template's leg forces, rear and front [N].
+        node: (T,) index into ``metadata["nodes"]``.
+        rear: (T,) index of the rear stance foot.
+        solved: (T,) False where the QP was not solved.
+        swing_reference: (T, 2) position of the swing foot's reference.
+        push: (T,) disturbance on the trunk [N].
+        vlo_time: (S,) time of each VLO, the start's included.
+        vlo_state: (S, 3) dx/dt (angular-momentum based), y, dy/dt.
+        vlo_predicted: (S, 3) state the planner expected at the next VLO.
+        vlo_controls: (S, 5) controls of the step that begins, by Slot.
+        vlo_offset: (S, 3) the planner's offset estimate.
+        vlo_reached: (S,) False where the planner took the best reachable step instead.
+        vlo_feasible: (S,) False where the template cannot complete the step at all.
+        vlo_load: (S,) load factor.
+        tick_seconds, solve_seconds: (ticks,) wall-clock time of every control tick and QP.
+        plan_seconds: (S,) wall-clock time of every plan.
+        metadata: robot, gait, options, joint names, limits, outcome and summary figures.
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    torque: Array
+    com: Array
+    com_velocity: Array
+    angular_momentum: Array
+    template_com: Array
+    template_velocity: Array
+    foot: Array
+    joint: Array
+    contact_force: Array
+    template_force: Array
+    node: NDArray[np.int64]
+    rear: NDArray[np.int64]
+    solved: NDArray[np.bool_]
+    swing_reference: Array
+    push: Array
+    vlo_time: Array
+    vlo_state: Array
+    vlo_predicted: Array
+    vlo_controls: Array
+    vlo_offset: Array
+    vlo_reached: NDArray[np.bool_]
+    vlo_feasible: NDArray[np.bool_]
+    vlo_load: Array
+    tick_seconds: Array
+    solve_seconds: Array
+    plan_seconds: Array
+    metadata: dict[str, Any]
+
+    @property
+    def steps(self) -> int:
+        """Completed steps."""
+        return len(self.vlo_time) - 1
+
+    @property
+    def fell(self) -> bool:
+        """True where the run ended in a fall."""
+        return bool(self.metadata["fall_reason"])
+
+    @property
+    def com_error(self) -> Array:
+        """(T, 2) template less robot at the robot's phase [m]."""
+        return self.template_com - self.com
+
+    def save(self, path: str | Path) -> Path:
+        """Write the run as a compressed ``.npz``.
+
+        Raises:
+            RecordError: if the file cannot be written.
+        """
+        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "metadata"}
+        text = json.dumps({"format": FORMAT, **self.metadata})
+        try:
+            np.savez_compressed(path, metadata=np.array(text), **arrays)
+        except OSError as error:
+            raise RecordError(f"cannot write the run to {path}: {error.strerror}") from None
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Record:
+        """Read a run that :meth:`save` wrote.
+
+        Raises:
+            RecordError: if the file is missing or is no recorded run.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                metadata = json.loads(str(data["metadata"]))
+                if metadata.pop("format", None) != FORMAT:
+                    raise KeyError("format")
+                names = [f.name for f in fields(cls) if f.name != "metadata"]
+                return cls(**{name: data[name] for name in names}, metadata=metadata)
+        except FileNotFoundError:
+            raise RecordError(f"there is no run at {path}: give a run.npz") from None
+        except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile):
+            raise RecordError(
+                f"{path} is no recorded run: give a run.npz of this library"
+            ) from None

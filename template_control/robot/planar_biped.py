@@ -1,0 +1,225 @@
+"""A planar biped with point feet, on Pinocchio.
+
+Frames: world x forward, y up (the URDF's z), pitch about the URDF's +y, so that a forward
+lean is positive. The generalised coordinates are q = (x, z, pitch, joints) in Pinocchio's
+joint order; all hinges are revolute, so nq = nv.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from template_control.errors import ParameterError, RobotError
+
+Array = NDArray[np.float64]
+
+BASE_DOF = 3
+_BASE = ("JointModelPX", "JointModelPZ", "JointModelRY")
+_HINGE = "JointModelRY"
+_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+_UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
+
+
+class PlanarBiped:
+    """Model of a planar biped and its kinematics and dynamics at the last :meth:`update`.
+
+    Attributes (constant):
+        name: the URDF's robot name.
+        path: the URDF file.
+        model: the Pinocchio model.
+        nv: degrees of freedom, 3 + number of actuated joints.
+        mass: total mass [kg].
+        gravity: gravitational acceleration [m/s^2].
+        feet: names of the two foot frames, left then right.
+        foot_radius: radius of the foot spheres [m].
+        joint_names: actuated joints in the order of q[3:].
+        torque_limit: (nv - 3,) URDF ``effort`` [N m].
+        velocity_limit: (nv - 3,) URDF ``velocity`` [rad/s].
+        legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
+        trunk_com: height of the trunk's own CoM above the hips [m].
+
+    Attributes (written by :meth:`update`; views that the next call overwrites):
+        mass_matrix: (nv, nv) M(q).
+        nonlinear_effects: (nv,) C(q, v) v + g(q) [N, N m].
+        com, com_velocity: (2,) [m, m/s].
+        com_jacobian: (2, nv); com_bias: (2,) its dJ/dt v [m/s^2].
+        angular_momentum: about the CoM, forward pitch positive [kg m^2/s].
+        angular_momentum_jacobian: (nv,) its row of the centroidal momentum matrix.
+        angular_momentum_bias: that row's time derivative times v [N m].
+        foot_position: (2, 2) lowest point of each foot sphere [m].
+        foot_velocity: (2, 2) of the material point there [m/s].
+        foot_jacobian: (2, 2, nv); foot_bias: (2, 2) its dJ/dt v for rolling [m/s^2].
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        model: pin.Model,
+        feet: tuple[str, str],
+        foot_radius: float,
+    ) -> None:
+        self.path = path
+        self.model = model
+        self.name: str = model.name
+        self.feet = feet
+        self.foot_radius = foot_radius
+        self.nv: int = model.nv
+        self.mass = float(pin.computeTotalMass(model))
+        self.gravity = float(-model.gravity.linear[2])
+        self.joint_names: tuple[str, ...] = tuple(model.names)[1 + BASE_DOF :]
+        self.torque_limit: Array = np.array(model.effortLimit[BASE_DOF:])
+        self.velocity_limit: Array = np.array(model.velocityLimit[BASE_DOF:])
+        self._foot_ids = tuple(model.getFrameId(f) for f in feet)
+        self.legs: tuple[tuple[int, ...], ...] = tuple(
+            tuple(j - BASE_DOF - 1 for j in model.supports[parent] if j > BASE_DOF)
+            for parent in (model.frames[f].parentJoint for f in self._foot_ids)
+        )
+        self.trunk_com = float(model.inertias[BASE_DOF].lever[2])
+        self._data = model.createData()
+        data = self._data
+        # Pinocchio keeps these arrays in place, so the views stay good.
+        self.mass_matrix: Array = data.M
+        self.nonlinear_effects: Array = data.nle
+        self._com_jacobian_3d: Array = data.Jcom
+        self.com = np.zeros(2)
+        self.com_velocity = np.zeros(2)
+        self.com_bias = np.zeros(2)
+        self.com_jacobian = np.zeros((2, self.nv))
+        self.angular_momentum = 0.0
+        self.angular_momentum_jacobian = np.zeros(self.nv)
+        self.angular_momentum_bias = 0.0
+        self.foot_position = np.zeros((2, 2))
+        self.foot_velocity = np.zeros((2, 2))
+        self.foot_jacobian = np.zeros((2, 2, self.nv))
+        self.foot_bias = np.zeros((2, 2))
+
+    @classmethod
+    def from_urdf(
+        cls, path: str | Path, feet: Sequence[str] = ("left_foot", "right_foot")
+    ) -> PlanarBiped:
+        """Load a planar URDF: prismatic x, prismatic z, revolute y, then hinges about y.
+
+        Args:
+            path: the URDF file.
+            feet: the two foot links; each has one sphere as collision geometry.
+
+        Raises:
+            RobotError: if the file is missing, no URDF, not planar, or lacks a foot.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
+        try:
+            model = pin.buildModelFromUrdf(str(path))
+        except (ValueError, RuntimeError) as error:
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else "unreadable"
+            raise RobotError(f"{path} is no URDF that Pinocchio reads ({reason})") from None
+        _check_planar(path, model)
+        if len(feet) != 2:
+            raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
+        for foot in feet:
+            if not model.existFrame(foot):
+                links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
+                raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
+        radius = _foot_radius(path, model, feet)
+        return cls(path, model, (feet[0], feet[1]), radius)
+
+    def update(self, q: Array, v: Array) -> None:
+        """Compute everything the controller needs at (q, v), each quantity once.
+
+        Args:
+            q: (nv,) configuration [m, rad].
+            v: (nv,) velocity [m/s, rad/s].
+
+        Raises:
+            ParameterError: if a value is NaN or infinite.
+        """
+        if not (np.isfinite(q).all() and np.isfinite(v).all()):
+            raise ParameterError(
+                f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
+            )
+        model, data = self.model, self._data
+        pin.computeAllTerms(model, data, q, v)
+        pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
+        com, velocity, bias = data.com[0], data.vcom[0], data.acom[0]
+        self.com[0], self.com[1] = com[0], com[2]
+        self.com_velocity[0], self.com_velocity[1] = velocity[0], velocity[2]
+        self.com_bias[0], self.com_bias[1] = bias[0], bias[2]
+        self.com_jacobian[:] = self._com_jacobian_3d[::2]
+        self.angular_momentum = float(data.hg.angular[1])
+        self.angular_momentum_jacobian[:] = data.Ag[4]
+        # The base coordinates' rows of C v are the rates of linear momentum and of the
+        # angular momentum about the base at zero acceleration; move the latter to the CoM.
+        rate = self.nonlinear_effects[:BASE_DOF] - data.g[:BASE_DOF]
+        self.angular_momentum_bias = float(
+            rate[2] - (com[2] - q[1]) * rate[0] + (com[0] - q[0]) * rate[1]
+        )
+        r = self.foot_radius
+        for i, frame in enumerate(self._foot_ids):
+            position = pin.updateFramePlacement(model, data, frame).translation
+            jacobian = pin.getFrameJacobian(model, data, frame, _WORLD_ALIGNED)
+            drift = pin.getFrameClassicalAcceleration(model, data, frame, _WORLD_ALIGNED)
+            self.foot_position[i, 0] = position[0]
+            self.foot_position[i, 1] = position[2] - r
+            # Rolling without slip: the material point below the sphere's centre is at rest.
+            self.foot_jacobian[i, 0] = jacobian[0] - r * jacobian[4]
+            self.foot_jacobian[i, 1] = jacobian[2]
+            linear, angular = drift.linear, drift.angular
+            self.foot_bias[i, 0] = linear[0] - r * angular[1]
+            self.foot_bias[i, 1] = linear[2]
+        self.foot_velocity[:] = self.foot_jacobian @ v
+
+    def joint_positions(self, out: Array) -> None:
+        """Write the actuated joints' positions (nv - 3, 2) [m] at the last update."""
+        placements = self._data.oMi
+        for i in range(self.nv - BASE_DOF):
+            position = placements[i + 1 + BASE_DOF].translation
+            out[i, 0], out[i, 1] = position[0], position[2]
+
+    def hip_height(self, q: Array) -> float:
+        """Height of the point the legs hang from [m]; the base joint is placed there."""
+        return float(q[1])
+
+
+def _check_planar(path: Path, model: pin.Model) -> None:
+    kinds = [joint.shortname() for joint in model.joints][1:]
+    names = list(model.names)[1:]
+    if tuple(kinds[:BASE_DOF]) != _BASE:
+        first = list(zip(names, kinds, strict=True))[:BASE_DOF]
+        raise RobotError(
+            f"{path} is not planar: its first joints are {first},"
+            " and must be prismatic x, prismatic z, revolute y"
+        )
+    for name, kind in zip(names[BASE_DOF:], kinds[BASE_DOF:], strict=True):
+        if kind != _HINGE:
+            raise RobotError(
+                f"{path} is not planar: joint {name!r} is {kind},"
+                " and must be revolute about y (with limits, not continuous)"
+            )
+    limits = np.array(model.effortLimit[BASE_DOF:])
+    for name, limit in zip(names[BASE_DOF:], limits, strict=True):
+        if not 0.0 < limit < _UNLIMITED:
+            raise RobotError(f"{path}: joint {name!r} has effort {limit}: give its torque limit")
+
+
+def _foot_radius(path: Path, model: pin.Model, feet: Sequence[str]) -> float:
+    geometry = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.COLLISION)
+    radii = set()
+    for foot in feet:
+        frame = model.getFrameId(foot)
+        spheres = [
+            g.geometry.radius
+            for g in geometry.geometryObjects
+            if g.parentFrame == frame and hasattr(g.geometry, "radius")
+        ]
+        if len(spheres) != 1:
+            raise RobotError(f"{path}: foot link {foot!r} must have one sphere as collision shape")
+        radii.add(float(spheres[0]))
+    if len(radii) != 1:
+        raise RobotError(f"{path}: the feet have different radii {sorted(radii)}")
+    return radii.pop()

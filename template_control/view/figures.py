@@ -1,0 +1,180 @@
+"""Figures of a recorded walk: stick diagram, CoM, joint torques, ground forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from template_control.errors import RecordError
+from template_control.plant.record import Record
+
+Array = NDArray[np.float64]
+
+LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
+_LEGS = (LEFT, RIGHT)
+_WINDOW = 2.2  # [s], about four steps
+
+
+def _window(record: Record, seconds: float = _WINDOW) -> slice:
+    """Samples of the last ``seconds`` of the run."""
+    return slice(int(np.searchsorted(record.time, record.time[-1] - seconds)), None)
+
+
+def _single_stance(record: Record) -> NDArray[np.bool_]:
+    single = np.array([name.startswith("SS") for name in record.metadata["nodes"]])
+    return np.asarray(single[record.node])
+
+
+def _shade(axes: Axes, record: Record, w: slice) -> None:
+    """Grey over single stance, as in Fig. 13."""
+    axes.fill_between(
+        record.time[w],
+        0.0,
+        1.0,
+        where=_single_stance(record)[w].tolist(),
+        transform=axes.get_xaxis_transform(),
+        color="0.92",
+        linewidth=0,
+        zorder=0,
+    )
+    axes.margins(x=0)
+
+
+def stick_diagram(record: Record, seconds: float = _WINDOW, interval: float = 0.06) -> Figure:
+    """The robot every ``interval`` seconds with its CoM and the template's path (Fig. 12)."""
+    w = _window(record, seconds)
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    axes = figure.subplots()
+    time = record.time[w]
+    rows = np.searchsorted(time, np.arange(time[0], time[-1], interval)) + (w.start or 0)
+    height = 2.0 * record.metadata["trunk_com"]
+    for row in rows:
+        q = record.q[row]
+        hip = q[:2]
+        top = hip + height * np.array([np.sin(q[2]), np.cos(q[2])])
+        axes.plot(*np.stack((hip, top)).T, color=TRUNK, linewidth=1.2, alpha=0.55)
+        for foot, leg in enumerate(record.metadata["legs"]):
+            points = np.vstack((record.joint[row, leg], record.foot[row, foot]))
+            axes.plot(*points.T, color=_LEGS[foot], linewidth=1.0, alpha=0.65)
+    template = record.template_com[w]
+    axes.plot(*template.T, color=TEMPLATE, linewidth=1.0, linestyle="--", label="template CoM")
+    axes.plot(*record.com[rows].T, "o", color=COM, markersize=3.5, label="robot CoM")
+    for foot, name in enumerate(("left leg", "right leg")):
+        axes.plot([], [], color=_LEGS[foot], label=name)
+    axes.axhline(0.0, color="0.3", linewidth=0.8)
+    axes.set(xlabel="x [m]", ylabel="y [m]", title=f"{record.metadata['robot']}: stick diagram")
+    axes.set_aspect("equal")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4, frameon=False)
+    return figure
+
+
+def com_tracking(record: Record, seconds: float = _WINDOW) -> Figure:
+    """CoM x and y against the template, and the errors, single stance shaded (Fig. 13a)."""
+    w = _window(record, seconds)
+    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    upper, middle, lower = figure.subplots(3, 1, sharex=True)
+    for axes, axis, name in ((upper, 0, "x"), (middle, 1, "y")):
+        axes.plot(record.time[w], record.com[w, axis], color=COM, label="robot")
+        axes.plot(
+            record.time[w],
+            record.template_com[w, axis],
+            color=TEMPLATE,
+            linestyle="--",
+            linewidth=1.0,
+            label="template",
+        )
+        axes.set_ylabel(f"CoM {name} [m]")
+    error = 1e3 * record.com_error[w]
+    lower.plot(record.time[w], error[:, 0], color=LEFT, label="x")
+    lower.plot(record.time[w], error[:, 1], color=RIGHT, label="y")
+    lower.set(xlabel="time [s]", ylabel="template - robot [mm]")
+    for axes in (upper, middle, lower):
+        _shade(axes, record, w)
+        axes.legend(loc="upper right")
+    upper.set_title(f"{record.metadata['robot']}: centre of mass (single stance shaded)")
+    return figure
+
+
+def joint_torques(record: Record, seconds: float = _WINDOW) -> Figure:
+    """Joint torques with their limits, single stance shaded (Fig. 13b)."""
+    w = _window(record, seconds)
+    names, limits = record.metadata["joints"], record.metadata["torque_limit"]
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    panels = figure.subplots(len(record.metadata["legs"]), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, leg in zip(panels, record.metadata["legs"], strict=True):
+        for joint, color in zip(leg, (LEFT, RIGHT, COM, TRUNK), strict=False):
+            axes.plot(record.time[w], record.torque[w, joint], color=color, label=names[joint])
+            for sign in (-1.0, 1.0):
+                axes.axhline(sign * limits[joint], color=color, linestyle=":", linewidth=0.9)
+        _shade(axes, record, w)
+        axes.set_ylabel("torque [N m]")
+        axes.legend(loc="upper right")
+    panels[0].set_title(f"{record.metadata['robot']}: joint torques, limits dotted")
+    panels[-1].set_xlabel("time [s]")
+    return figure
+
+
+def ground_forces(record: Record, seconds: float = _WINDOW) -> Figure:
+    """Ground reaction forces of either foot with the template's leg forces."""
+    w = _window(record, seconds)
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    panels = figure.subplots(2, 1, sharex=True)
+    rear = record.rear[w]
+    for axes, axis, name in zip(panels, (1, 0), ("vertical", "horizontal"), strict=True):
+        template = record.template_force[w, :, axis]
+        for foot, color in enumerate(_LEGS):
+            label = "left foot" if foot == 0 else "right foot"
+            axes.plot(record.time[w], record.contact_force[w, foot, axis], color=color, label=label)
+            leg = np.where(rear == foot, template[:, 0], template[:, 1])
+            axes.plot(
+                record.time[w],
+                leg,
+                color=TEMPLATE,
+                linestyle="--",
+                linewidth=0.9,
+                label="template" if foot == 0 else None,
+            )
+        # A landing foot's first sample is its impulse over one physics step; keep the scale.
+        span = 1.25 * np.abs(template).max() + 1.0
+        axes.set_ylim(-0.05 * span if axis == 1 else -span, span)
+        _shade(axes, record, w)
+        axes.set_ylabel(f"{name} force [N]")
+        axes.legend(loc="upper right")
+    panels[0].set_title(f"{record.metadata['robot']}: ground reaction forces")
+    panels[-1].set_xlabel("time [s]")
+    return figure
+
+
+FIGURES: dict[str, Callable[[Record], Figure]] = {
+    "stick_diagram": stick_diagram,
+    "com": com_tracking,
+    "torques": joint_torques,
+    "forces": ground_forces,
+}
+"""Every figure of a walk, by file name."""
+
+
+def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Path]:
+    """Draw all figures of ``record`` into ``folder`` as PNG; returns their paths.
+
+    Raises:
+        RecordError: if the folder cannot be written or the run has no samples.
+    """
+    if len(record.time) < 2:
+        raise RecordError("the run has fewer than two samples: there is nothing to draw")
+    paths = []
+    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        for name, draw in FIGURES.items():
+            path = Path(folder) / f"{name}.png"
+            try:
+                draw(record).savefig(path, dpi=dpi)
+            except OSError as error:
+                raise RecordError(f"cannot write {path}: {error.strerror}") from None
+            paths.append(path)
+    return paths

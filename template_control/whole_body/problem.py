@@ -1,0 +1,181 @@
+"""The whole-body QP in its only unknowns, the joint torques.
+
+Torques are scaled by their limits and forces by the robot's weight:
+
+    min  1/2 z^T H z + g^T z      z = tau / tau_max
+    s.t. -1 <= z <= 1                           torque limits
+         0 <= mu f_y -+ f_x                     linearised friction cone, each stance foot
+         0 <= f_y <= cap                        unilateral contact, unloading foot
+
+H is badly conditioned (tasks against regularisers), and a proximal solver is slow along
+its soft directions. So the solver gets the same problem in w = L^T z with H = L L^T, whose
+Hessian is the identity, and constraint rows of unit length.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from template_control.whole_body.elimination import cholesky, eliminate
+
+Array = NDArray[np.float64]
+
+ROWS_PER_FOOT = 3
+_FAR = 1e20  # ProxQP's infinity
+
+
+@njit(cache=True)
+def assemble(
+    mass_matrix: Array,
+    nonlinear_effects: Array,
+    jacobian: Array,
+    bias: Array,
+    task_jacobian: Array,
+    task_bias: Array,
+    task_desired: Array,
+    task_weight: Array,
+    force_reference: Array,
+    force_weight: float,
+    torque_weight: float,
+    torque_limit: Array,
+    friction: float,
+    force_cap: Array,
+    weight: float,
+    a_map: Array,
+    f_map: Array,
+    factor: Array,
+    gradient: Array,
+    constraint: Array,
+    lower: Array,
+    upper: Array,
+) -> bool:
+    """Fill the QP's matrices in place.
+
+    Args:
+        mass_matrix, nonlinear_effects, jacobian, bias: as in
+            :func:`~.elimination.eliminate`; ``jacobian`` is (2 c, nv) for c stance feet,
+            rows x, y of each.
+        task_jacobian, task_bias, task_desired, task_weight: (t, nv), (t,), (t,), (t,).
+        force_reference: (2 c,) wanted contact forces [N].
+        force_weight, torque_weight: regularisers, dimensionless.
+        torque_limit: (nu,) [N m].
+        friction: coefficient of the cone.
+        force_cap: (c,) largest normal force [N] (inf: none).
+        weight: m g [N].
+        a_map, f_map: (nv, nu + 1), (2 c, nu + 1) overwritten with the affine maps.
+        factor: (nu, nu) overwritten with L in its lower triangle.
+        gradient: (nu,) overwritten with L^-1 g.
+        constraint, lower, upper: (nu + 3 c, nu), (nu + 3 c,) twice, overwritten, in w.
+
+    Returns:
+        False where the elimination is singular.
+    """
+    nv = mass_matrix.shape[0]
+    nu = torque_limit.shape[0]
+    feet = force_cap.shape[0]
+    if not eliminate(mass_matrix, nonlinear_effects, jacobian, bias, nv - nu, a_map, f_map):
+        return False
+    factor[:] = 0.0
+    gradient[:] = 0.0
+    row = np.empty(nu + 1)
+    for i in range(nu):
+        factor[i, i] = torque_weight
+    for t in range(task_weight.shape[0]):
+        if task_weight[t] == 0.0:
+            continue
+        for j in range(nu + 1):
+            total = 0.0
+            for k in range(nv):
+                total += task_jacobian[t, k] * a_map[k, j]
+            row[j] = total
+        row[nu] += task_bias[t] - task_desired[t]
+        _add_square(row, task_weight[t], torque_limit, factor, gradient)
+    for i in range(2 * feet):
+        for j in range(nu + 1):
+            row[j] = f_map[i, j] / weight
+        row[nu] -= force_reference[i] / weight
+        _add_square(row, force_weight, torque_limit, factor, gradient)
+
+    constraint[:] = 0.0
+    for i in range(nu):
+        constraint[i, i] = 1.0
+        lower[i], upper[i] = -1.0, 1.0
+    for foot in range(feet):
+        x, y, top = 2 * foot, 2 * foot + 1, nu + ROWS_PER_FOOT * foot
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            for j in range(nu):
+                constraint[top + side, j] = (
+                    (friction * f_map[y, j] + sign * f_map[x, j]) * torque_limit[j] / weight
+                )
+            lower[top + side] = -(friction * f_map[y, nu] + sign * f_map[x, nu]) / weight
+            upper[top + side] = _FAR
+        for j in range(nu):
+            constraint[top + 2, j] = f_map[y, j] * torque_limit[j] / weight
+        lower[top + 2] = -f_map[y, nu] / weight
+        upper[top + 2] = min(_FAR, (force_cap[foot] - f_map[y, nu]) / weight)
+
+    if not cholesky(factor, nu):
+        return False
+    _forward(factor, gradient)
+    for i in range(constraint.shape[0]):
+        _forward(factor, constraint[i])
+        length = 0.0
+        for j in range(nu):
+            length += constraint[i, j] * constraint[i, j]
+        scale = 1.0 / np.sqrt(max(length, 1e-300))
+        for j in range(nu):
+            constraint[i, j] *= scale
+        lower[i] *= scale
+        if upper[i] < _FAR:
+            upper[i] *= scale
+    return True
+
+
+@njit(cache=True)
+def _forward(factor: Array, vector: Array) -> None:
+    """vector = L^-1 vector, in place."""
+    for i in range(vector.shape[0]):
+        for k in range(i):
+            vector[i] -= factor[i, k] * vector[k]
+        vector[i] /= factor[i, i]
+
+
+@njit(cache=True)
+def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
+    """Joint torques [N m] of the QP's solution: tau_max * (L^-T w), kept within tau_max."""
+    n = w.shape[0]
+    for i in range(n - 1, -1, -1):
+        out[i] = w[i]
+        for k in range(i + 1, n):
+            out[i] -= factor[k, i] * out[k]
+        out[i] /= factor[i, i]
+    for i in range(n):
+        # The solver's tolerance may leave a torque a hair beyond its limit.
+        out[i] = min(1.0, max(-1.0, out[i])) * torque_limit[i]
+
+
+@njit(cache=True)
+def _add_square(
+    row: Array, row_weight: float, scale: Array, hessian: Array, gradient: Array
+) -> None:
+    """Add the square of (row[:-1] tau + row[-1]), tau = scale * z, to H and g."""
+    nu = gradient.shape[0]
+    for i in range(nu):
+        left = row_weight * row[i] * scale[i]
+        gradient[i] += left * row[nu]
+        for j in range(nu):
+            hessian[i, j] += left * row[j] * scale[j]
+
+
+@njit(cache=True)
+def affine(matrix: Array, tau: Array, out: Array) -> None:
+    """out = matrix[:, :-1] tau + matrix[:, -1]."""
+    n = tau.shape[0]
+    for i in range(out.shape[0]):
+        total = matrix[i, n]
+        for j in range(n):
+            total += matrix[i, j] * tau[j]
+        out[i] = total

@@ -1,0 +1,27 @@
+"""Shared objects: the shipped robot and its default gait."""
+
+import numpy as np
+import pytest
+
+from template_control.robot.library import load_robot
+from template_control.slip.gait import gait_at
+from template_control.slip.parameters import SlipParameters
+
+
+@pytest.fixture
+def robot():
+    return load_robot("five-link")
+
+
+@pytest.fixture(scope="session")
+def gait():
+    return gait_at(SlipParameters(), np.radians(66.0), 1.1)
+
+
+@pytest.fixture
+def random_states():
+    """Twenty states (q, v) of the five-link robot, seeded."""
+    rng = np.random.default_rng(7)
+    low = np.array([-1.0, 0.5, -0.5, -0.9, 0.2, -0.9, 0.2])
+    high = np.array([1.0, 1.0, 0.5, 0.5, 1.2, 0.5, 1.2])
+    return [(rng.uniform(low, high), rng.normal(0.0, 1.5, 7)) for _ in range(20)]

@@ -1,0 +1,128 @@
+"""``template-control walk`` as a user meets it."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from template_control.cli.main import main
+from template_control.errors import RecordError
+from template_control.plant.record import Record
+from template_control.robot.library import robot_path
+from template_control.view.figures import FIGURES, save_figures
+
+KEYS = {
+    "robot", "gait", "steps", "fell", "fall_reason", "duration", "mean_speed", "vlo_target",
+    "vlo_mean_last_50", "com_error_rms", "com_error_max", "joint_torque", "saturated_share",
+    "qp_failures", "control_tick_seconds", "qp_solve_seconds", "real_time_factor", "record",
+}  # fmt: skip
+
+
+def command(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "template_control.cli.main", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+def test_json_is_all_there_is_on_stdout(tmp_path):
+    done = command("walk", "--steps", "3", "--json", "--output", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    assert set(figures) >= KEYS
+    assert figures["steps"] == 3
+    assert Record.load(figures["record"]).steps == 3
+    assert {p.stem for p in (tmp_path / "out").glob("*.png")} == set(FIGURES)
+
+
+def test_table_and_no_figures(tmp_path, capfd):
+    assert main(["walk", "--steps", "2", "--no-figures", "--output", str(tmp_path)]) == 0
+    out = capfd.readouterr().out
+    for text in ("steps", "falls", "mean speed", "CoM error", "left_knee", "real-time factor"):
+        assert text in out
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_a_fall_exits_with_one_and_keeps_the_run(tmp_path, capfd):
+    arguments = ["walk", "--steps", "10", "--torque-scale", "0.2", "--json"]
+    assert main([*arguments, "--output", str(tmp_path)]) == 1
+    figures = json.loads(capfd.readouterr().out)
+    assert figures["fell"]
+    assert "step" in figures["fall_reason"]
+    assert Record.load(tmp_path / "run.npz").fell
+
+
+@pytest.mark.parametrize(
+    ("arguments", "culprit"),
+    [
+        (["--robot", "/nowhere/robot.urdf"], "/nowhere/robot.urdf"),
+        (["--robot", "hexapod"], "hexapod"),
+        (["--friction", "-0.1"], "--friction"),
+        (["--friction", "nan"], "--friction"),
+        (["--mass-scale", "7"], "--mass-scale"),
+        (["--steps", "0"], "--steps"),
+        (["--torque-scale", "0"], "--torque-scale"),
+        (["--speed", "5"], "5 m/s"),
+        (["--speed", "1", "--gait", "paper"], "--speed"),
+        (["--output", "/proc/none"], "/proc/none"),
+        (["--seed", "-1"], "--seed"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["walk", *arguments]) == 2
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    lines = captured.err.strip().splitlines()
+    assert len(lines) == 1
+    assert culprit in lines[0]
+
+
+def test_a_robot_that_is_not_planar_is_one_line(tmp_path, capfd):
+    text = robot_path("five-link").read_text()
+    path = tmp_path / "bent.urdf"
+    path.write_text(text.replace('"left_knee" type="revolute"', '"left_knee" type="continuous"'))
+    assert main(["walk", "--robot", str(path), "--output", str(tmp_path)]) == 2
+    assert "left_knee" in capfd.readouterr().err
+
+
+def test_a_seed_moves_the_start(tmp_path):
+    for seed in ("1", "2"):
+        out = str(tmp_path / seed)
+        assert main(["walk", "--steps", "1", "--seed", seed, "--no-figures", "--output", out]) == 0
+    starts = [Record.load(tmp_path / s / "run.npz").vlo_state[0] for s in ("1", "2")]
+    assert not np.allclose(starts[0], starts[1])
+
+
+def test_a_file_that_is_no_run_is_refused(tmp_path):
+    junk = tmp_path / "junk.npz"
+    junk.write_bytes(b"not a zip file")
+    other = tmp_path / "other.npz"
+    np.savez(other, a=np.zeros(3))
+    for path in (junk, other):
+        with pytest.raises(RecordError, match="no recorded run"):
+            Record.load(path)
+    with pytest.raises(RecordError, match="there is no run"):
+        Record.load(tmp_path / "missing.npz")
+
+
+def test_figures_need_samples(tmp_path):
+    main(["walk", "--steps", "1", "--no-figures", "--output", str(tmp_path)])
+    record = Record.load(tmp_path / "run.npz")
+    with pytest.raises(RecordError, match="cannot write"):
+        save_figures(record, tmp_path / "missing")
+
+
+def test_help_explains_every_option(capfd):
+    with pytest.raises(SystemExit):
+        main(["walk", "--help"])
+    out = capfd.readouterr().out
+    options = (
+        "--robot --steps --speed --friction --torque-scale --seed --output --json --no-figures"
+    )
+    for option in options.split(" "):
+        assert option in out

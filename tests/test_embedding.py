@@ -1,0 +1,243 @@
+"""Planners, plans, phases, swing foot, guards: the parts of the embedding."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from template_control.embedding.guards import Sensed, fired
+from template_control.embedding.load import LoadEstimate, LoadOptions
+from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.modified import ModifiedPlanner
+from template_control.embedding.plan import at_phase, chain, sample
+from template_control.embedding.references import leg_forces
+from template_control.embedding.start import state_at_vlo
+from template_control.embedding.swing_foot import SwingFoot, SwingOptions, quintic_step
+from template_control.errors import GaitError, RobotError
+from template_control.slip.automaton import AUTOMATON, STRIDE_START, Event, Outcome, Slot
+from template_control.slip.gait import gait_for_speed, gait_from_energy, vlo_energy
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.stride import controls, run, vlo_return_map
+
+P = SlipParameters()
+
+
+@pytest.fixture(params=[LqrPlanner, ModifiedPlanner])
+def planner(request, gait):
+    return request.param(gait)
+
+
+def test_planner_leaves_the_gait_alone(planner, gait):
+    decision = planner.decide(gait.vlo)
+    assert decision.feasible
+    assert decision.reached
+    np.testing.assert_allclose(decision.predicted, gait.vlo, atol=4e-3)
+    assert decision.controls[Slot.TOUCHDOWN_ANGLE] == pytest.approx(np.radians(66.0), abs=4e-3)
+
+
+def test_prediction_is_the_exact_map(planner, gait):
+    z = gait.vlo + [0.02, 0.003, -0.03]
+    decision = planner.decide(z)
+    z_next, outcome = vlo_return_map(P, z, decision.controls)
+    assert outcome is Outcome.SECTION
+    np.testing.assert_allclose(decision.predicted, z_next, atol=1e-9)
+
+
+@given(speed=st.floats(0.4, 1.8), height=st.floats(0.85, 1.0), vertical=st.floats(-0.5, 0.5))
+@settings(max_examples=60, deadline=None)
+def test_planner_answers_for_every_state(speed, height, vertical):
+    gait = gait_for_speed(P, 1.2)
+    for kind in (LqrPlanner, ModifiedPlanner):
+        decision = kind(gait).decide(np.array([speed, height, vertical]))
+        alpha = decision.controls[Slot.TOUCHDOWN_ANGLE]
+        assert np.all(np.isfinite(decision.controls))
+        # Above asin(y / l0) the foot would be under the ground already.
+        assert np.sin(alpha) < height
+        k0 = P.leg_stiffness
+        for slot in (Slot.K_SC, Slot.K_SD):
+            assert 0.5 * k0 - 1e-6 <= decision.controls[slot] <= 1.5 * k0 + 1e-6
+
+
+@pytest.mark.parametrize("shift", [[0.04, 0.0, 0.0], [0.0, 0.006, 0.0], [0.0, 0.0, 0.1]])
+def test_lqr_brings_the_template_back(gait, shift):
+    planner, z = LqrPlanner(gait), gait.vlo + shift
+    for _ in range(25):
+        z, outcome = vlo_return_map(P, z, planner.decide(z).controls)
+        assert outcome is Outcome.SECTION
+    np.testing.assert_allclose(z, gait.vlo, atol=2e-3)
+
+
+def test_lqr_settles_on_target_in_spite_of_an_offset(gait):
+    """A plant that adds a constant to every step still ends at the gait."""
+    planner, z = LqrPlanner(gait), gait.vlo.copy()
+    offset = np.array([0.008, -0.001, 0.02])
+    for _ in range(80):
+        decision = planner.decide(z)
+        z, outcome = vlo_return_map(P, z, decision.controls)
+        assert outcome is Outcome.SECTION
+        z = z + offset
+        planner.observe(decision, z)
+    np.testing.assert_allclose(planner.offset, offset, atol=1e-4)
+    error = np.abs(z - gait.vlo)
+    assert np.all(error < [0.011, 0.005, 0.03])
+
+
+def test_modified_planner_meets_the_energy_of_equation_38(gait):
+    planner = ModifiedPlanner(gait)
+    z = gait.vlo + [0.03, 0.002, 0.0]
+    decision = planner.decide(z)
+    k0, k2 = P.leg_stiffness, decision.controls[Slot.K_SD]
+    assert k2 != k0
+    # Stance stiffness is back at k0 at the next VLO; the reset's energy is part of (38) only
+    # where the height met is the wanted one, so compare before the reset.
+    y = decision.predicted[1]
+    before_reset = vlo_energy(P, decision.predicted) + 0.5 * (k2 - k0) * (1.0 - y) ** 2
+    injected = 0.5 * (k2 - k0) * (1.0 - gait.vlo[1]) ** 2
+    assert before_reset == pytest.approx(gait.energy + injected, abs=1e-6)
+
+
+def test_unreachable_state_is_said(planner, gait):
+    decision = planner.decide(gait.vlo + [0.5, 0.01, 0.3])
+    assert not decision.reached
+
+
+def test_chained_plan_is_continuous_and_knows_its_events(gait):
+    u = gait.controls
+    first = run(P, STRIDE_START["w"], [2.0, gait.vlo[1], gait.vlo[0], 0.0], u, (2.0, 0.0))
+    second = run(P, first.node, first.state, u, tuple(first.toes))
+    plan = chain([first, second])
+    times = np.linspace(0.0, plan.duration - 1e-6, 400)
+    states = np.empty((400, 6))
+    for t, row in zip(times, states, strict=True):
+        sample(plan.cx, plan.cy, plan.meta, t, row)
+    assert np.max(np.abs(np.diff(states[:, :2], axis=0))) < 0.01
+    assert plan.foothold == pytest.approx(2.0 + gait.step_length, abs=1e-6)
+    assert plan.touchdown < plan.liftoff < plan.vlo
+    assert plan.vlo == pytest.approx(gait.step_duration, abs=1e-9)
+    np.testing.assert_allclose(plan.vlo_state, gait.vlo, atol=1e-7)
+
+
+@given(time=st.floats(0.0, 0.32), scale=st.floats(0.97, 1.03))
+@settings(max_examples=50, deadline=None)
+def test_phase_look_up_inverts_the_path(time, scale):
+    gait = gait_for_speed(P, 1.2)
+    u = gait.controls
+    plan = chain([run(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)])
+    state, found = np.empty(6), np.empty(6)
+    sample(plan.cx, plan.cy, plan.meta, time, state)
+    # A robot on the same ray from the foot, a little nearer or farther, is in the same phase.
+    t, _ = at_phase(
+        plan.cx, plan.cy, plan.meta, 0.0, scale * state[0], scale * state[1], 0.2, found
+    )
+    assert t == pytest.approx(time, abs=1e-8)
+    np.testing.assert_allclose(found, state, atol=1e-7)
+
+
+def test_template_forces_accelerate_the_template(gait):
+    u = gait.controls
+    stride = run(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)
+    forces = np.empty((2, 2))
+    for row in stride.meta:
+        t = row[0] + 0.5 * row[1]
+        s = stride.sample(t)[0]
+        leg_forces(row, s[0], s[1], P.rest_length, forces)
+        expected = P.mass * (s[4:] + [0.0, P.gravity])
+        np.testing.assert_allclose(forces.sum(axis=0), expected, rtol=1e-9)
+
+
+def test_quintic_arrives():
+    state = np.array([0.1, -0.4, 3.0])
+    remaining, dt = 0.3, 1e-3
+    for i in range(299):
+        quintic_step(state, 0.7, 0.2, remaining - i * dt, dt)
+    assert state[0] == pytest.approx(0.7 - 0.2 * dt, abs=1e-5)
+    assert state[1] == pytest.approx(0.2, abs=1e-3)
+
+
+def test_swing_clears_the_ground_and_lands_slowly():
+    options = SwingOptions()
+    swing = SwingFoot(options)
+    swing.start(np.array([-0.6, 0.0]), np.zeros(2))
+    heights, accelerations = [], []
+    for i in range(400):
+        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3)
+        heights.append(swing.y[0])
+        accelerations.append(max(abs(swing.x[2]), abs(swing.y[2])))
+    assert max(heights) == pytest.approx(options.clearance, abs=2e-3)
+    assert heights[-1] == pytest.approx(0.0, abs=2e-3)
+    assert min(heights) > -2e-3
+    assert swing.x[0] == pytest.approx(0.6, abs=2e-3)
+    assert abs(swing.x[1]) < 0.05
+    assert abs(swing.y[1]) <= options.landing_speed + 1e-9
+    assert max(accelerations) < 80.0
+
+
+def test_swing_without_a_foothold_comes_down():
+    swing = SwingFoot(SwingOptions())
+    swing.start(np.array([0.0, 0.05]), np.array([1.0, 0.0]))
+    for _ in range(100):
+        swing.advance(np.nan, 0.3, 1e-3)
+    assert swing.y[0] == pytest.approx(0.05 - 0.02)
+    assert swing.x[1] == 0.0
+
+
+def test_guards_feel_what_the_template_sees():
+    sensed = Sensed(np.array([0.0, 0.97, 1.1, 0.0]), np.array([0.0, 0.6]), True, 1.0)
+
+    def happened(event, phase=0.0, liftoff=np.inf):
+        return fired(event, sensed, phase, liftoff, 1.0, 9.81)
+
+    assert happened(Event.VLO)
+    assert happened(Event.TOUCHDOWN)
+    assert not happened(Event.VIRTUAL_BOTTOM)
+    assert not happened(Event.REAR_LIFTOFF)
+    assert happened(Event.REAR_LIFTOFF, phase=0.3, liftoff=0.29)
+    sensed.swing_time = 0.01
+    assert not happened(Event.TOUCHDOWN), "the foot that just left may still scrape"
+    sensed.state[0] = -0.01
+    assert not happened(Event.VLO)
+    sensed.state[:2] = 0.5, 0.95
+    assert happened(Event.REAR_LIFTOFF), "an overstretched leg is let go without a plan"
+
+
+def test_load_learns_a_constant_and_ignores_the_gait():
+    load = LoadEstimate(LoadOptions(), 9.81)
+    load.end_step()
+    for _ in range(10):
+        load.observe(0.15, 0.5)  # within the dead zone
+        load.end_step()
+    assert load.factor == 1.0
+    for _ in range(20):
+        load.observe(9.81 * (1.1 - load.factor), 0.5)
+        load.end_step()
+    assert load.factor == pytest.approx(1.08, abs=1e-3)
+
+
+def test_start_is_where_it_was_asked_for(robot, gait):
+    swing, velocity = np.array([0.0, 0.05]), np.array([2.0, 0.0])
+    q, v = state_at_vlo(robot, gait.vlo, 0, swing, velocity)
+    robot.update(q, v)
+    np.testing.assert_allclose(robot.com, [0.0, gait.vlo[1]], atol=1e-10)
+    np.testing.assert_allclose(robot.foot_position, [[0.0, 0.0], swing], atol=1e-10)
+    np.testing.assert_allclose(robot.foot_velocity, [[0.0, 0.0], velocity], atol=1e-10)
+    effective = robot.com_velocity[0] + robot.angular_momentum / (80.0 * gait.vlo[1])
+    assert effective == pytest.approx(gait.vlo[0], abs=1e-10)
+    with pytest.raises(RobotError, match=r"reach|limits"):
+        state_at_vlo(robot, np.array([1.1, 1.4, 0.0]), 0, swing, velocity)
+
+
+def test_gaits_by_speed_and_impossible_ones():
+    for speed in (0.9, 1.0, 1.3):
+        assert gait_for_speed(P, speed).mean_speed == pytest.approx(speed, abs=1e-8)
+    with pytest.raises(GaitError, match=r"5 m/s.*between"):
+        gait_for_speed(P, 5.0)
+    with pytest.raises(GaitError, match="leaves no speed"):
+        gait_from_energy(P, 0.98, 100.0)
+
+
+def test_events_lead_where_the_automaton_says(gait):
+    stride = run(
+        P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], controls(1.15, 1.6e4, 1.7e4)
+    )
+    for event in stride.events:
+        assert AUTOMATON.successor(event.source, event.event) == event.target

@@ -1,0 +1,162 @@
+"""The five-link model: physics, agreement with PyBullet, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pybullet
+import pytest
+
+from template_control.errors import ParameterError, RobotError
+from template_control.plant.bullet import BulletPlant, PlantOptions
+from template_control.robot.library import load_robot, robot_path
+from template_control.robot.planar_biped import PlanarBiped
+
+
+def test_masses_and_limits_are_those_of_the_readme(robot):
+    assert robot.mass == pytest.approx(80.0)
+    assert robot.nv == 7
+    np.testing.assert_array_equal(robot.torque_limit, 350.0)
+    assert robot.legs == ((0, 1), (2, 3))
+    assert robot.foot_radius == 0.01
+
+
+def test_inertias_are_physically_valid(robot):
+    for inertia in robot.model.inertias:
+        if inertia.mass == 0.0:
+            continue
+        principal = np.linalg.eigvalsh(inertia.inertia)
+        assert np.all(principal > 0.0)
+        assert principal.sum() - 2 * principal.max() >= 0.0, "triangle inequality"
+
+
+def differentiate(robot, read, q, v, h=1e-6):
+    """Central difference along v of what ``read`` returns after an update at velocity v."""
+    robot.update(q + h * v, v)
+    ahead = np.copy(read())
+    robot.update(q - h * v, v)
+    return (ahead - np.copy(read())) / (2 * h)
+
+
+def test_jacobians_and_biases_match_finite_differences(robot, random_states):
+    for q, v in random_states:
+        com_bias = differentiate(robot, lambda: robot.com_velocity, q, v)
+        momentum_rate = differentiate(robot, lambda: robot.angular_momentum, q, v)
+        com_velocity = differentiate(robot, lambda: robot.com, q, v)
+        robot.update(q, v)
+        np.testing.assert_allclose(robot.com_velocity, com_velocity, atol=1e-7)
+        np.testing.assert_allclose(robot.com_jacobian @ v, robot.com_velocity, atol=1e-12)
+        np.testing.assert_allclose(robot.com_bias, com_bias, atol=1e-6)
+        assert robot.angular_momentum_bias == pytest.approx(momentum_rate, abs=1e-6)
+        momentum = robot.angular_momentum_jacobian @ v
+        assert momentum == pytest.approx(robot.angular_momentum, abs=1e-12)
+
+
+def test_foot_rows_are_those_of_a_rolling_sphere(robot, random_states):
+    for q, v in random_states:
+        foot = differentiate(robot, lambda: robot.foot_velocity, q, v)
+        lowest = differentiate(robot, lambda: robot.foot_position, q, v)
+        robot.update(q, v)
+        np.testing.assert_allclose(robot.foot_bias, foot, atol=1e-5)
+        for i, leg in enumerate(robot.legs):
+            pitch_rate = v[2] + sum(v[3 + j] for j in leg)
+            rolling = lowest[i] - [robot.foot_radius * pitch_rate, 0.0]
+            np.testing.assert_allclose(robot.foot_velocity[i], rolling, atol=1e-7)
+
+
+def test_mass_matrix_and_bias_forces_agree_with_pybullet(robot, random_states):
+    with BulletPlant(robot, PlantOptions()) as plant:
+        client, body, joints = plant.client, plant.body, plant.joints
+        order = np.argsort(joints)  # PyBullet speaks the file's order
+        for q, v in random_states:
+            robot.update(q, v)
+            file_q, file_v = q[order].tolist(), v[order].tolist()
+            mass = pybullet.calculateMassMatrix(body, file_q, physicsClientId=client)
+            bias = pybullet.calculateInverseDynamics(
+                body, file_q, file_v, [0.0] * 7, physicsClientId=client
+            )
+            np.testing.assert_allclose(
+                np.array(mass), robot.mass_matrix[np.ix_(order, order)], atol=1e-8
+            )
+            np.testing.assert_allclose(bias, robot.nonlinear_effects[order], atol=1e-8)
+
+
+FLIGHT_Q = np.array([0.0, 3.0, 0.1, -0.5, 0.8, 0.2, 0.9])
+FLIGHT_V = np.array([1.0, 2.0, 0.5, -1.0, 1.5, 1.0, -1.2])
+
+
+def fly(robot, dt, duration=0.2):
+    """Final (q, v) in PyBullet and by semi-implicit Euler on Pinocchio's ABA, no torques."""
+    model, data = robot.model, robot.model.createData()
+    torque, q, v = np.zeros(4), np.zeros(7), np.zeros(7)
+    euler_q, euler_v = FLIGHT_Q.copy(), FLIGHT_V.copy()
+    with BulletPlant(robot, PlantOptions(time_step=dt)) as plant:
+        plant.reset(FLIGHT_Q, FLIGHT_V)
+        for _ in range(round(duration / dt)):
+            plant.step(torque)
+            euler_v += dt * pin.aba(model, data, euler_q, euler_v, np.zeros(7))
+            euler_q += dt * euler_v
+        plant.read(q, v)
+    return (q, v), (euler_q, euler_v)
+
+
+def test_plant_is_the_model_in_free_flight(robot):
+    bullet, euler = fly(robot, 1e-4)
+    np.testing.assert_allclose(bullet, euler, atol=1e-10)
+
+
+def invariants(robot, q, v):
+    """Horizontal and angular momentum over mass, and mechanical energy over mass."""
+    data = robot.model.createData()
+    robot.update(q, v)
+    energy = pin.computeMechanicalEnergy(robot.model, data, q, v)
+    return np.array([robot.com_velocity[0], robot.angular_momentum / 80.0, energy / 80.0])
+
+
+def test_free_flight_conserves_energy_and_momentum(robot):
+    start = invariants(robot, FLIGHT_Q, FLIGHT_V)
+    drift = [np.abs(invariants(robot, *fly(robot, dt)[0]) - start) for dt in (2e-4, 1e-4)]
+    assert np.all(drift[1] < [1e-5, 1e-5, 2e-3])  # m/s, m^2/s, J/kg
+    # What is left is the first-order integrator's: it halves with the step.
+    np.testing.assert_allclose(drift[0] / drift[1], 2.0, atol=0.1)
+
+
+def test_update_refuses_nan(robot):
+    with pytest.raises(ParameterError, match="not finite"):
+        robot.update(np.full(7, np.nan), np.zeros(7))
+
+
+def edited(tmp_path, *replacements):
+    text = robot_path("five-link").read_text()
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "edited.urdf"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"base_x" type="prismatic"', '"base_x" type="revolute"', "not planar.*base_x"),
+        ('"left_knee" type="revolute"', '"left_knee" type="continuous"', "left_knee"),
+        ('effort="350"', 'effort="0"', "effort 0.0"),
+        ("left_foot", "left_toe", "no foot link 'left_foot'"),
+        ("<robot", "<rowboat", "no URDF"),
+    ],
+)
+def test_unusable_urdf_is_named(tmp_path, old, new, message):
+    with pytest.raises(RobotError, match=message):
+        PlanarBiped.from_urdf(edited(tmp_path, (old, new)))
+
+
+def test_missing_urdf_and_unknown_robot_are_named():
+    with pytest.raises(RobotError, match=r"no URDF at /nowhere/x\.urdf"):
+        load_robot("/nowhere/x.urdf")
+    with pytest.raises(RobotError, match=r"no robot 'hexapod'.*five-link"):
+        load_robot("hexapod")
+
+
+def test_one_urdf_serves_both_engines(robot):
+    assert Path(robot.path) == robot_path("five-link")

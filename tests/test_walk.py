@@ -1,0 +1,219 @@
+"""The robot walking in PyBullet: what must hold on every tick, and over many steps."""
+
+import numpy as np
+import pytest
+
+from template_control.embedding.controller import EmbeddingOptions
+from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.modified import ModifiedPlanner
+from template_control.errors import ParameterError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.record import Record
+from template_control.plant.simulation import (
+    Push,
+    SimulationOptions,
+    perturbed_start,
+    simulate,
+)
+from template_control.plant.summary import summarise
+from template_control.robot.library import load_robot
+from template_control.slip.gait import gait_at, gait_for_speed, gait_from_energy
+from template_control.slip.parameters import SlipParameters
+
+P = SlipParameters()
+
+
+def walk(gait, planner=LqrPlanner, **options):
+    return simulate(load_robot("five-link"), planner(gait), SimulationOptions(**options))
+
+
+@pytest.fixture(scope="module")
+def record():
+    return walk(gait_at(P, np.radians(66.0), 1.1), steps=12)
+
+
+def test_walks_without_a_fall(record):
+    assert record.steps == 12
+    assert not record.fell
+    assert record.metadata["summary"]["qp_failures"] == 0
+    assert np.all(record.solved)
+    speed = (record.com[-1, 0] - record.com[0, 0]) / record.time[-1]
+    assert 1.1 < speed < 1.3
+
+
+def test_follows_the_template(record):
+    rms = np.sqrt(np.mean(record.com_error**2, axis=0))
+    assert rms[0] <= 0.01
+    assert rms[1] <= 0.005
+    np.testing.assert_allclose(rms, list(record.metadata["summary"]["com_error_rms"].values()))
+
+
+def test_torques_stay_within_the_urdf(record):
+    assert np.abs(record.torque).max() <= 350.0
+    peaks = [j["peak"] for j in record.metadata["summary"]["joint_torque"].values()]
+    np.testing.assert_allclose(np.abs(record.torque).max(axis=0), peaks)
+
+
+def test_only_joint_torques_act_on_the_robot(record):
+    """Each tick's change of momentum is weight and the contact forces PyBullet reports."""
+    dt = record.time[1] - record.time[0]
+    force = record.contact_force[1:].sum(axis=1)
+    force[:, 1] -= 80.0 * 9.81
+    residual = 80.0 * np.diff(record.com_velocity, axis=0) / dt - force
+    # First-order in the physics step where joints move fast; a hidden force would not average.
+    assert np.all(np.abs(residual.mean(axis=0)) < 0.5)  # N, of 785
+    assert np.quantile(np.abs(residual), 0.99) < 10.0
+
+
+def test_contact_forces_lie_in_the_cone(record):
+    x, y = record.contact_force[..., 0], record.contact_force[..., 1]
+    assert np.all(y >= 0.0)
+    assert np.all(np.abs(x) <= 0.7 * y + 1e-6)
+
+
+def test_stance_feet_do_not_slide(record):
+    nodes = np.array(record.metadata["nodes"])[record.node]
+    single = nodes == "SS_bv^w"
+    rear = record.foot[np.arange(len(record.time)), record.rear]
+    step = np.abs(np.diff(rear[:, 0]))
+    # Rolling of a 1 cm sphere moves its lowest point by less than 0.1 mm a millisecond.
+    assert step[single[1:] & single[:-1]].max() < 1e-4
+
+
+def test_the_node_sequence_is_the_automatons(record):
+    names = np.array(record.metadata["nodes"])[record.node]
+    changes = names[np.concatenate(([True], names[1:] != names[:-1]))]
+    cycle = ["SS_av^w", "DS_sc^w", "DS_sd^w", "SS_bv^w"]
+    assert list(changes) == [cycle[i % 4] for i in range(len(changes))]
+    assert len(changes) >= 4 * record.steps
+
+
+def test_walk_is_deterministic(record):
+    again = walk(gait_at(P, np.radians(66.0), 1.1), steps=12)
+    np.testing.assert_array_equal(again.q, record.q)
+
+
+def test_summary_has_every_figure(record):
+    figures = summarise(record, "somewhere")
+    assert figures["record"] == "somewhere"
+    assert set(figures["vlo_target"]) == {"speed", "height", "vertical_speed"}
+    assert set(figures["joint_torque"]["left_hip"]) == {"peak", "rms", "limit"}
+    assert figures["fall_reason"] is None
+
+
+def test_a_fall_is_recorded_whole(tmp_path):
+    record = walk(gait_at(P, np.radians(66.0), 1.1), steps=30, pushes=(Push(-200.0, step=3),))
+    assert record.fell
+    assert 3 <= record.steps < 30
+    assert "step" in record.metadata["fall_reason"]
+    again = Record.load(record.save(tmp_path / "run.npz"))
+    np.testing.assert_array_equal(again.q, record.q)
+    assert again.metadata == record.metadata
+    assert again.fell
+
+
+def test_weak_legs_report_failed_qps_or_a_fall():
+    record = walk(
+        gait_at(P, np.radians(66.0), 1.1),
+        steps=5,
+        embedding=EmbeddingOptions(torque_scale=0.2),
+    )
+    assert record.fell
+    assert np.abs(record.torque).max() <= 70.0
+    assert record.metadata["summary"]["qp_failures"] == np.sum(~record.solved)
+    assert record.metadata["summary"]["saturated_share"] > 0.0
+
+
+def test_the_papers_planner_walks_too():
+    record = walk(gait_at(P, np.radians(66.0), 1.1), ModifiedPlanner, steps=15)
+    assert not record.fell
+
+
+def test_bad_options_are_named():
+    with pytest.raises(ParameterError, match="friction"):
+        PlantOptions(friction=-1.0)
+    with pytest.raises(ParameterError, match="steps"):
+        SimulationOptions(steps=0)
+    with pytest.raises(ParameterError, match="record_every"):
+        SimulationOptions(record_every=0)
+
+
+def settled(record, gait):
+    return record.vlo_state[-50:].mean(axis=0) - gait.vlo
+
+
+@pytest.mark.slow
+def test_settles_on_the_default_gait():
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    record = walk(gait, steps=200)
+    error = np.abs(settled(record, gait))
+    assert not record.fell
+    assert error[0] <= 0.01 * gait.vlo[0]
+    assert error[1] <= 0.005
+    assert error[2] <= 0.03
+
+
+@pytest.mark.slow
+def test_settles_on_the_papers_equilibrium():
+    gait = gait_from_energy(P, 0.9818, 826.0)
+    record = walk(gait, steps=200)
+    error = np.abs(settled(record, gait))
+    assert not record.fell
+    assert error[0] <= 0.03 * gait.vlo[0]
+    assert error[1] <= 0.01
+    assert error[2] <= 0.1
+
+
+@pytest.mark.slow
+def test_thousand_steps():
+    record = walk(gait_at(P, np.radians(66.0), 1.1), steps=1000, record_every=10)
+    figures = summarise(record, "")
+    assert record.steps == 1000
+    assert not record.fell
+    assert 1.1 <= figures["mean_speed"] <= 1.3
+    assert figures["com_error_rms"]["x"] <= 0.01
+    assert figures["com_error_rms"]["y"] <= 0.005
+    assert figures["qp_failures"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("speed", [0.9, 1.0, 1.3])
+def test_other_speeds(speed):
+    record = walk(gait_for_speed(P, speed), steps=50)
+    assert not record.fell
+    walked = (record.com[-1, 0] - record.com[0, 0]) / record.time[-1]
+    assert walked == pytest.approx(speed, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
+def test_perturbed_starts(seed):
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    assert not walk(gait, steps=50, start=perturbed_start(gait.vlo, seed)).fell
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", [0.9, 1.1])
+def test_unknown_mass(scale):
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    assert not walk(gait, steps=50, plant=PlantOptions(mass_scale=scale)).fell
+
+
+@pytest.mark.slow
+def test_slippery_ground():
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    record = walk(
+        gait,
+        steps=50,
+        plant=PlantOptions(friction=0.5),
+        embedding=EmbeddingOptions(friction=0.45),
+    )
+    assert not record.fell
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("impulse", [-10.0, 10.0])
+@pytest.mark.parametrize("phase", np.arange(10) / 10)
+def test_pushes(impulse, phase):
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    assert not walk(gait, steps=50, pushes=(Push(impulse, 10, phase),)).fell
