@@ -1,0 +1,113 @@
+"""Every command and snippet of the README runs as printed."""
+
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_python_snippets_run_as_printed(tmp_path):
+    snippets = blocks("python")
+    assert snippets
+    for snippet in snippets:
+        done = subprocess.run(
+            [sys.executable, "-c", snippet],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )
+        assert done.returncode == 0, done.stderr
+
+
+def commands():
+    return [line for block in blocks("sh") for line in block.strip().splitlines()]
+
+
+def test_the_two_commands_are_there():
+    installing = [line for line in commands() if "venv" in line]
+    assert len(installing) == 2
+    walking, testing = installing
+    assert walking.endswith(".venv/bin/template-control walk")
+    assert testing.endswith(".venv/bin/pytest")
+    # .ci/run takes the second from the README and runs it.
+    assert "README.md" in (ROOT / ".ci" / "run").read_text()
+
+
+@pytest.mark.parametrize("line", [c for c in commands() if "venv -" not in c and "venv ." not in c])
+def test_other_commands_run_as_printed(line, tmp_path):
+    words = line.split()
+    assert words[0] in ("template-control", "python")
+    if words[0] == "template-control":
+        words = [sys.executable, "-m", "template_control.cli.main", *words[1:]]
+    else:
+        words = [sys.executable, str(ROOT / words[1]), *words[2:]]
+    done = subprocess.run(
+        words,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_pictures_are_there():
+    for picture in re.findall(r"!\[.*?\]\((.*?)\)", README):
+        assert (ROOT / picture).is_file()
+
+
+@pytest.mark.slow
+def test_first_command_works_in_a_fresh_clone(tmp_path):
+    clone = tmp_path / "clone"
+    subprocess.run(["git", "clone", "--quiet", str(ROOT), str(clone)], check=True)
+    line = next(c for c in commands() if c.endswith("template-control walk"))
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", line],
+        cwd=clone,
+        capture_output=True,
+        text=True,
+        timeout=900,
+    )
+    assert done.returncode == 0, done.stderr
+    assert (clone / "runs" / "walk" / "run.npz").is_file()
+    assert (clone / "runs" / "walk" / "stick_diagram.png").is_file()
+
+
+@pytest.mark.slow
+def test_a_wheel_finds_its_robots_elsewhere(tmp_path):
+    pip = [sys.executable, "-m", "pip"]
+    subprocess.run(
+        [*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", str(tmp_path), str(ROOT)],
+        check=True,
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    names = zipfile.ZipFile(wheel).namelist()
+    assert "template_control/robots/five_link.urdf" in names
+    assert "template_control/py.typed" in names
+    target = tmp_path / "site"
+    subprocess.run(
+        [*pip, "install", "--quiet", "--no-deps", "--target", str(target), str(wheel)], check=True
+    )
+    code = "import template_control as tc; print(tc.load_robot('five-link').path)"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(target)},
+    )
+    assert done.stdout.strip() == str(target / "template_control/robots/five_link.urdf")
