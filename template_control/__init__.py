@@ -25,10 +25,11 @@ from template_control.plant.simulation import Push, SimulationOptions, perturbed
 from template_control.plant.summary import summarise
 from template_control.robot.library import ROBOTS, load_robot
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.automaton import AUTOMATON, STRIDE_START, Event, Outcome, Slot
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import WalkingGait, gait_at, gait_for_speed, gait_from_energy
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.stride import Stride, controls, run, vlo_return_map
+from template_control.slip.vocabulary import Event, Outcome, Slot
 from template_control.view.figures import save_figures
 
 __all__ = [

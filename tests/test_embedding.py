@@ -14,10 +14,11 @@ from template_control.embedding.references import leg_forces
 from template_control.embedding.start import state_at_vlo
 from template_control.embedding.swing_foot import SwingFoot, SwingOptions, quintic_step
 from template_control.errors import GaitError, RobotError
-from template_control.slip.automaton import AUTOMATON, STRIDE_START, Event, Outcome, Slot
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import gait_for_speed, gait_from_energy, vlo_energy
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.stride import controls, run, vlo_return_map
+from template_control.slip.vocabulary import Event, Outcome, Slot
 
 P = SlipParameters()
 

@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton import STRIDE_START, Event, Outcome
+from template_control.slip.automaton import STRIDE_START
 from template_control.slip.gait import gait_at, gait_from_energy
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.stride import controls, run, vlo_return_map
+from template_control.slip.vocabulary import Event, Outcome
 
 P = SlipParameters()
 ALPHA = np.radians(66.0)

@@ -21,8 +21,10 @@ from template_control.embedding.planner import Decision, Planner
 from template_control.embedding.references import leg_forces, pd, unloading_cap
 from template_control.embedding.swing_foot import SwingFoot, SwingOptions
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.automaton import AUTOMATON, STRIDE_START, Node, Phase, Reset
-from template_control.slip.stride import Workspace, run
+from template_control.slip.automaton import AUTOMATON, STRIDE_START, Node
+from template_control.slip.kernel import new_scratch
+from template_control.slip.stride import run
+from template_control.slip.vocabulary import Phase, Reset
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.tasks import (
     DOUBLE_STANCE_WEIGHTS,
@@ -125,7 +127,7 @@ class EmbeddingController:
             Phase.SS: np.array(o.single_stance.rows),
             Phase.DS: np.array(o.double_stance.rows),
         }
-        self._workspace = Workspace()
+        self._scratch = new_scratch()
         self._plan: Plan
         self._plan_toe = 0.0
 
@@ -249,7 +251,7 @@ class EmbeddingController:
         p, s = self.parameters, self._sensed
         toes = (float(s.toes[0]), float(s.toes[1]))
         decision = self.steps[-1].decision
-        first = run(p, self.node.name, s.state, decision.controls, toes, workspace=self._workspace)
+        first = run(p, self.node.name, s.state, decision.controls, toes, scratch=self._scratch)
         strides = [first]
         if first.completed:
             # The next foothold must be known when the swing begins, before the next VLO.
@@ -261,7 +263,7 @@ class EmbeddingController:
                     first.state,
                     ahead.controls,
                     (float(first.toes[0]), float(first.toes[1])),
-                    workspace=self._workspace,
+                    scratch=self._scratch,
                 )
             )
         self._plan = chain(strides)

@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from template_control.embedding.planner import Decision
-from template_control.embedding.step_search import FALL_PRICE, Law, linear, price, scratch, search
-from template_control.slip.automaton import AUTOMATON, STRIDE_START, Slot
+from template_control.embedding.step_search import FALL_PRICE, Law, linear, price, search
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import WalkingGait
-from template_control.slip.stride import Workspace, vlo_return_map
+from template_control.slip.kernel import new_scratch
+from template_control.slip.stride import kernel_model, vlo_return_map
 from template_control.slip.tables import TABLES
+from template_control.slip.vocabulary import Slot
 
 Array = NDArray[np.float64]
 
@@ -85,7 +87,7 @@ class LqrPlanner:
             r + self.b.T @ self._cost @ self.b, self.b.T @ self._cost @ self.a
         )
         self._settling = _settling_map(self.a, self.b, np.array(o.tolerance))
-        self._scratch = scratch()
+        self._scratch = new_scratch()
         self._spread = np.array(o.spread)
         self._law = self._aim()
 
@@ -103,10 +105,8 @@ class LqrPlanner:
             lower=np.array([nominal[0] + o.angle_range[0], *[o.stiffness_range[0]] * 2]),
             upper=np.array([nominal[0] + o.angle_range[1], *[o.stiffness_range[1]] * 2]),
             top_margin=o.top_margin,
-            mass=p.mass,
-            gravity=p.gravity,
-            rest_length=p.rest_length,
             stiffness=p.leg_stiffness,
+            model=kernel_model(p),
         )
 
     def decide(self, z: Array) -> Decision:
@@ -137,12 +137,12 @@ class LqrPlanner:
 def _jacobians(gait: WalkingGait) -> tuple[Array, Array]:
     """Central differences of the exact map in z and in (alpha, kappa_1/k0, kappa_2/k0)."""
     p, z, u = gait.parameters, gait.vlo, gait.controls
-    workspace = Workspace()
+    scratch = new_scratch()
     h = 1e-5
 
     def difference(dz: Array, du: Array) -> Array:
-        ahead = vlo_return_map(p, z + dz, u + du, workspace)[0]
-        behind = vlo_return_map(p, z - dz, u - du, workspace)[0]
+        ahead = vlo_return_map(p, z + dz, u + du, scratch)[0]
+        behind = vlo_return_map(p, z - dz, u - du, scratch)[0]
         return (ahead - behind) / (2 * h)
 
     unit = np.zeros((3, len(u)))

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planner import Decision
-from template_control.slip.automaton import AUTOMATON, STRIDE_START, Outcome, Slot
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import WalkingGait
+from template_control.slip.kernel import new_scratch
 from template_control.slip.modified_walking import search_angle
-from template_control.slip.stride import Workspace
+from template_control.slip.stride import kernel_model
 from template_control.slip.tables import TABLES
+from template_control.slip.vocabulary import Outcome, Slot
 
 Array = NDArray[np.float64]
 
@@ -51,19 +53,22 @@ class ModifiedPlanner:
         self.gait = gait
         self.options = options or ModifiedOptions()
         self.offset: Array = np.zeros(3)
-        self._workspace = Workspace()
+        self._scratch = new_scratch()
+        self._model = kernel_model(gait.parameters)
         k0 = gait.parameters.leg_stiffness
         self._stiffness = np.array(self.options.stiffness_range) * k0
 
     def decide(self, z: Array) -> Decision:
         """Controls for a step from VLO state ``z`` (3,); see :class:`Planner`."""
-        p, w, o = self.gait.parameters, self._workspace, self.options
+        p, o = self.gait.parameters, self.options
+        predicted = np.empty(3)
         nominal = float(self.gait.controls[Slot.TOUCHDOWN_ANGLE])
         top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
         high = min(nominal + o.angle_range[1], top)
         angles = np.array([min(nominal + o.angle_range[0], high), high])
         outcome, alpha, kappa_2, residual = search_angle(
             TABLES,
+            self._model,
             _NODE,
             z,
             self.gait.vlo,
@@ -71,21 +76,14 @@ class ModifiedPlanner:
             angles,
             p.leg_stiffness,
             self._stiffness,
-            p.mass,
-            p.gravity,
-            p.rest_length,
-            w.cx,
-            w.cy,
-            w.meta,
-            w.events,
-            w.work,
-            w.z_next,
+            self._scratch,
+            predicted,
         )
         controls = self.gait.controls.copy()
         controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2
         feasible = outcome == Outcome.SECTION
         reached = feasible and residual < o.tolerance**2
-        return Decision(controls, w.z_next.copy(), feasible, reached)
+        return Decision(controls, predicted, feasible, reached)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """The paper's planner plans every step afresh."""

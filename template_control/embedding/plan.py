@@ -14,9 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.automaton import Event, Outcome
 from template_control.slip.stride import Stride
 from template_control.slip.taylor import ORDER
+from template_control.slip.vocabulary import Event, Outcome
 
 Array = NDArray[np.float64]
 

@@ -12,9 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.kernel import MAX_EVENTS, MAX_SEGMENTS, vlo_map
+from template_control.slip.kernel import Model, Scratch, vlo_map
 from template_control.slip.tables import Tables
-from template_control.slip.taylor import ORDER
 
 Array = NDArray[np.float64]
 
@@ -33,7 +32,8 @@ class Law(NamedTuple):
         offset: (3,) what the robot adds to the template's next VLO state.
         lower, upper: (3,) bounds of u.
         top_margin: alpha stays this far [rad] below asin(y / l0).
-        mass, gravity, rest_length, stiffness: the template.
+        stiffness: k0 [N/m].
+        model: the template.
     """
 
     target: Array
@@ -44,31 +44,8 @@ class Law(NamedTuple):
     lower: Array
     upper: Array
     top_margin: float
-    mass: float
-    gravity: float
-    rest_length: float
     stiffness: float
-
-
-class Scratch(NamedTuple):
-    """Arrays the kernel writes to."""
-
-    cx: Array
-    cy: Array
-    meta: Array
-    events: Array
-    work: Array
-
-
-def scratch() -> Scratch:
-    """New arrays for one thread."""
-    return Scratch(
-        np.zeros((MAX_SEGMENTS, ORDER + 1)),
-        np.zeros((MAX_SEGMENTS, ORDER + 1)),
-        np.zeros((MAX_SEGMENTS, 7)),
-        np.zeros((MAX_EVENTS, 8)),
-        np.zeros((2, 4, ORDER + 1)),
-    )
+    model: Model
 
 
 @njit(cache=True)
@@ -76,7 +53,7 @@ def bounded(law: Law, z: Array, u: Array) -> None:
     """Clip controls ``u`` (3,) in place to what is admissible at VLO state ``z`` (3,)."""
     for i in range(3):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
-    top = np.arcsin(min(z[1] / law.rest_length, 1.0)) - law.top_margin
+    top = np.arcsin(min(z[1] / law.model.rest_length, 1.0)) - law.top_margin
     u[0] = min(u[0], top)
 
 
@@ -96,21 +73,7 @@ def step(tables: Tables, node: int, law: Law, s: Scratch, z: Array, u: Array, z_
     controls = np.zeros(5)
     controls[0] = u[0]
     controls[1], controls[2] = u[1] * law.stiffness, u[2] * law.stiffness
-    outcome = vlo_map(
-        tables,
-        node,
-        z,
-        controls,
-        law.mass,
-        law.gravity,
-        law.rest_length,
-        s.cx,
-        s.cy,
-        s.meta,
-        s.events,
-        s.work,
-        z_next,
-    )
+    outcome = vlo_map(tables, law.model, node, z, controls, s, z_next)
     for i in range(3):
         z_next[i] += law.offset[i]
     return outcome

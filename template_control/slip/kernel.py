@@ -6,13 +6,15 @@ assignments, and reads which of them belong where from :class:`~.tables.Tables`.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.automaton import Event, Outcome, Reset
 from template_control.slip.tables import Tables
-from template_control.slip.taylor import evaluate, expand
+from template_control.slip.taylor import ORDER, evaluate, expand
+from template_control.slip.vocabulary import Event, Outcome, Reset
 
 Array = NDArray[np.float64]
 
@@ -38,6 +40,43 @@ _MAX_EDGES = 8
 _SUBSTEPS = 4
 _ARMING = 1e-10  # a guard must have been this far below zero before it can fire
 _EVENT_TIME = 1e-14  # [s], bracket at which a root counts as found
+
+
+class Model(NamedTuple):
+    """The template's physics as the kernel takes it, SI units."""
+
+    mass: float
+    gravity: float
+    rest_length: float
+    max_time: float
+
+
+class Scratch(NamedTuple):
+    """Arrays a stride is written to; one set a thread, reused from call to call.
+
+    Attributes:
+        cx, cy: (MAX_SEGMENTS, ORDER + 1) polynomials of the path, one row a segment.
+        meta: (MAX_SEGMENTS, 7) start time, duration, node, toes, stiffnesses of a segment.
+        events: (MAX_EVENTS, 8) time, event, node left, node entered, state before the reset.
+        work: (2, 4, ORDER + 1) for the series.
+    """
+
+    cx: Array
+    cy: Array
+    meta: Array
+    events: Array
+    work: Array
+
+
+def new_scratch() -> Scratch:
+    """Fresh arrays for one thread."""
+    return Scratch(
+        np.zeros((MAX_SEGMENTS, ORDER + 1)),
+        np.zeros((MAX_SEGMENTS, ORDER + 1)),
+        np.zeros((MAX_SEGMENTS, 7)),
+        np.zeros((MAX_EVENTS, 8)),
+        np.zeros((2, 4, ORDER + 1)),
+    )
 
 
 @njit(cache=True)
@@ -117,41 +156,33 @@ def _root(
 @njit(cache=True)
 def run_stride(
     tables: Tables,
+    model: Model,
     node: int,
     state: Array,
     toes: Array,
     controls: Array,
-    mass: float,
-    gravity: float,
-    rest_length: float,
-    max_time: float,
     record: bool,
-    cx: Array,
-    cy: Array,
-    meta: Array,
-    events: Array,
-    work: Array,
+    scratch: Scratch,
 ) -> tuple[int, int, int, int, float]:
     """Run the automaton from ``node`` until a section or a failure.
 
     Args:
         tables: the packed automaton.
+        model: the template; a stride longer than its ``max_time`` counts as failed.
         node: index of the first node.
         state: (4,) x, y, dx/dt, dy/dt [m, m/s], overwritten with the final state.
         toes: (2,) x of rear and front toe [m], overwritten.
         controls: (NUM_SLOTS,) u: touchdown angle [rad] and stiffnesses [N/m] by Slot.
-        mass, gravity, rest_length: SI.
-        max_time: time after which the stride counts as failed [s].
         record: keep every segment and event; otherwise only the last is kept.
-        cx, cy: (MAX_SEGMENTS, ORDER + 1) polynomials of the path, one row a segment.
-        meta: (MAX_SEGMENTS, 7) start time, duration, node, toes, stiffnesses of a segment.
-        events: (MAX_EVENTS, 8) time, event, node left, node entered, state before the reset.
-        work: (2, 4, ORDER + 1) scratch.
+        scratch: overwritten.
 
     Returns:
         Outcome, last node (the one entered, where the section was reached), number of
         segments, number of events, duration [s].
     """
+    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
+    max_time = model.max_time
+    cx, cy, meta, events, work = scratch
     alpha = controls[0]
     stiffness = np.empty(2)
     probe = np.empty(4)
@@ -245,17 +276,11 @@ def run_stride(
 @njit(cache=True)
 def vlo_map(
     tables: Tables,
+    model: Model,
     node: int,
     z: Array,
     controls: Array,
-    mass: float,
-    gravity: float,
-    rest_length: float,
-    cx: Array,
-    cy: Array,
-    meta: Array,
-    events: Array,
-    work: Array,
+    scratch: Scratch,
     z_next: Array,
 ) -> int:
     """VLO return map (7), (9) for one state; returns the Outcome's value.
@@ -268,23 +293,6 @@ def vlo_map(
     state = np.empty(4)
     toes = np.zeros(2)
     state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
-    limit = 20.0 * np.sqrt(rest_length / gravity)
-    outcome = run_stride(
-        tables,
-        node,
-        state,
-        toes,
-        controls,
-        mass,
-        gravity,
-        rest_length,
-        limit,
-        False,
-        cx,
-        cy,
-        meta,
-        events,
-        work,
-    )[0]
+    outcome = run_stride(tables, model, node, state, toes, controls, False, scratch)[0]
     z_next[0], z_next[1], z_next[2] = state[2], state[1], state[3]
     return outcome

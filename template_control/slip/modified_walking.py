@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.automaton import Event, Outcome
-from template_control.slip.kernel import MAX_EVENTS, run_stride
+from template_control.slip.kernel import MAX_EVENTS, Model, Scratch, run_stride
 from template_control.slip.tables import Tables
+from template_control.slip.vocabulary import Event, Outcome
 
 Array = NDArray[np.float64]
 
@@ -27,9 +27,7 @@ def energy_stiffness(
     front_length: float,
     rear_length: float,
     kappa_1: float,
-    mass: float,
-    gravity: float,
-    rest_length: float,
+    model: Model,
 ) -> float:
     """Stiffness kappa_2 after the virtual bottom, equation (38) [N/m].
 
@@ -37,33 +35,28 @@ def energy_stiffness(
         z, target: (3,) dx/dt, y, dy/dt at this VLO and wanted at the next.
         front_length, rear_length: of the legs at the virtual bottom [m].
         kappa_1: stiffness before the virtual bottom [N/m].
-        mass, gravity, rest_length: SI.
+        model: the template.
     """
+    rest_length = model.rest_length
     mu_1 = (rest_length - target[1]) ** 2
     mu_2 = (rest_length - z[1]) ** 2
     mu_3 = (rest_length - front_length) ** 2 + (rest_length - rear_length) ** 2
     kinetic = target[0] ** 2 + target[2] ** 2 - z[0] ** 2 - z[2] ** 2
-    mu_4 = mass * (kinetic + 2.0 * gravity * (target[1] - z[1]))
+    mu_4 = model.mass * (kinetic + 2.0 * model.gravity * (target[1] - z[1]))
     return (mu_4 + (mu_3 - mu_2) * kappa_1) / (mu_3 - mu_1)
 
 
 @njit(cache=True)
 def modified_step(
     tables: Tables,
+    model: Model,
     node: int,
     z: Array,
     target: Array,
     alpha: float,
     kappa_1: float,
     stiffness_range: Array,
-    mass: float,
-    gravity: float,
-    rest_length: float,
-    cx: Array,
-    cy: Array,
-    meta: Array,
-    events: Array,
-    work: Array,
+    scratch: Scratch,
     z_next: Array,
 ) -> tuple[int, float]:
     """One step with angle ``alpha`` and kappa_2 of (38), kept within ``stiffness_range``.
@@ -76,7 +69,7 @@ def modified_step(
     Returns:
         Outcome, kappa_2 [N/m].
     """
-    limit = 20.0 * np.sqrt(rest_length / gravity)
+    events = scratch.events
     state, toes, controls = np.empty(4), np.zeros(2), np.zeros(5)
     controls[0], controls[1] = alpha, kappa_1
     kappa_2 = kappa_1
@@ -86,21 +79,18 @@ def modified_step(
         state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
         toes[:] = 0.0
         outcome, _, _, count, _ = run_stride(
-            tables, node, state, toes, controls, mass, gravity, rest_length, limit,
-            True, cx, cy, meta, events, work,
-        )  # fmt: skip
+            tables, model, node, state, toes, controls, True, scratch
+        )
         if attempt == 1:
             break
         toe = -1.0
         for i in range(min(count, MAX_EVENTS)):
             x, y = events[i, 4], events[i, 5]
             if i == 0:
-                toe = x + rest_length * np.cos(alpha)
+                toe = x + model.rest_length * np.cos(alpha)
             if events[i, 1] == _VIRTUAL_BOTTOM:
                 front, rear = np.hypot(x - toe, y), np.hypot(x, y)
-                wanted = energy_stiffness(
-                    z, target, front, rear, kappa_1, mass, gravity, rest_length
-                )
+                wanted = energy_stiffness(z, target, front, rear, kappa_1, model)
                 kappa_2 = min(max(wanted, stiffness_range[0]), stiffness_range[1])
         if kappa_2 == kappa_1 and outcome != _SECTION:
             break
@@ -111,6 +101,7 @@ def modified_step(
 @njit(cache=True)
 def search_angle(
     tables: Tables,
+    model: Model,
     node: int,
     z: Array,
     target: Array,
@@ -118,14 +109,7 @@ def search_angle(
     angles: Array,
     kappa_1: float,
     stiffness_range: Array,
-    mass: float,
-    gravity: float,
-    rest_length: float,
-    cx: Array,
-    cy: Array,
-    meta: Array,
-    events: Array,
-    work: Array,
+    scratch: Scratch,
     z_next: Array,
 ) -> tuple[int, float, float, float]:
     """Touchdown angle whose step ends nearest ``target``, equations (36) and (37).
@@ -149,17 +133,24 @@ def search_angle(
         for i in range(count):
             alpha = low + (high - low) * i / (count - 1)
             outcome, kappa_2 = modified_step(
-                tables, node, z, target, alpha, kappa_1, stiffness_range,
-                mass, gravity, rest_length, cx, cy, meta, events, work, z1,
-            )  # fmt: skip
+                tables, model, node, z, target, alpha, kappa_1, stiffness_range, scratch, z1
+            )
             residual = np.sum((z1 - target) ** 2)
             if outcome != _SECTION:
                 cost = 1e6 + residual
             else:
                 following, _ = modified_step(
-                    tables, node, z1, target, nominal_alpha, kappa_1, stiffness_range,
-                    mass, gravity, rest_length, cx, cy, meta, events, work, z2,
-                )  # fmt: skip
+                    tables,
+                    model,
+                    node,
+                    z1,
+                    target,
+                    nominal_alpha,
+                    kappa_1,
+                    stiffness_range,
+                    scratch,
+                    z2,
+                )
                 second = np.sum((z2 - target) ** 2)
                 cost = residual + (0.1 * second if following == _SECTION else 10.0)
             if cost < best_cost or best_outcome < 0:

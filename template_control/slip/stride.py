@@ -9,25 +9,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton import AUTOMATON, NUM_SLOTS, Event, Outcome, Slot
-from template_control.slip.kernel import MAX_EVENTS, MAX_SEGMENTS, run_stride, vlo_map
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.kernel import Model, Scratch, new_scratch, run_stride, vlo_map
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.tables import TABLES
-from template_control.slip.taylor import ORDER
+from template_control.slip.vocabulary import NUM_SLOTS, Event, Outcome, Slot
 
 Array = NDArray[np.float64]
 
 
-class Workspace:
-    """Arrays the kernel writes to; one per thread, reused from call to call."""
+def kernel_model(parameters: SlipParameters, max_time: float | None = None) -> Model:
+    """``parameters`` as the kernel takes them.
 
-    def __init__(self) -> None:
-        self.cx = np.zeros((MAX_SEGMENTS, ORDER + 1))
-        self.cy = np.zeros((MAX_SEGMENTS, ORDER + 1))
-        self.meta = np.zeros((MAX_SEGMENTS, 7))
-        self.events = np.zeros((MAX_EVENTS, 8))
-        self.work = np.zeros((2, 4, ORDER + 1))
-        self.z_next = np.zeros(3)
+    Args:
+        parameters: the template.
+        max_time: time limit of a stride [s]; default 20 sqrt(l0/g).
+    """
+    p = parameters
+    limit = 20.0 * np.sqrt(p.rest_length / p.gravity) if max_time is None else max_time
+    return Model(p.mass, p.gravity, p.rest_length, float(limit))
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def run(
     u: Array,
     toes: Sequence[float] = (0.0, 0.0),
     max_time: float | None = None,
-    workspace: Workspace | None = None,
+    scratch: Scratch | None = None,
 ) -> Stride:
     """Simulate one stride on the exact model.
 
@@ -152,33 +152,24 @@ def run(
         u: (5,) controls from :func:`controls`.
         toes: x of the rear and front toe [m].
         max_time: give up after this time [s]; default 20 sqrt(l0/g).
-        workspace: reuse these arrays.
+        scratch: reuse these arrays.
 
     Raises:
         ParameterError: for NaN or a wrong shape.
         KeyError: if there is no node ``start``.
     """
-    w = workspace or Workspace()
+    w = scratch or new_scratch()
     x = _finite("state", state, 4)
     c = _finite("toes", toes, 2)
-    p = parameters
-    limit = 20.0 * np.sqrt(p.rest_length / p.gravity) if max_time is None else max_time
     outcome, node, segments, events, duration = run_stride(
         TABLES,
+        kernel_model(parameters, max_time),
         AUTOMATON.index[start],
         x,
         c,
         _finite("controls", u, NUM_SLOTS),
-        p.mass,
-        p.gravity,
-        p.rest_length,
-        limit,
         True,
-        w.cx,
-        w.cy,
-        w.meta,
-        w.events,
-        w.work,
+        w,
     )
     names = [n.name for n in AUTOMATON.nodes]
     return Stride(
@@ -207,7 +198,7 @@ def vlo_return_map(
     parameters: SlipParameters,
     z: Sequence[float] | Array,
     u: Array,
-    workspace: Workspace | None = None,
+    scratch: Scratch | None = None,
 ) -> tuple[Array, Outcome]:
     """VLO return map of walking, equations (7) and (9), on the exact model.
 
@@ -215,26 +206,19 @@ def vlo_return_map(
         parameters: the template.
         z: (3,) dx/dt, y, dy/dt at VLO [m/s, m, m/s].
         u: (5,) controls from :func:`controls`.
-        workspace: reuse these arrays.
+        scratch: reuse these arrays.
 
     Returns:
         The next VLO state (3,), meaningless unless the outcome is SECTION; the outcome.
     """
-    w = workspace or Workspace()
-    p = parameters
+    z_next = np.empty(3)
     outcome = vlo_map(
         TABLES,
-        AUTOMATON.index["SS_av^w"],
+        kernel_model(parameters),
+        AUTOMATON.index[STRIDE_START["w"]],
         _finite("VLO state", z, 3),
         u,
-        p.mass,
-        p.gravity,
-        p.rest_length,
-        w.cx,
-        w.cy,
-        w.meta,
-        w.events,
-        w.work,
-        w.z_next,
+        scratch or new_scratch(),
+        z_next,
     )
-    return w.z_next.copy(), Outcome(outcome)
+    return z_next, Outcome(outcome)

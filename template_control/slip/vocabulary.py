@@ -1,0 +1,103 @@
+"""Words of the hybrid automaton (Table I): phases, guards, resets, control slots, outcomes."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Phase(IntEnum):
+    """Primary phases of motion (Section II-A): flight, single stance, double stance."""
+
+    F = 0
+    SS = 1
+    DS = 2
+
+
+class Slot(IntEnum):
+    """Places of the control vector u of a stride, in order.
+
+    ``TOUCHDOWN_ANGLE`` is alpha [rad] from the ground to the leg. The other slots are leg
+    stiffnesses [N/m]: before and after the stride's (virtual) bottom, and the two of the
+    front leg in a walk-to-run stride.
+    """
+
+    TOUCHDOWN_ANGLE = 0
+    K_SC = 1
+    K_SD = 2
+    K_SC_WR = 3
+    K_SD_WR = 4
+
+
+NUM_SLOTS = len(Slot)
+
+
+class Event(IntEnum):
+    """Transition guards; each is a scalar function that fires when it *rises* through 0.
+
+    With CoM (x, y), toes c1 (rear) and c2 (front), leg lengths l1, l2:
+
+    ===================  =====================================================
+    TOUCHDOWN            l0 sin(alpha) - y
+    REAR_LIFTOFF         l1 - l0
+    FRONT_LIFTOFF        l2 - l0
+    APEX                 -dy/dt
+    BOTTOM               d(l1^2)/dt: rear (only) leg turns to decompression
+    VIRTUAL_BOTTOM       d/dt of the squared distance to the midpoint of the toes
+    VLO                  x - c1: the stance leg is vertical
+    PASSED_FRONT_FOOT    x - c2: the CoM is over the front foot, rear leg still down
+    FALL                 -y
+    BACKWARD             -dx/dt
+    ===================  =====================================================
+    """
+
+    TOUCHDOWN = 0
+    REAR_LIFTOFF = 1
+    FRONT_LIFTOFF = 2
+    APEX = 3
+    BOTTOM = 4
+    VIRTUAL_BOTTOM = 5
+    VLO = 6
+    PASSED_FRONT_FOOT = 7
+    FALL = 8
+    BACKWARD = 9
+
+
+class Reset(IntEnum):
+    """What happens to the toes when an edge is taken.
+
+    ``PLACE_REAR`` and ``PLACE_FRONT`` put a toe where the stretched leg at the touchdown
+    angle meets the ground, x + l0 cos(alpha); ``SHIFT`` makes the front toe the rear one.
+    """
+
+    NONE = 0
+    PLACE_REAR = 1
+    PLACE_FRONT = 2
+    SHIFT = 3
+
+
+class Outcome(IntEnum):
+    """How a stride ended: at its section, or why it did not."""
+
+    SECTION = 0
+    FALL = 1
+    UNWANTED_FLIGHT = 2
+    BACKWARD = 3
+    NO_TOUCHDOWN = 4
+    NO_LIFTOFF = 5
+    TIMEOUT = 6
+
+    @property
+    def reason(self) -> str:
+        """The outcome in words."""
+        return _REASONS[self]
+
+
+_REASONS = {
+    Outcome.SECTION: "reached its section",
+    Outcome.FALL: "the CoM fell to the ground",
+    Outcome.UNWANTED_FLIGHT: "the last foot left the ground in a walking phase",
+    Outcome.BACKWARD: "the CoM turned backward",
+    Outcome.NO_TOUCHDOWN: "the swing leg never touched down",
+    Outcome.NO_LIFTOFF: "the CoM passed the front foot before the rear leg lifted off",
+    Outcome.TIMEOUT: "no event within the time limit",
+}
