@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from template_control.embedding.guards import Sensed, fired
@@ -12,10 +12,11 @@ from template_control.embedding.modified import ModifiedPlanner
 from template_control.embedding.plan import at_phase, chain, sample
 from template_control.embedding.references import leg_forces
 from template_control.embedding.start import state_at_vlo
+from template_control.embedding.step_planning import ReplanOptions, StepPlanning
 from template_control.embedding.swing_foot import SwingFoot, SwingOptions, quintic_step
 from template_control.errors import GaitError, RobotError
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.gait import gait_for_speed, gait_from_energy, vlo_energy
+from template_control.slip.gait import gait_at, gait_for_speed, gait_from_energy, vlo_energy
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.stride import controls, run, vlo_return_map
 from template_control.slip.vocabulary import Event, Outcome, Slot
@@ -180,6 +181,45 @@ def test_swing_without_a_foothold_comes_down():
         swing.advance(np.nan, 0.3, 1e-3)
     assert swing.y[0] == pytest.approx(0.05 - 0.02)
     assert swing.x[1] == 0.0
+
+
+def test_swing_stays_within_reach_of_the_hip():
+    swing = SwingFoot(SwingOptions(reach=0.97))
+    swing.start(np.array([0.55, 0.1]), np.zeros(2))
+    hip = np.array([0.0, 0.85])
+    np.testing.assert_array_equal(swing.within_reach(hip - [0.0, 0.3], 1.2, 0.9), swing.x)
+    x, speed, acceleration = swing.within_reach(hip, 1.2, 0.9)
+    assert np.hypot(x, 0.75) == pytest.approx(0.97 * 0.9)
+    assert (speed, acceleration) == (1.2, 0.0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.02, 0.12), st.floats(-0.2, 0.2), st.floats(-0.02, 0.005))
+def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(later, faster, higher):
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    node = AUTOMATON.node(STRIDE_START["w"])
+    planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
+    sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
+    planning.decide(node, sensed, 0.0, 1.0)
+    u = planning.steps[0].decision.controls
+    z = gait.vlo + [faster, higher, 0.0]
+    disturbed = run(P, node.name, [0.0, z[1], z[0], z[2]], u)
+    assume(later < disturbed.time_of(Event.TOUCHDOWN))
+    sensed.state[:] = disturbed.sample(later)[0][:4]
+    planning.reconsider(node, sensed, later)
+    expected = LqrPlanner(gait).decide(z).controls
+    np.testing.assert_allclose(planning.steps[0].decision.controls, expected, rtol=1e-6)
+    assert len(planning.steps) == 1
+
+
+def test_surprise_is_a_large_deviation_some_time_after_the_last_plan():
+    planning = StepPlanning(
+        LqrPlanner(gait_at(P, np.radians(66.0), 1.1)), ReplanOptions(speed=0.05, interval=0.02)
+    )
+    assert planning.surprised(-0.06, phase_time=0.1, now=0.1)
+    assert not planning.surprised(0.04, phase_time=0.1, now=0.1)
+    assert not planning.surprised(0.06, phase_time=0.01, now=0.1)
+    assert not planning.surprised(0.06, phase_time=0.1, now=0.01)
 
 
 def test_guards_feel_what_the_template_sees():

@@ -26,13 +26,19 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit status (2 for a user's mistake, told in one line)."""
+    """Run a command; returns its exit status.
+
+    A user's mistake is told in one line, status 2; Ctrl-C is status 130.
+    """
     options = build_parser().parse_args(arguments)
     try:
         return int(options.run(options))
     except TemplateControlError as error:
         print(f"template-control: {error}", file=sys.stderr)
         return _USER_ERROR
+    except KeyboardInterrupt:
+        print("template-control: interrupted before anything was done", file=sys.stderr)
+        return walk.INTERRUPTED
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from template_control.slip.gait import WalkingGait, gait_at, gait_for_speed, gai
 from template_control.slip.parameters import SlipParameters
 from template_control.view.figures import save_figures
 
+INTERRUPTED = 130  # exit status after Ctrl-C, as shells have it
 _PLANNERS: dict[str, type[LqrPlanner] | type[ModifiedPlanner]] = {
     "lqr": LqrPlanner,
     "modified": ModifiedPlanner,
@@ -46,7 +47,8 @@ def add_parser(commands: Any) -> None:
         description=(
             "Walk a robot in PyBullet: a planner on the SLIP template chooses each step, a"
             " whole-body QP makes the robot follow it. Ends with a table, and a folder with the"
-            " run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input."
+            " run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input, 130"
+            " after Ctrl-C (what was walked by then is saved)."
         ),
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
@@ -112,7 +114,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Walk as told; returns 0, or 1 after a fall."""
+    """Walk as told; returns 0, 1 after a fall, 130 after Ctrl-C."""
     _check(options)
     folder = _writable(options.output)
     robot = load_robot(options.robot)
@@ -141,6 +143,8 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(figures))
     else:
         print_table(figures, record)
+    if record.metadata["interrupted"]:
+        return INTERRUPTED
     return 1 if record.fell else 0
 
 

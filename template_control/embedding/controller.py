@@ -8,7 +8,6 @@ to the CoM (beta of Section V-B).
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,14 +15,13 @@ from numpy.typing import NDArray
 
 from template_control.embedding.guards import Sensed, fired
 from template_control.embedding.load import LoadEstimate, LoadOptions
-from template_control.embedding.plan import Plan, at_phase, chain
-from template_control.embedding.planner import Decision, Planner
+from template_control.embedding.plan import at_phase
+from template_control.embedding.planner import Planner
 from template_control.embedding.references import leg_forces, pd, unloading_cap
+from template_control.embedding.step_planning import ReplanOptions, StepPlanning, StepReport
 from template_control.embedding.swing_foot import SwingFoot, SwingOptions
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON, STRIDE_START, Node
-from template_control.slip.kernel import new_scratch
-from template_control.slip.stride import run
 from template_control.slip.vocabulary import Phase, Reset
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.tasks import (
@@ -37,7 +35,6 @@ from template_control.whole_body.tasks import (
 
 Array = NDArray[np.float64]
 
-_VLO_STATE = [2, 1, 3]  # dx/dt, y, dy/dt of a state x, y, dx/dt, dy/dt
 _NO_CAP = np.full(1, np.inf)
 
 
@@ -53,6 +50,7 @@ class EmbeddingOptions:
         friction: coefficient the QP's cones are built with.
         torque_scale: share of the URDF's torque limits that may be used.
         trunk_pitch: where the trunk is held [rad].
+        replan: when a step is planned anew.
     """
 
     gains: Gains = field(default_factory=Gains)
@@ -63,27 +61,7 @@ class EmbeddingOptions:
     friction: float = 0.63
     torque_scale: float = 1.0
     trunk_pitch: float = 0.0
-
-
-@dataclass(frozen=True)
-class StepReport:
-    """What the controller knew and chose at a VLO.
-
-    Attributes:
-        time: of the VLO [s].
-        state: (3,) dx/dt (angular-momentum based), y, dy/dt.
-        decision: the planner's choice for the step that begins.
-        offset: (3,) the planner's offset estimate.
-        load: the load factor.
-        plan_seconds: wall-clock time of the plan.
-    """
-
-    time: float
-    state: Array
-    decision: Decision
-    offset: Array
-    load: float
-    plan_seconds: float
+    replan: ReplanOptions = field(default_factory=ReplanOptions)
 
 
 class EmbeddingController:
@@ -97,7 +75,7 @@ class EmbeddingController:
     Attributes:
         node: the automaton's node the robot is in.
         rear, front: indices of the feet; in single stance the rear one carries.
-        steps: one report a VLO, the start's included.
+        planning: the step's decision and the path that follows it.
         reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
         template_forces: (2, 2) leg forces of the template at this phase [N], rear and front.
         swing: reference of the swing foot.
@@ -107,9 +85,9 @@ class EmbeddingController:
         self, robot: PlanarBiped, planner: Planner, options: EmbeddingOptions | None = None
     ) -> None:
         self.robot = robot
-        self.planner = planner
         self.options = options or EmbeddingOptions()
         o = self.options
+        self.planning = StepPlanning(planner, o.replan)
         self.parameters = planner.gait.parameters
         self.qp = WholeBodyQp(robot, o.friction, o.torque_scale)
         self.tasks = TaskStack(robot.nv)
@@ -120,16 +98,22 @@ class EmbeddingController:
         self.reference = np.zeros(6)
         self.template_forces = np.zeros((2, 2))
         self.phase_time = 0.0
-        self.steps: list[StepReport] = []
         self.time = 0.0
         self._sensed = Sensed(np.zeros(4), np.zeros(2))
         self._rows = {
             Phase.SS: np.array(o.single_stance.rows),
             Phase.DS: np.array(o.double_stance.rows),
         }
-        self._scratch = new_scratch()
-        self._plan: Plan
-        self._plan_toe = 0.0
+
+    @property
+    def planner(self) -> Planner:
+        """Chooses each step's controls."""
+        return self.planning.planner
+
+    @property
+    def steps(self) -> list[StepReport]:
+        """One report a VLO, the start's included."""
+        return self.planning.steps
 
     def start(self, rear: int) -> None:
         """Begin at a VLO over foot ``rear``; the robot's model must be up to date.
@@ -161,10 +145,15 @@ class EmbeddingController:
         self._sensed.swing_time += dt
         self._sense(contact)
         self._advance()
+        if self.planning.surprised(
+            self._sensed.state[2] - self.reference[2], self.phase_time, self.time
+        ):
+            self.planning.reconsider(self.node, self._sensed, self.time)
+            self.phase_time = 0.0
         x, y = self._sensed.state[0] - self._sensed.toes[0], self._sensed.state[1]
-        plan = self._plan
+        path, toe = self.planning.path, self.planning.toe
         self.phase_time, row = at_phase(
-            plan.cx, plan.cy, plan.meta, self._plan_toe, x, y, self.phase_time + dt, self.reference
+            path.cx, path.cy, path.meta, toe, x, y, self.phase_time + dt, self.reference
         )
         self._track_com(x, y, dt)
         trunk = self.options.gains.trunk
@@ -172,14 +161,16 @@ class EmbeddingController:
             0.0, self.options.trunk_pitch, 0.0, q[2], v[2], trunk[0], trunk[1]
         )
         leg_forces(
-            plan.meta[row],
-            self.reference[0] + self._plan_toe,
+            path.meta[row],
+            self.reference[0] + toe,
             self.reference[1],
             self.parameters.rest_length,
             self.template_forces,
         )
         self.time += dt
-        return self._solve_double() if self.node.phase is Phase.DS else self._solve_single(dt)
+        if self.node.phase is Phase.DS:
+            return self._solve_double()
+        return self._solve_single(q, v, dt)
 
     # -- the automaton ----------------------------------------------------------------
 
@@ -205,7 +196,7 @@ class EmbeddingController:
                 edge.event,
                 self._sensed,
                 self.phase_time,
-                self._plan.liftoff,
+                self.planning.path.liftoff,
                 p.rest_length,
                 p.gravity,
             ):
@@ -214,60 +205,25 @@ class EmbeddingController:
             if edge.reset is Reset.SHIFT:
                 self._lift_off()
             elif edge.reset is Reset.PLACE_FRONT:
-                self._replan()
+                self.planning.follow(self.node, self._sensed, self.time)
+                self.phase_time = 0.0
             if edge.section:
                 self._decide()
             return
 
     def _lift_off(self) -> None:
         """The front foot becomes the rear one; the plan goes on from its toe."""
-        self._plan_toe = self._plan.front_toe
+        self.planning.toe = self.planning.path.front_toe
         self.rear, self.front = self.front, self.rear
         r, s = self.robot, self._sensed
         s.toes[0], s.toes[1] = s.toes[1], s.toes[0]
         s.swing_time = 0.0
         self.swing.start(r.foot_position[self.front], r.foot_velocity[self.front])
 
-    # -- planning ---------------------------------------------------------------------
-
     def _decide(self) -> None:
-        """At VLO: learn from the step that ended, choose the next one's controls."""
-        z = self._sensed.state[_VLO_STATE].copy()
-        begin = time.perf_counter()
         if self.steps:
-            self.planner.observe(self.steps[-1].decision, z)
             self.load.end_step()
-        decision = self.planner.decide(z)
-        seconds = time.perf_counter() - begin
-        self.steps.append(
-            StepReport(
-                self.time, z, decision, self.planner.offset.copy(), self.load.factor, seconds
-            )
-        )
-        self._replan()
-
-    def _replan(self) -> None:
-        """Template path from here to the touchdown after the next VLO."""
-        p, s = self.parameters, self._sensed
-        toes = (float(s.toes[0]), float(s.toes[1]))
-        decision = self.steps[-1].decision
-        first = run(p, self.node.name, s.state, decision.controls, toes, scratch=self._scratch)
-        strides = [first]
-        if first.completed:
-            # The next foothold must be known when the swing begins, before the next VLO.
-            ahead = self.planner.decide(first.state[_VLO_STATE])
-            strides.append(
-                run(
-                    p,
-                    first.node,
-                    first.state,
-                    ahead.controls,
-                    (float(first.toes[0]), float(first.toes[1])),
-                    scratch=self._scratch,
-                )
-            )
-        self._plan = chain(strides)
-        self._plan_toe = toes[0]
+        self.planning.decide(self.node, self._sensed, self.time, self.load.factor)
         self.phase_time = 0.0
 
     # -- control ----------------------------------------------------------------------
@@ -294,12 +250,20 @@ class EmbeddingController:
             self.load.factor,
         )
 
-    def _solve_single(self, dt: float) -> Solution:
+    def _solve_single(self, q: Array, v: Array, dt: float) -> Solution:
         r, o, swing, d = self.robot, self.options, self.swing, self.tasks.desired
-        swing.advance(self._plan.foothold, self._plan.touchdown - self.phase_time, dt)
+        path = self.planning.path
+        foothold, due = path.foothold, path.touchdown - self.phase_time
+        if not np.isfinite(foothold):
+            # The template cannot complete the step; the gait's own foothold is the best guess.
+            gait = self.planner.gait
+            foothold = self._sensed.toes[0] + gait.step_length
+            due = gait.step_duration - self._sensed.swing_time
+        swing.advance(foothold, due, dt)
         position, velocity = r.foot_position[self.front], r.foot_velocity[self.front]
         kp, kd = o.gains.swing
-        for row, axis, i in ((Row.SWING_X, swing.x, 0), (Row.SWING_Y, swing.y, 1)):
+        forward = swing.within_reach(q[:2], v[0], r.leg_length)
+        for row, axis, i in ((Row.SWING_X, forward, 0), (Row.SWING_Y, swing.y, 1)):
             d[row] = pd(axis[2], axis[0], axis[1], position[i], velocity[i], kp, kd)
         return self.qp.solve(
             self.tasks,

@@ -114,28 +114,36 @@ def search(
     best: Array,
     first: Array,
 ) -> float:
-    """Improve ``best`` (3,) in place over a shrinking grid in alpha and kappa_2; its price.
+    """Improve ``best`` (3,) in place over shrinking grids in alpha, kappa_2 and in kappa_1.
 
     Args:
-        spread: (2,) half-widths of the first grid in alpha [rad] and kappa_2/k0.
+        spread: (2,) half-widths of the first grid in alpha [rad] and kappa/k0.
         best: start of the search, and its result.
         first: (3,) overwritten with the state after the step.
+
+    Returns:
+        The price of ``best``.
     """
     u = np.empty(3)
     z1 = np.empty(3)
     cheapest = price(tables, node, law, s, z, best, first)
     width_alpha, width_kappa = spread[0], spread[1]
     for _ in range(3):
-        c0, c2 = best[0], best[2]
-        for i in range(-2, 3):
-            for j in range(-1, 2):
-                u[0], u[1], u[2] = c0 + 0.5 * i * width_alpha, best[1], c2 + j * width_kappa
-                bounded(law, z, u)
-                cost = price(tables, node, law, s, z, u, z1)
-                if cost < cheapest:
-                    cheapest = cost
-                    best[:] = u
-                    first[:] = z1
+        c0, c1, c2 = best[0], best[1], best[2]
+        for i in range(17):
+            # 5 x 3 points in alpha and kappa_2 about the centre, and two in kappa_1.
+            u[0], u[1], u[2] = c0, c1, c2
+            if i < 15:
+                u[0] += 0.5 * (i // 3 - 2) * width_alpha
+                u[2] += (i % 3 - 1) * width_kappa
+            else:
+                u[1] += (2 * i - 31) * width_kappa
+            bounded(law, z, u)
+            cost = price(tables, node, law, s, z, u, z1)
+            if cost < cheapest:
+                cheapest = cost
+                best[:] = u
+                first[:] = z1
         width_alpha *= 0.4
         width_kappa *= 0.4
     return cheapest

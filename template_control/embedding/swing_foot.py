@@ -28,12 +28,15 @@ class SwingOptions:
         horizon: below this time to go [s] the path is no longer re-aimed.
         lead: the foot is above its foothold this long before touchdown [s], so that it
             comes down at rest relative to the ground.
+        reach: the foot is kept within this share of the leg's length from the hip; a knee
+            that goes straight hits its stop with tens of kilonewtons.
     """
 
     clearance: float = 0.05
     landing_speed: float = 0.2
     horizon: float = 0.02
     lead: float = 0.03
+    reach: float = 0.97
 
 
 @njit(cache=True)
@@ -92,6 +95,20 @@ class SwingFoot:
             else:
                 quintic_step(self.y, 0.0, -o.landing_speed, time_to_go, dt)
         self._elapsed += dt
+
+    def within_reach(self, hip: Array, hip_speed: float, leg_length: float) -> Array:
+        """The horizontal reference (3,), held where the leg can follow.
+
+        Args:
+            hip: (2,) position of the hip [m].
+            hip_speed: its forward speed [m/s].
+            leg_length: of the straight leg [m].
+        """
+        height = hip[1] - self.y[0]
+        span = np.sqrt(max((self.options.reach * leg_length) ** 2 - height**2, 0.0))
+        if self.x[0] <= hip[0] + span:
+            return self.x
+        return np.array([hip[0] + span, hip_speed, 0.0])
 
     def _coast(self, dt: float) -> None:
         """Overdue or nearly there: hold the horizontal position, keep coming down."""

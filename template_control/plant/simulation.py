@@ -87,6 +87,8 @@ def simulate(
 ) -> Record:
     """Walk ``robot`` and record it; a fall ends the run, is recorded and raises nothing.
 
+    Ctrl-C ends the run too; what was walked by then is returned, marked ``interrupted``.
+
     Args:
         robot: model of the controller, and whose URDF PyBullet loads.
         planner: chooses the steps; owns the gait.
@@ -113,6 +115,8 @@ def simulate(
         try:
             reason = _loop(plant, controller, recorder, o, length, progress)
         except KeyboardInterrupt:
+            if not recorder.rows:
+                raise
             reason, interrupted = "", True
     seconds = time.perf_counter() - begin
     metadata = _metadata(controller, recorder, o, reason, seconds)

@@ -41,6 +41,7 @@ class PlanarBiped:
         torque_limit: (nv - 3,) URDF ``effort`` [N m].
         velocity_limit: (nv - 3,) URDF ``velocity`` [rad/s].
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
+        leg_length: from hip to the foot sphere's centre with a straight knee [m].
         trunk_com: height of the trunk's own CoM above the hips [m].
 
     Attributes (written by :meth:`update`; views that the next call overwrites):
@@ -78,6 +79,11 @@ class PlanarBiped:
         self.legs: tuple[tuple[int, ...], ...] = tuple(
             tuple(j - BASE_DOF - 1 for j in model.supports[parent] if j > BASE_DOF)
             for parent in (model.frames[f].parentJoint for f in self._foot_ids)
+        )
+        self.leg_length = min(
+            sum(_sagittal(model.jointPlacements[j + 1 + BASE_DOF]) for j in leg[1:])
+            + _sagittal(model.frames[foot].placement)
+            for leg, foot in zip(self.legs, self._foot_ids, strict=True)
         )
         self.trunk_com = float(model.inertias[BASE_DOF].lever[2])
         self._data = model.createData()
@@ -184,6 +190,12 @@ class PlanarBiped:
     def hip_height(self, q: Array) -> float:
         """Height of the point the legs hang from [m]; the base joint is placed there."""
         return float(q[1])
+
+
+def _sagittal(placement: pin.SE3) -> float:
+    """Length of a placement's translation in the x-z plane [m]."""
+    translation = placement.translation
+    return float(np.hypot(translation[0], translation[2]))
 
 
 def _check_planar(path: Path, model: pin.Model) -> None:

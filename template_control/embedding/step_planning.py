@@ -1,0 +1,161 @@
+"""From one VLO to the next: the planner's decision, and the template's path that follows it.
+
+The path is planned at VLO, again where a foot has landed, and again when a disturbance has
+carried the robot away from it.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.guards import Sensed
+from template_control.embedding.plan import Plan, chain
+from template_control.embedding.planner import Decision, Planner
+from template_control.slip.automaton import AUTOMATON, STRIDE_START, Node
+from template_control.slip.kernel import new_scratch
+from template_control.slip.stride import run
+from template_control.slip.vocabulary import Slot
+
+Array = NDArray[np.float64]
+
+_VLO_STATE = [2, 1, 3]  # dx/dt, y, dy/dt of a state x, y, dx/dt, dy/dt
+
+
+@dataclass(frozen=True)
+class ReplanOptions:
+    """When a step is planned anew between two sections.
+
+    Attributes:
+        speed: deviation of the (momentum-based) forward speed from the plan's [m/s].
+        interval: shortest time between such plans [s].
+    """
+
+    speed: float = 0.05
+    interval: float = 0.02
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What the controller knew and chose at a VLO.
+
+    Attributes:
+        time: of the VLO [s].
+        state: (3,) dx/dt (angular-momentum based), y, dy/dt.
+        decision: the planner's choice for the step that begins.
+        offset: (3,) the planner's offset estimate.
+        load: the load factor.
+        plan_seconds: wall-clock time of the plan.
+    """
+
+    time: float
+    state: Array
+    decision: Decision
+    offset: Array
+    load: float
+    plan_seconds: float
+
+
+class StepPlanning:
+    """Keeps the present step's decision and the path the robot follows.
+
+    Args:
+        planner: chooses each step's controls and owns the gait.
+        options: when to plan again.
+
+    Attributes:
+        steps: one report a VLO, the start's included.
+        path: the template's, from the last plan on.
+        toe: x of the rear toe the path's phase is measured from [m].
+    """
+
+    def __init__(self, planner: Planner, options: ReplanOptions) -> None:
+        self.planner = planner
+        self.options = options
+        self.parameters = planner.gait.parameters
+        self.steps: list[StepReport] = []
+        self.path: Plan
+        self.toe = 0.0
+        self._planned_at = 0.0
+        self._scratch = new_scratch()
+
+    def decide(self, node: Node, sensed: Sensed, now: float, load: float) -> None:
+        """At VLO: learn from the step that ended, choose the next one's controls.
+
+        Args:
+            node: of the automaton, where the step begins.
+            sensed: the robot's state.
+            now: time [s].
+            load: the load factor, for the report.
+        """
+        z = sensed.state[_VLO_STATE].copy()
+        begin = time.perf_counter()
+        if self.steps:
+            self.planner.observe(self.steps[-1].decision, z)
+        decision = self.planner.decide(z)
+        seconds = time.perf_counter() - begin
+        self.steps.append(StepReport(now, z, decision, self.planner.offset.copy(), load, seconds))
+        self.follow(node, sensed, now)
+
+    def follow(self, node: Node, sensed: Sensed, now: float) -> None:
+        """Template path from here to the touchdown after the next VLO."""
+        toes = (float(sensed.toes[0]), float(sensed.toes[1]))
+        u = self.steps[-1].decision.controls
+        first = run(self.parameters, node.name, sensed.state, u, toes, scratch=self._scratch)
+        strides = [first]
+        if first.completed:
+            # The next foothold must be known when the swing begins, before the next VLO.
+            ahead = self.planner.decide(first.state[_VLO_STATE])
+            strides.append(
+                run(
+                    self.parameters,
+                    first.node,
+                    first.state,
+                    ahead.controls,
+                    (float(first.toes[0]), float(first.toes[1])),
+                    scratch=self._scratch,
+                )
+            )
+        self.path = chain(strides)
+        self.toe = toes[0]
+        self._planned_at = now
+
+    def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
+        """Whether a disturbance has carried the robot away from its path.
+
+        Args:
+            deviation: of the forward speed from the path's [m/s].
+            phase_time: time along the path [s].
+            now: time [s].
+        """
+        o = self.options
+        return (
+            abs(deviation) > o.speed
+            and phase_time > o.interval
+            and now - self._planned_at > o.interval
+        )
+
+    def reconsider(self, node: Node, sensed: Sensed, now: float) -> None:
+        """Plan again from here; before touchdown the step's controls are still free."""
+        if node.name == STRIDE_START["w"]:
+            z = self._back_to_vlo(sensed)
+            if z is not None:
+                self.steps[-1] = replace(self.steps[-1], decision=self.planner.decide(z))
+        self.follow(node, sensed, now)
+
+    def _back_to_vlo(self, sensed: Sensed) -> Array | None:
+        """The VLO state from which the template would have come to where the robot is.
+
+        The template's dynamics are the same forward and backward: its past is the mirror
+        image of the future of the mirrored state.
+        """
+        x, y, dx, dy = sensed.state
+        u = self.steps[-1].decision.controls.copy()
+        u[Slot.K_SD] = u[Slot.K_SC]
+        before_vlo = AUTOMATON.node("SS_bv^w").name
+        mirrored = [sensed.toes[0] - x, y, dx, -dy]
+        past = run(self.parameters, before_vlo, mirrored, u, scratch=self._scratch)
+        return past.state[_VLO_STATE] * [1.0, 1.0, -1.0] if past.completed else None
