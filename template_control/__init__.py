@@ -28,8 +28,9 @@ from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import WalkingGait, gait_at, gait_for_speed, gait_from_energy
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.stride import Stride, controls, run, vlo_return_map
-from template_control.slip.vocabulary import Event, Outcome, Slot
+from template_control.slip.return_map import ReturnMap
+from template_control.slip.stride import Stride, controls, run
+from template_control.slip.vocabulary import Event, MapKind, Outcome, Slot
 from template_control.view.figures import save_figures
 
 __all__ = [
@@ -43,6 +44,7 @@ __all__ = [
     "GaitError",
     "LqrOptions",
     "LqrPlanner",
+    "MapKind",
     "ModifiedOptions",
     "ModifiedPlanner",
     "Outcome",
@@ -53,6 +55,7 @@ __all__ = [
     "Push",
     "Record",
     "RecordError",
+    "ReturnMap",
     "RobotError",
     "SimulationOptions",
     "SlipParameters",
@@ -70,5 +73,4 @@ __all__ = [
     "save_figures",
     "simulate",
     "summarise",
-    "vlo_return_map",
 ]

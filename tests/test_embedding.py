@@ -18,7 +18,8 @@ from template_control.errors import GaitError, RobotError
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import gait_at, gait_for_speed, gait_from_energy, vlo_energy
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.stride import controls, run, vlo_return_map
+from template_control.slip.return_map import ReturnMap
+from template_control.slip.stride import controls, run
 from template_control.slip.vocabulary import Event, Outcome, Slot
 
 P = SlipParameters()
@@ -40,7 +41,7 @@ def test_planner_leaves_the_gait_alone(planner, gait):
 def test_prediction_is_the_exact_map(planner, gait):
     z = gait.vlo + [0.02, 0.003, -0.03]
     decision = planner.decide(z)
-    z_next, outcome = vlo_return_map(P, z, decision.controls)
+    z_next, outcome = ReturnMap(P).step(z, decision.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(decision.predicted, z_next, atol=1e-9)
 
@@ -64,7 +65,7 @@ def test_planner_answers_for_every_state(speed, height, vertical):
 def test_lqr_brings_the_template_back(gait, shift):
     planner, z = LqrPlanner(gait), gait.vlo + shift
     for _ in range(25):
-        z, outcome = vlo_return_map(P, z, planner.decide(z).controls)
+        z, outcome = ReturnMap(P).step(z, planner.decide(z).controls)
         assert outcome is Outcome.SECTION
     np.testing.assert_allclose(z, gait.vlo, atol=2e-3)
 
@@ -75,7 +76,7 @@ def test_lqr_settles_on_target_in_spite_of_an_offset(gait):
     offset = np.array([0.008, -0.001, 0.02])
     for _ in range(80):
         decision = planner.decide(z)
-        z, outcome = vlo_return_map(P, z, decision.controls)
+        z, outcome = ReturnMap(P).step(z, decision.controls)
         assert outcome is Outcome.SECTION
         z = z + offset
         planner.observe(decision, z)

@@ -10,7 +10,8 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton import STRIDE_START
 from template_control.slip.gait import gait_at, gait_from_energy
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.stride import controls, run, vlo_return_map
+from template_control.slip.return_map import ReturnMap
+from template_control.slip.stride import controls, run
 from template_control.slip.vocabulary import Event, Outcome
 
 P = SlipParameters()
@@ -168,7 +169,7 @@ def test_running_stride_runs_on_the_same_kernel():
 
 def test_gait_returns_to_itself_and_is_symmetric():
     gait = gait_at(P, ALPHA, 1.1)
-    z, outcome = vlo_return_map(P, gait.vlo, gait.controls)
+    z, outcome = ReturnMap(P).step(gait.vlo, gait.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(z, gait.vlo, atol=1e-8)
     stride = run(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], gait.controls)

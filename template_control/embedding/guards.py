@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.kernel import guard
+from template_control.slip.guards import guard
 from template_control.slip.vocabulary import Event
 
 Array = NDArray[np.float64]

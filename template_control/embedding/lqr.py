@@ -19,7 +19,8 @@ from template_control.embedding.step_search import FALL_PRICE, Law, linear, pric
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import WalkingGait
 from template_control.slip.kernel import new_scratch
-from template_control.slip.stride import kernel_model, vlo_return_map
+from template_control.slip.return_map import ReturnMap
+from template_control.slip.stride import kernel_model
 from template_control.slip.tables import TABLES
 from template_control.slip.vocabulary import Slot
 
@@ -135,21 +136,10 @@ class LqrPlanner:
 
 
 def _jacobians(gait: WalkingGait) -> tuple[Array, Array]:
-    """Central differences of the exact map in z and in (alpha, kappa_1/k0, kappa_2/k0)."""
-    p, z, u = gait.parameters, gait.vlo, gait.controls
-    scratch = new_scratch()
-    h = 1e-5
-
-    def difference(dz: Array, du: Array) -> Array:
-        ahead = vlo_return_map(p, z + dz, u + du, scratch)[0]
-        behind = vlo_return_map(p, z - dz, u - du, scratch)[0]
-        return (ahead - behind) / (2 * h)
-
-    unit = np.zeros((3, len(u)))
-    unit[range(3), _SLOTS] = [1.0, p.leg_stiffness, p.leg_stiffness]
-    a = np.column_stack([difference(h * e, np.zeros_like(u)) for e in np.eye(3)])
-    b = np.column_stack([difference(np.zeros(3), h * e) for e in unit])
-    return a, b
+    """Of the exact map in z and in (alpha, kappa_1/k0, kappa_2/k0)."""
+    linear = ReturnMap(gait.parameters).linearise(gait.vlo, gait.controls)
+    k0 = gait.parameters.leg_stiffness
+    return linear.state_jacobian, linear.control_jacobian[:, _SLOTS] * [1.0, k0, k0]
 
 
 def _settling_map(a: Array, b: Array, tolerance: Array) -> Array:

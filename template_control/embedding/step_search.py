@@ -1,4 +1,4 @@
-"""Compiled look-ahead on the exact VLO map: what an LQR step is worth, and a better one.
+"""Compiled look-ahead on the exact VLO return map: what an LQR step is worth, and a better one.
 
 A step is judged two steps ahead: it is taken on the exact map, the step after it by the
 (bounded) LQR law, and the state then reached is priced with the LQR's cost-to-go.
@@ -12,11 +12,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.kernel import Model, Scratch, vlo_map
+from template_control.slip.kernel import Model, Scratch
+from template_control.slip.section_map import section_map
 from template_control.slip.tables import Tables
+from template_control.slip.vocabulary import MapKind
 
 Array = NDArray[np.float64]
 
+_EXACT = int(MapKind.EXACT)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
 
@@ -73,7 +76,7 @@ def step(tables: Tables, node: int, law: Law, s: Scratch, z: Array, u: Array, z_
     controls = np.zeros(5)
     controls[0] = u[0]
     controls[1], controls[2] = u[1] * law.stiffness, u[2] * law.stiffness
-    outcome = vlo_map(tables, law.model, node, z, controls, s, z_next)
+    outcome = section_map(tables, law.model, _EXACT, node, z, controls, s, z_next)
     for i in range(3):
         z_next[i] += law.offset[i]
     return outcome

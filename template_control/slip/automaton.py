@@ -77,6 +77,23 @@ class Automaton:
         """
         return self.nodes[self.index[name]]
 
+    def stride(self, start: str) -> tuple[Node, ...]:
+        """Nodes a stride from ``start`` can pass, in order of first arrival."""
+        found = [self.node(start)]
+        for node in found:
+            for edge in node.edges:
+                if isinstance(edge.target, str) and not edge.section:
+                    target = self.node(edge.target)
+                    if target not in found:
+                        found.append(target)
+        return tuple(found)
+
+    def sections(self, start: str) -> tuple[Event, Event]:
+        """Sections (VLO or APEX) at which a stride from ``start`` begins and ends."""
+        begin = Event.APEX if self.node(start).phase is Phase.F else Event.VLO
+        end = next(e.event for n in self.stride(start) for e in n.edges if e.section)
+        return begin, end
+
     def successor(self, name: str, event: Event) -> str:
         """Name of the node that follows ``name`` when ``event`` fires.
 

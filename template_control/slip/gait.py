@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 
 from template_control.errors import GaitError
 from template_control.slip.automaton import STRIDE_START
-from template_control.slip.kernel import Scratch, new_scratch
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.stride import controls, run, vlo_return_map
+from template_control.slip.return_map import ReturnMap
+from template_control.slip.stride import controls, run
 from template_control.slip.vocabulary import Outcome
 
 Array = NDArray[np.float64]
@@ -67,9 +67,9 @@ def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingG
     return WalkingGait(name, parameters, z, u, float(stride.state[0]), stride.duration)
 
 
-def _returns(parameters: SlipParameters, z: Array, u: Array, scratch: Scratch) -> float:
+def _returns(step: ReturnMap, z: Array, u: Array) -> float:
     """Vertical speed at the next VLO, NaN where there is none; zero for a symmetric gait."""
-    z_next, outcome = vlo_return_map(parameters, z, u, scratch)
+    z_next, outcome = step.step(z, u)
     return float(z_next[2]) if outcome is Outcome.SECTION else np.nan
 
 
@@ -79,10 +79,10 @@ def _symmetric_roots(
     values: Array,
 ) -> list[tuple[Array, Array]]:
     """All (z, u) = make(value) on the grid ``values`` that return to themselves."""
-    scratch = new_scratch()
+    step = ReturnMap(parameters)
 
     def residual(value: float) -> float:
-        return _returns(parameters, *make(value), scratch)
+        return _returns(step, *make(value))
 
     found = []
     samples = [residual(v) for v in values]
@@ -90,7 +90,7 @@ def _symmetric_roots(
         if not (np.isfinite(f_lo) and np.isfinite(f_hi)) or f_lo * f_hi > 0.0:
             continue
         z, u = make(brentq(residual, lo, hi, xtol=1e-14, rtol=1e-14))
-        z_next, outcome = vlo_return_map(parameters, z, u, scratch)
+        z_next, outcome = step.step(z, u)
         # A vertical speed that returns to zero need not be the symmetric step.
         if outcome is Outcome.SECTION and np.max(np.abs(z_next - z)) < 1e-6:
             found.append((z, u))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.kernel import Model, Scratch, new_scratch, run_stride, vlo_map
+from template_control.slip.automaton import AUTOMATON
+from template_control.slip.kernel import Model, Scratch, new_scratch, run_stride
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.tables import TABLES
 from template_control.slip.vocabulary import NUM_SLOTS, Event, Outcome, Slot
@@ -125,7 +125,12 @@ def controls(
     return u
 
 
-def _finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
+def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
+    """``values`` as a new array of this size.
+
+    Raises:
+        ParameterError: if its shape is another, or a number is not finite.
+    """
     array = np.array(values, dtype=float)
     if array.shape != (size,):
         raise ParameterError(f"{name} has shape {array.shape}: give {size} numbers")
@@ -159,15 +164,15 @@ def run(
         KeyError: if there is no node ``start``.
     """
     w = scratch or new_scratch()
-    x = _finite("state", state, 4)
-    c = _finite("toes", toes, 2)
+    x = finite("state", state, 4)
+    c = finite("toes", toes, 2)
     outcome, node, segments, events, duration = run_stride(
         TABLES,
         kernel_model(parameters, max_time),
         AUTOMATON.index[start],
         x,
         c,
-        _finite("controls", u, NUM_SLOTS),
+        finite("controls", u, NUM_SLOTS),
         True,
         w,
     )
@@ -192,33 +197,3 @@ def run(
         cy=w.cy[:segments].copy(),
         meta=w.meta[:segments].copy(),
     )
-
-
-def vlo_return_map(
-    parameters: SlipParameters,
-    z: Sequence[float] | Array,
-    u: Array,
-    scratch: Scratch | None = None,
-) -> tuple[Array, Outcome]:
-    """VLO return map of walking, equations (7) and (9), on the exact model.
-
-    Args:
-        parameters: the template.
-        z: (3,) dx/dt, y, dy/dt at VLO [m/s, m, m/s].
-        u: (5,) controls from :func:`controls`.
-        scratch: reuse these arrays.
-
-    Returns:
-        The next VLO state (3,), meaningless unless the outcome is SECTION; the outcome.
-    """
-    z_next = np.empty(3)
-    outcome = vlo_map(
-        TABLES,
-        kernel_model(parameters),
-        AUTOMATON.index[STRIDE_START["w"]],
-        _finite("VLO state", z, 3),
-        u,
-        scratch or new_scratch(),
-        z_next,
-    )
-    return z_next, Outcome(outcome)

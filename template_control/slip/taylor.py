@@ -1,27 +1,28 @@
-"""Taylor series of the SLIP dynamics, equations (1) to (3), to machine precision.
+"""Taylor series of the SLIP dynamics, equations (1) to (3), to 13 digits.
 
 The right-hand side is built from sums, products and one power, so all Taylor
 coefficients of the CoM path follow from recurrences (automatic differentiation of the
 ODE; Jorba and Zou 2005). A phase then takes one to three steps, each a polynomial that
-also serves as dense output and as the function in which events are located.
+also serves as dense output and as the path on which events are located.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from template_control.slip.compiled import inner
 
 Array = NDArray[np.float64]
 
-ORDER = 18
+ORDER = 16
 """Degree of the polynomials."""
 
-TOLERANCE = 1e-15
+TOLERANCE = 1e-13
 """Size of the last terms relative to the rest length; sets the step."""
 
 
-@njit(cache=True)
+@inner
 def expand(
     state: Array,
     toes: Array,
@@ -48,22 +49,25 @@ def expand(
     """
     cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
     for n in range(ORDER - 1):
-        ax = 0.0
-        ay = -gravity if n == 0 else 0.0
+        ax = 0.0 * cx[0]
+        ay = ax - (gravity if n == 0 else 0.0)
         for leg in range(2):
             if stiffness[leg] == 0.0:
                 continue
             d, s, q, w = work[leg, 0], work[leg, 1], work[leg, 2], work[leg, 3]
             d[n] = cx[n] - (toes[leg] if n == 0 else 0.0)
-            total = 0.0
-            for j in range(n + 1):
+            total = 0.0 * cx[0]
+            for j in range((n + 1) // 2):
                 total += d[j] * d[n - j] + cy[j] * cy[n - j]
+            total *= 2.0
+            if n % 2 == 0:
+                total += d[n // 2] * d[n // 2] + cy[n // 2] * cy[n // 2]
             s[n] = total
             if n == 0:
                 q[0] = 1.0 / np.sqrt(total)
                 w[0] = stiffness[leg] / mass * (rest_length * q[0] - 1.0)
             else:
-                total = 0.0
+                total = 0.0 * cx[0]
                 for j in range(n):
                     total += (-0.5 * (n - j) - j) * s[n - j] * q[j]
                 q[n] = total / (n * s[0])
@@ -80,15 +84,3 @@ def expand(
         if size > 0.0:
             step = min(step, (TOLERANCE / size) ** (1.0 / n))
     return step
-
-
-@njit(cache=True)
-def evaluate(cx: Array, cy: Array, t: float, state: Array) -> None:
-    """Write position and velocity of the polynomials at ``t`` [s] into ``state`` (4,)."""
-    x = y = u = v = 0.0
-    for n in range(ORDER, -1, -1):
-        u = u * t + x
-        v = v * t + y
-        x = x * t + cx[n]
-        y = y * t + cy[n]
-    state[0], state[1], state[2], state[3] = x, y, u, v

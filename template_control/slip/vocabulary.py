@@ -62,6 +62,9 @@ class Event(IntEnum):
     BACKWARD = 9
 
 
+NUM_EVENTS = len(Event)
+
+
 class Reset(IntEnum):
     """What happens to the toes when an edge is taken.
 
@@ -101,3 +104,17 @@ _REASONS = {
     Outcome.NO_LIFTOFF: "the CoM passed the front foot before the rear leg lifted off",
     Outcome.TIMEOUT: "no event within the time limit",
 }
+
+
+class MapKind(IntEnum):
+    """Which solution of the stance dynamics a return map is made of.
+
+    ``EXACT``: event-exact integration. The others are closed forms of Section III:
+    ``PAPER`` as published, ``IMPROVED`` with one deferred correction and conserved energy,
+    ``GEYER`` without correction of the angular momentum.
+    """
+
+    EXACT = 0
+    PAPER = 1
+    IMPROVED = 2
+    GEYER = 3
