@@ -21,7 +21,8 @@ from template_control.embedding.references import leg_forces, pd, unloading_cap
 from template_control.embedding.step_planning import ReplanOptions, StepPlanning, StepReport
 from template_control.embedding.swing_foot import SwingFoot, SwingOptions
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.automaton import AUTOMATON, STRIDE_START, Node
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.hybrid import Node
 from template_control.slip.vocabulary import Phase, Reset
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.tasks import (

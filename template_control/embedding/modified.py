@@ -14,7 +14,7 @@ from template_control.slip.kernel import new_scratch
 from template_control.slip.modified_walking import search_angle
 from template_control.slip.stride import kernel_model
 from template_control.slip.tables import TABLES
-from template_control.slip.vocabulary import Outcome, Slot
+from template_control.slip.vocabulary import MapKind, Outcome, Slot
 
 Array = NDArray[np.float64]
 
@@ -30,16 +30,18 @@ class ModifiedOptions:
         stiffness_range: kappa_2 over k0.
         top_margin: alpha stays this far [rad] below asin(y / l0).
         tolerance: distance from the gait's VLO state, in SI units, that counts as reached.
+        map_kind: the return map that steps are tried on.
     """
 
     angle_range: tuple[float, float] = (-0.14, 0.08)
     stiffness_range: tuple[float, float] = (0.5, 1.5)
     top_margin: float = 0.01
     tolerance: float = 0.05
+    map_kind: MapKind = MapKind.EXACT
 
 
 class ModifiedPlanner:
-    """kappa_1 = k0, kappa_2 by equation (38), alpha by search on the exact map.
+    """kappa_1 = k0, kappa_2 by equation (38), alpha by search on a return map.
 
     Args:
         gait: to reach at the next VLO.
@@ -69,6 +71,7 @@ class ModifiedPlanner:
         outcome, alpha, kappa_2, residual = search_angle(
             TABLES,
             self._model,
+            int(o.map_kind),
             _NODE,
             z,
             self.gait.vlo,

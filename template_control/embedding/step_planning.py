@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from template_control.embedding.guards import Sensed
 from template_control.embedding.plan import Plan, chain
 from template_control.embedding.planner import Decision, Planner
-from template_control.slip.automaton import AUTOMATON, STRIDE_START, Node
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.hybrid import Node
 from template_control.slip.kernel import new_scratch
 from template_control.slip.stride import run
 from template_control.slip.vocabulary import Slot

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from template_control.slip.kernel import Model, Scratch
-from template_control.slip.section_map import section_map
+from template_control.slip.section_map import RESULTS, section_map
 from template_control.slip.tables import Tables
 from template_control.slip.vocabulary import MapKind
 
@@ -76,9 +76,10 @@ def step(tables: Tables, node: int, law: Law, s: Scratch, z: Array, u: Array, z_
     controls = np.zeros(5)
     controls[0] = u[0]
     controls[1], controls[2] = u[1] * law.stiffness, u[2] * law.stiffness
-    outcome = section_map(tables, law.model, _EXACT, node, z, controls, s, z_next)
+    result = np.empty(RESULTS)
+    outcome = section_map(tables, law.model, _EXACT, node, z, controls, s, result)
     for i in range(3):
-        z_next[i] += law.offset[i]
+        z_next[i] = result[i] + law.offset[i]
     return outcome
 
 

@@ -10,101 +10,8 @@ takes its place (``Reset.SHIFT``).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
+from template_control.slip.hybrid import Automaton, Edge, Node
 from template_control.slip.vocabulary import Event, Outcome, Phase, Reset, Slot
-
-
-@dataclass(frozen=True)
-class Edge:
-    """A transition: when ``event`` fires, apply ``reset`` and go to ``target``.
-
-    Attributes:
-        event: the guard.
-        target: name of the successor node, or the failure the stride ends with.
-        reset: what happens to the toes.
-        guard: the guard's name in Fig. 2 (empty for failures).
-        section: True where a stride ends (VLO or apex), and the next begins at ``target``.
-    """
-
-    event: Event
-    target: str | Outcome
-    reset: Reset = Reset.NONE
-    guard: str = ""
-    section: bool = False
-
-
-@dataclass(frozen=True)
-class Node:
-    """A circle of Fig. 2, ``phase_subphase^gait``; leg stiffness is constant in it.
-
-    Attributes:
-        name: the node's name, such as ``"DS_sc^w"``.
-        phase: flight, single or double stance.
-        rear: stiffness slot of the rear (in single stance: the only) leg, None in the air.
-        front: stiffness slot of the front leg, None in the air.
-        edges: the ways out, failures included.
-    """
-
-    name: str
-    phase: Phase
-    rear: Slot | None
-    front: Slot | None
-    edges: tuple[Edge, ...]
-
-    def edge(self, event: Event) -> Edge | None:
-        """The first edge that ``event`` fires, or None."""
-        return next((e for e in self.edges if e.event is event), None)
-
-
-@dataclass(frozen=True)
-class Automaton:
-    """Nodes of the walking and running gaits and of both transition strides."""
-
-    nodes: tuple[Node, ...]
-
-    @cached_property
-    def index(self) -> dict[str, int]:
-        """Node name to position in :attr:`nodes`."""
-        return {node.name: i for i, node in enumerate(self.nodes)}
-
-    def node(self, name: str) -> Node:
-        """The node called ``name``.
-
-        Raises:
-            KeyError: if there is none.
-        """
-        return self.nodes[self.index[name]]
-
-    def stride(self, start: str) -> tuple[Node, ...]:
-        """Nodes a stride from ``start`` can pass, in order of first arrival."""
-        found = [self.node(start)]
-        for node in found:
-            for edge in node.edges:
-                if isinstance(edge.target, str) and not edge.section:
-                    target = self.node(edge.target)
-                    if target not in found:
-                        found.append(target)
-        return tuple(found)
-
-    def sections(self, start: str) -> tuple[Event, Event]:
-        """Sections (VLO or APEX) at which a stride from ``start`` begins and ends."""
-        begin = Event.APEX if self.node(start).phase is Phase.F else Event.VLO
-        end = next(e.event for n in self.stride(start) for e in n.edges if e.section)
-        return begin, end
-
-    def successor(self, name: str, event: Event) -> str:
-        """Name of the node that follows ``name`` when ``event`` fires.
-
-        Raises:
-            KeyError: if ``event`` is no way out of it, or ends the stride in failure.
-        """
-        edge = self.node(name).edge(event)
-        if edge is None or isinstance(edge.target, Outcome):
-            raise KeyError(f"{event.name} leads nowhere from {name}")
-        return edge.target
-
 
 _SINGLE_STANCE_FAILURES = (
     Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
@@ -279,6 +186,48 @@ def _walk_to_run() -> tuple[Node, ...]:
     )
 
 
+def _simplified_walk_to_run() -> tuple[Node, ...]:
+    """The WRT stride as its controller sees it (Section IV-C1).
+
+    The rear leg is ignored after the virtual bottom, though its liftoff still ends the
+    phase; from there on the stride is the real one.
+    """
+    return (
+        Node(
+            "SS_av^wr*",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^wr*", Reset.PLACE_FRONT, "G_t^wr"),
+                *_AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sc^wr*",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_br^wr*",
+            Phase.SS,
+            None,
+            Slot.K_SC_WR,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                # Alone, the front leg may be passed before: that is no failure here.
+                Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *_RUNNING_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
 def _run_to_walk() -> tuple[Node, ...]:
     """The RWT stride: apex -> touchdown -> bottom -> VLO (Section IV-C2)."""
     return (
@@ -309,8 +258,22 @@ def _run_to_walk() -> tuple[Node, ...]:
     )
 
 
-AUTOMATON = Automaton((*_walking(), *_running(), *_walk_to_run(), *_run_to_walk()))
+AUTOMATON = Automaton(
+    (
+        *_walking(),
+        *_running(),
+        *_walk_to_run(),
+        *_run_to_walk(),
+        *_simplified_walk_to_run(),
+    )
+)
 """The one automaton of the library."""
 
-STRIDE_START = {"w": "SS_av^w", "r": "F_aa^r", "wr": "SS_av^wr", "rw": "F_aa^rw"}
-"""First node of each kind of stride (superscripts of Table I)."""
+STRIDE_START = {
+    "w": "SS_av^w",
+    "r": "F_aa^r",
+    "wr": "SS_av^wr",
+    "rw": "F_aa^rw",
+    "wr*": "SS_av^wr*",
+}
+"""First node of each kind of stride (superscripts of Table I; * the controller's WRT)."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.slip.compiled import inner
-from template_control.slip.kernel import Model, Scratch, apply_reset
+from template_control.slip.kernel import Model, Scratch, apply_reset, note_bottom
 from template_control.slip.locate import arm, first_event, root
 from template_control.slip.path import FLIGHT, STANCE, sample
 from template_control.slip.stance_map import (
@@ -267,6 +267,7 @@ def closed_form_stride(
         if edge == _GOES_ON:
             continue
         edge += first_edge
+        note_bottom(tables.event[edge], state, toes, scratch.bottom)
         apply_reset(tables.reset[edge], state, toes, model.rest_length, alpha)
         if tables.outcome[edge] >= 0:
             return tables.outcome[edge]

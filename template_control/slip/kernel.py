@@ -16,7 +16,7 @@ from template_control.slip.locate import MAX_EDGES, arm, first_event
 from template_control.slip.path import COEFFICIENTS, SERIES, sample
 from template_control.slip.tables import Tables
 from template_control.slip.taylor import ORDER, expand
-from template_control.slip.vocabulary import NUM_EVENTS, Outcome, Reset
+from template_control.slip.vocabulary import NUM_EVENTS, Event, Outcome, Reset
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 _PLACE_REAR = int(Reset.PLACE_REAR)
 _PLACE_FRONT = int(Reset.PLACE_FRONT)
 _SHIFT = int(Reset.SHIFT)
+_BOTTOM = int(Event.BOTTOM)
+_VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
 _TIMEOUT = int(Outcome.TIMEOUT)
 
 MAX_SEGMENTS = 96
@@ -52,6 +54,7 @@ class Scratch(NamedTuple):
         path: (COEFFICIENTS,) of a closed-form phase.
         out: (6,) a sample of a path.
         state, toes: (4,) and (2,) of the section maps.
+        bottom: (2,) lengths of rear and front leg at the last (virtual) bottom [m].
         stiffness: (2,) of the phase's legs.
         values, armed: (2, NUM_EVENTS) and (MAX_EDGES,) the guards.
     """
@@ -65,6 +68,7 @@ class Scratch(NamedTuple):
     out: Array
     state: Array
     toes: Array
+    bottom: Array
     stiffness: Array
     values: Array
     armed: NDArray[np.bool_]
@@ -83,6 +87,7 @@ def new_scratch(dtype: type[float] | type[complex] = float) -> Scratch:
         np.zeros(4, dtype),
         np.zeros(2, dtype),
         np.zeros(2, dtype),
+        np.zeros(2, dtype),
         np.zeros((2, NUM_EVENTS)),
         np.zeros(MAX_EDGES, dtype=np.bool_),
     )
@@ -97,6 +102,14 @@ def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha
         toes[1] = state[0] + rest_length * np.cos(alpha)
     elif reset == _SHIFT:
         toes[0] = toes[1]
+
+
+@inner
+def note_bottom(event: int, state: Array, toes: Array, bottom: Array) -> None:
+    """At a bottom, virtual or not, write the legs' lengths to ``bottom`` (2,)."""
+    if event in (_BOTTOM, _VIRTUAL_BOTTOM):
+        for leg in range(2):
+            bottom[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
 
 
 @inner
@@ -183,6 +196,7 @@ def run_stride(
         for i in range(4):
             events[row, 4 + i] = state[i].real
         event_count += 1
+        note_bottom(tables.event[fired], state, toes, scratch.bottom)
         apply_reset(tables.reset[fired], state, toes, rest_length, alpha)
         if outcome >= 0:
             return outcome, (target if target >= 0 else node), segments, event_count, time

@@ -10,13 +10,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.kernel import MAX_EVENTS, Model, Scratch, run_stride
-from template_control.slip.tables import Tables
-from template_control.slip.vocabulary import Event, Outcome
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.kernel import Model, Scratch, new_scratch
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.section_map import RESULTS, section_map
+from template_control.slip.stride import kernel_model
+from template_control.slip.tables import TABLES, Tables
+from template_control.slip.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
-_VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
+_K_SC = int(Slot.K_SC)
+_K_SD = int(Slot.K_SD)
+_STEP = 1e-20  # of a complex step
 _SECTION = int(Outcome.SECTION)
 
 
@@ -50,58 +57,68 @@ def energy_stiffness(
 def modified_step(
     tables: Tables,
     model: Model,
+    kind: int,
     node: int,
     z: Array,
     target: Array,
-    alpha: float,
-    kappa_1: float,
     stiffness_range: Array,
+    controls: Array,
     scratch: Scratch,
-    z_next: Array,
-) -> tuple[int, float]:
-    """One step with angle ``alpha`` and kappa_2 of (38), kept within ``stiffness_range``.
+    result: Array,
+) -> int:
+    """One step with kappa_2 of (38), kept within ``stiffness_range``.
 
     Args:
+        kind: value of the MapKind.
+        target: (3,) the state wanted at the next VLO.
         stiffness_range: (2,) bounds of kappa_2 [N/m].
-        z_next: (3,) overwritten with the next VLO state.
-        The rest as in :func:`energy_stiffness` and :func:`~.kernel.run_stride`.
+        controls: (NUM_SLOTS,) touchdown angle and kappa_1; kappa_2 is overwritten.
+        The rest as in :func:`~.section_map.section_map`.
 
     Returns:
-        Outcome, kappa_2 [N/m].
+        The Outcome's value.
     """
-    events = scratch.events
-    state, toes, controls = np.empty(4), np.zeros(2), np.zeros(5)
-    controls[0], controls[1] = alpha, kappa_1
-    kappa_2 = kappa_1
-    for attempt in range(2):
-        # The first pass finds the virtual bottom, which kappa_2 does not influence.
-        controls[2] = kappa_2
-        state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
-        toes[:] = 0.0
-        outcome, _, _, count, _ = run_stride(
-            tables, model, node, state, toes, controls, True, scratch
+    # The first pass finds the virtual bottom, which kappa_2 does not influence.
+    controls[_K_SD] = controls[_K_SC]
+    outcome = section_map(tables, model, kind, node, z, controls, scratch, result)
+    rear, front = result[4], result[5]
+    if not np.isfinite(rear.real):
+        return outcome
+    wanted = energy_stiffness(z, target, front, rear, controls[_K_SC], model)
+    if wanted.real < stiffness_range[0]:
+        wanted = stiffness_range[0] + 0.0 * wanted
+    elif wanted.real > stiffness_range[1]:
+        wanted = stiffness_range[1] + 0.0 * wanted
+    controls[_K_SD] = wanted
+    return section_map(tables, model, kind, node, z, controls, scratch, result)
+
+
+@njit(cache=True)
+def modified_many(
+    tables: Tables,
+    model: Model,
+    kind: int,
+    node: int,
+    z: Array,
+    target: Array,
+    stiffness_range: Array,
+    controls: Array,
+    scratch: Scratch,
+    result: Array,
+    outcome: IntArray,
+) -> None:
+    """:func:`modified_step` from one state for rows of ``controls`` (n, NUM_SLOTS)."""
+    for i in range(controls.shape[0]):
+        outcome[i] = modified_step(
+            tables, model, kind, node, z, target, stiffness_range, controls[i], scratch, result[i]
         )
-        if attempt == 1:
-            break
-        toe = -1.0
-        for i in range(min(count, MAX_EVENTS)):
-            x, y = events[i, 4], events[i, 5]
-            if i == 0:
-                toe = x + model.rest_length * np.cos(alpha)
-            if events[i, 1] == _VIRTUAL_BOTTOM:
-                front, rear = np.hypot(x - toe, y), np.hypot(x, y)
-                wanted = energy_stiffness(z, target, front, rear, kappa_1, model)
-                kappa_2 = min(max(wanted, stiffness_range[0]), stiffness_range[1])
-        if kappa_2 == kappa_1 and outcome != _SECTION:
-            break
-    z_next[0], z_next[1], z_next[2] = state[2], state[1], state[3]
-    return outcome, kappa_2
 
 
 @njit(cache=True)
 def search_angle(
     tables: Tables,
     model: Model,
+    kind: int,
     node: int,
     z: Array,
     target: Array,
@@ -124,7 +141,7 @@ def search_angle(
     Returns:
         Outcome, alpha [rad], kappa_2 [N/m], squared residual of the first step.
     """
-    z1, z2 = np.empty(3), np.empty(3)
+    z1, z2, u = np.empty(RESULTS), np.empty(RESULTS), np.zeros(NUM_SLOTS)
     best_cost, best_alpha, best_kappa, best_residual = np.inf, nominal_alpha, kappa_1, np.inf
     best_outcome = -1
     low, high = angles[0], angles[1]
@@ -132,32 +149,82 @@ def search_angle(
         count = 9 if level == 0 else 5
         for i in range(count):
             alpha = low + (high - low) * i / (count - 1)
-            outcome, kappa_2 = modified_step(
-                tables, model, node, z, target, alpha, kappa_1, stiffness_range, scratch, z1
+            u[0], u[_K_SC] = alpha, kappa_1
+            outcome = modified_step(
+                tables, model, kind, node, z, target, stiffness_range, u, scratch, z1
             )
-            residual = np.sum((z1 - target) ** 2)
+            kappa_2 = u[_K_SD]
+            residual = np.sum((z1[:3] - target) ** 2)
             if outcome != _SECTION:
                 cost = 1e6 + residual
             else:
-                following, _ = modified_step(
-                    tables,
-                    model,
-                    node,
-                    z1,
-                    target,
-                    nominal_alpha,
-                    kappa_1,
-                    stiffness_range,
-                    scratch,
-                    z2,
+                u[0] = nominal_alpha
+                following = modified_step(
+                    tables, model, kind, node, z1[:3], target, stiffness_range, u, scratch, z2
                 )
-                second = np.sum((z2 - target) ** 2)
+                second = np.sum((z2[:3] - target) ** 2)
                 cost = residual + (0.1 * second if following == _SECTION else 10.0)
             if cost < best_cost or best_outcome < 0:
                 best_cost, best_alpha, best_kappa = cost, alpha, kappa_2
                 best_residual, best_outcome = residual, outcome
-                z_next[:] = z1
+                z_next[:] = z1[:3]
         width = (high - low) / (count - 1)
         low = max(angles[0], best_alpha - 0.75 * width)
         high = min(angles[1], best_alpha + 0.75 * width)
     return best_outcome, best_alpha, best_kappa, best_residual
+
+
+class ModifiedMap:
+    """The VLO return map with kappa_2 by (38), for :class:`~.step_solver.StepProblem`.
+
+    Args:
+        parameters: the template.
+        kind: of return map.
+        stiffness_range: bounds of kappa_2 [N/m].
+
+    Attributes:
+        target: (3,) VLO state whose energy kappa_2 aims at.
+
+    The methods overwrite kappa_2 in the controls they are given.
+    """
+
+    dimensions = (3, 3)
+
+    def __init__(
+        self, parameters: SlipParameters, kind: MapKind, stiffness_range: tuple[float, float]
+    ) -> None:
+        self.parameters = parameters
+        self.target = np.zeros(3)
+        self._range = np.array(stiffness_range)
+        node = AUTOMATON.index[STRIDE_START["w"]]
+        self._kernel = TABLES, kernel_model(parameters), int(kind), node
+        self._scratch, self._complex_scratch = new_scratch(), new_scratch(complex)
+
+    def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
+        """See :meth:`~.return_map.ReturnMap.evaluate`."""
+        result = np.empty(RESULTS)
+        outcome = modified_step(
+            *self._kernel, z, self.target, self._range, u, self._scratch, result
+        )
+        return result, Outcome(outcome)
+
+    def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
+        """See :meth:`~.return_map.ReturnMap.evaluate_many`."""
+        result, outcome = np.empty((len(u), RESULTS)), np.empty(len(u), dtype=np.int64)
+        modified_many(*self._kernel, z, self.target, self._range, u, self._scratch, result, outcome)
+        return result, outcome
+
+    def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
+        """See :meth:`~.return_map.ReturnMap.derivatives`; kappa_2 varies along with u."""
+        jacobian = np.empty((RESULTS, len(columns)))
+        result, outcome = self.evaluate(z, u)
+        zc = np.array(z, dtype=complex)
+        for c, column in enumerate(columns):
+            uc = u.astype(complex)
+            uc[column - 3] += 1j * _STEP
+            step = np.empty(RESULTS, dtype=complex)
+            modified_step(
+                *self._kernel, zc, self.target, self._range, uc, self._complex_scratch, step
+            )
+            jacobian[:, c] = step.imag / _STEP
+        return result, jacobian, outcome

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.kernel import new_scratch
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.section_map import map_many, section_jacobian, section_map
+from template_control.slip.section_map import RESULTS, map_many, section_jacobian, section_map
 from template_control.slip.stride import kernel_model
 from template_control.slip.tables import TABLES
 from template_control.slip.vocabulary import NUM_SLOTS, Event, MapKind, Outcome
@@ -22,6 +23,8 @@ IntArray = NDArray[np.int64]
 DIMENSION = {Event.VLO: 3, Event.APEX: 2}
 """Size of a section's state: dx/dt, y, dy/dt at VLO (8), dx/dt, y at apex (4)."""
 
+_STATE = 3
+
 
 class Mapped(NamedTuple):
     """Where strides end; NaN where one fails.
@@ -30,11 +33,13 @@ class Mapped(NamedTuple):
         state: (..., m) at the next section.
         outcome: (...) values of the :class:`~.vocabulary.Outcome`.
         advance: (...) horizontal distance covered by the CoM [m].
+        bottom: (..., 2) length of rear and front leg at the (virtual) bottom [m].
     """
 
     state: Array
     outcome: IntArray
     advance: Array
+    bottom: Array
 
 
 class Linearisation(NamedTuple):
@@ -79,15 +84,15 @@ class ReturnMap:
             raise ParameterError(f"no stride {stride!r}: give one of {', '.join(STRIDE_START)}")
         self.parameters = parameters
         self.stride = stride
-        self.kind = kind
+        self.kind = MapKind(kind)
         begin, end = AUTOMATON.sections(STRIDE_START[stride])
         self.dimensions = DIMENSION[begin], DIMENSION[end]
-        self._node = AUTOMATON.index[STRIDE_START[stride]]
-        self._model = kernel_model(parameters)
+        node = AUTOMATON.index[STRIDE_START[stride]]
+        self._kernel = TABLES, kernel_model(parameters), int(self.kind), node
         self._scratch = new_scratch()
         self._complex_scratch = new_scratch(complex)
 
-    def step(self, z: Array, u: Array) -> tuple[Array, Outcome]:
+    def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
         """One stride without checks, for inner loops.
 
         Args:
@@ -95,13 +100,43 @@ class ReturnMap:
             u: (NUM_SLOTS,) controls.
 
         Returns:
-            (m,) state at the next section, where the outcome is SECTION; the outcome.
+            (RESULTS,) dx/dt, y, dy/dt at the next section, where the outcome is SECTION,
+            distance covered, legs' lengths at the bottom; the outcome.
         """
-        z_next = np.empty(self.dimensions[1])
-        outcome = section_map(
-            TABLES, self._model, self.kind, self._node, z, u, self._scratch, z_next
+        result = np.empty(RESULTS)
+        outcome = section_map(*self._kernel, _padded(z), u, self._scratch, result)
+        return result, Outcome(outcome)
+
+    def step(self, z: Array, u: Array) -> tuple[Array, Outcome]:
+        """As :meth:`evaluate`, but only the (m,) state at the next section."""
+        result, outcome = self.evaluate(z, u)
+        return result[: self.dimensions[1]], outcome
+
+    def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
+        """As :meth:`evaluate` for controls ``u`` (n, NUM_SLOTS) from one state ``z``."""
+        return self._many(np.tile(_padded(z), (len(u), 1)), u)
+
+    def _many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
+        result, outcome = np.empty((len(z), RESULTS)), np.empty(len(z), dtype=np.int64)
+        map_many(*self._kernel, z, u, self._scratch, result, outcome)
+        return result, outcome
+
+    def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
+        """One stride and chosen derivatives without checks, for inner loops.
+
+        Args:
+            z: (n,) state at the section.
+            u: (NUM_SLOTS,) controls.
+            columns: (c,) what to differentiate by: 0 to 2 the state, 3 + slot the controls.
+
+        Returns:
+            (RESULTS,) as :meth:`evaluate`; its (RESULTS, c) derivatives; the outcome.
+        """
+        result, jacobian = np.empty(RESULTS), np.empty((RESULTS, len(columns)))
+        outcome = section_jacobian(
+            *self._kernel, _padded(z), u, columns, self._complex_scratch, result, jacobian
         )
-        return z_next, Outcome(outcome)
+        return result, jacobian, Outcome(outcome)
 
     def __call__(self, z: ArrayLike, u: ArrayLike) -> Mapped:
         """Strides from one state or many, with the same controls or each its own.
@@ -113,30 +148,23 @@ class ReturnMap:
         Raises:
             ParameterError: for a wrong shape or a number that is not finite.
         """
-        states = self._checked("state", z, self.dimensions[0])
-        inputs = self._checked("controls", u, NUM_SLOTS)
+        states = _checked("state", z, self.dimensions[0])
+        inputs = _checked("controls", u, NUM_SLOTS)
         shape = np.broadcast_shapes(states.shape[:-1], inputs.shape[:-1])
         count = int(np.prod(shape, dtype=np.int64))
-        flat_z = np.broadcast_to(states, (*shape, states.shape[-1])).reshape(count, -1)
-        flat_u = np.broadcast_to(inputs, (*shape, NUM_SLOTS)).reshape(count, -1)
-        z_next = np.empty((count, self.dimensions[1]))
-        advance = np.empty(count)
-        outcome = np.empty(count, dtype=np.int64)
-        map_many(
-            TABLES,
-            self._model,
-            self.kind,
-            self._node,
-            np.ascontiguousarray(flat_z),
-            np.ascontiguousarray(flat_u),
-            self._scratch,
-            z_next,
-            advance,
-            outcome,
+        flat_z, flat_u = np.zeros((*shape, _STATE)), np.empty((*shape, NUM_SLOTS))
+        flat_z[..., : self.dimensions[0]], flat_u[...] = states, inputs
+        result, outcome = self._many(
+            flat_z.reshape(count, _STATE), flat_u.reshape(count, NUM_SLOTS)
         )
-        failed = outcome != Outcome.SECTION
-        z_next[failed], advance[failed] = np.nan, np.nan
-        return Mapped(z_next.reshape(*shape, -1), outcome.reshape(shape), advance.reshape(shape))
+        result[outcome != Outcome.SECTION] = np.nan
+        result = result.reshape(*shape, RESULTS)
+        return Mapped(
+            result[..., : self.dimensions[1]],
+            outcome.reshape(shape),
+            result[..., _STATE],
+            result[..., _STATE + 1 :],
+        )
 
     def linearise(self, z: ArrayLike, u: ArrayLike) -> Linearisation:
         """One stride and its derivatives, event times included, exact to rounding.
@@ -148,33 +176,29 @@ class ReturnMap:
         Raises:
             ParameterError: for a wrong shape or a number that is not finite.
         """
-        states = self._checked("state", z, self.dimensions[0])
-        inputs = self._checked("controls", u, NUM_SLOTS)
+        states = _checked("state", z, self.dimensions[0])
+        inputs = _checked("controls", u, NUM_SLOTS)
         if states.ndim != 1 or inputs.ndim != 1:
             raise ParameterError("linearise takes one state and one control vector")
         n, m = self.dimensions
-        z_next, a, b = np.empty(m), np.empty((m, n)), np.empty((m, NUM_SLOTS))
-        outcome = section_jacobian(
-            TABLES,
-            self._model,
-            self.kind,
-            self._node,
-            states,
-            inputs,
-            self._complex_scratch,
-            z_next,
-            a,
-            b,
-        )
-        return Linearisation(z_next, Outcome(outcome), a, b)
+        columns: Sequence[int] = [*range(n), *range(_STATE, _STATE + NUM_SLOTS)]
+        result, jacobian, outcome = self.derivatives(states, inputs, np.array(columns))
+        return Linearisation(result[:m], outcome, jacobian[:m, :n], jacobian[:m, n:])
 
-    @staticmethod
-    def _checked(name: str, values: ArrayLike, size: int) -> Array:
-        array = np.array(values, dtype=np.float64)
-        if array.ndim == 0 or array.shape[-1] != size:
-            raise ParameterError(
-                f"{name} has shape {array.shape}: the last axis must hold {size} numbers"
-            )
-        if not np.all(np.isfinite(array)):
-            raise ParameterError(f"{name} holds a number that is not finite: give finite ones")
-        return array
+
+def _padded(z: Array) -> Array:
+    """A section's state as the kernel takes it: dy/dt is 0 at apex."""
+    full = np.zeros(_STATE)
+    full[: len(z)] = z
+    return full
+
+
+def _checked(name: str, values: ArrayLike, size: int) -> Array:
+    array = np.array(values, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != size:
+        raise ParameterError(
+            f"{name} has shape {array.shape}: the last axis must hold {size} numbers"
+        )
+    if not np.all(np.isfinite(array)):
+        raise ParameterError(f"{name} holds a number that is not finite: give finite ones")
+    return array

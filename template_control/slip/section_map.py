@@ -18,6 +18,9 @@ IntArray = NDArray[np.int64]
 _EXACT = int(MapKind.EXACT)
 _STEP = 1e-20  # of a complex step: its square vanishes against 1
 
+RESULTS = 6
+"""Numbers a map yields: dx/dt, y, dy/dt, distance covered, legs' lengths at the bottom."""
+
 
 @inner
 def section_map(
@@ -28,7 +31,7 @@ def section_map(
     z: Array,
     controls: Array,
     scratch: Scratch,
-    z_next: Array,
+    result: Array,
 ) -> int:
     """One stride from section to section; returns the Outcome's value.
 
@@ -37,23 +40,23 @@ def section_map(
         model: the template.
         kind: value of the MapKind.
         node: index of the stride's first node.
-        z: (3,) dx/dt, y, dy/dt at VLO, or (2,) dx/dt, y at apex [m/s, m, m/s].
+        z: (3,) dx/dt, y, dy/dt at the section [m/s, m, m/s]; dy/dt is 0 at apex.
         controls: (NUM_SLOTS,) u by Slot.
         scratch: overwritten.
-        z_next: (3,) or (2,) overwritten with the state at the next section.
+        result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance
+            covered [m], lengths of rear and front leg at the (virtual) bottom [m], NaN if
+            there was none.
     """
-    state, toes = scratch.state, scratch.toes
-    state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], 0.0
-    if z.shape[0] == 3:
-        state[3] = z[2]
+    state, toes, bottom = scratch.state, scratch.toes, scratch.bottom
+    state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
     toes[0] = toes[1] = 0.0
+    bottom[0] = bottom[1] = np.nan
     if kind == _EXACT:
         outcome = run_stride(tables, model, node, state, toes, controls, False, scratch)[0]
     else:
         outcome = closed_form_stride(tables, model, kind, node, state, toes, controls, scratch)
-    z_next[0], z_next[1] = state[2], state[1]
-    if z_next.shape[0] == 3:
-        z_next[2] = state[3]
+    result[0], result[1], result[2], result[3] = state[2], state[1], state[3], state[0]
+    result[4], result[5] = bottom[0], bottom[1]
     return outcome
 
 
@@ -66,17 +69,12 @@ def map_many(
     z: Array,
     controls: Array,
     scratch: Scratch,
-    z_next: Array,
-    advance: Array,
+    result: Array,
     outcome: IntArray,
 ) -> None:
-    """:func:`section_map` for rows of ``z`` (n, 3 or 2) and ``controls`` (n, NUM_SLOTS).
-
-    ``advance`` (n,) is overwritten with the distance covered [m].
-    """
+    """:func:`section_map` for rows of ``z`` (n, 3) and ``controls`` (n, NUM_SLOTS)."""
     for i in range(z.shape[0]):
-        outcome[i] = section_map(tables, model, kind, node, z[i], controls[i], scratch, z_next[i])
-        advance[i] = scratch.state[0]
+        outcome[i] = section_map(tables, model, kind, node, z[i], controls[i], scratch, result[i])
 
 
 @njit(cache=True)
@@ -87,10 +85,10 @@ def section_jacobian(
     node: int,
     z: Array,
     controls: Array,
+    columns: IntArray,
     scratch: Scratch,
-    z_next: Array,
-    state_jacobian: Array,
-    control_jacobian: Array,
+    result: Array,
+    jacobian: Array,
 ) -> int:
     """:func:`section_map` with its derivatives, exact to rounding, by complex steps.
 
@@ -98,34 +96,30 @@ def section_jacobian(
     accounts for; nothing is differenced.
 
     Args:
+        columns: (c,) what to differentiate by: 0 to 2 the state, 3 + slot the controls.
         scratch: complex, from ``new_scratch(complex)``.
-        z_next: (m,) overwritten.
-        state_jacobian: (m, n) overwritten with d z_next / d z.
-        control_jacobian: (m, NUM_SLOTS) overwritten with d z_next / d u.
+        result: (RESULTS,) overwritten.
+        jacobian: (RESULTS, c) overwritten.
         The rest as in :func:`section_map`.
     """
-    n, m = z.shape[0], z_next.shape[0]
     zc, uc = z.astype(np.complex128), controls.astype(np.complex128)
-    out = np.empty(m, np.complex128)
+    out = np.empty(RESULTS, np.complex128)
     outcome = 0
-    for j in range(n + controls.shape[0]):
+    for c in range(columns.shape[0]):
+        j = columns[c]
         # Scaled so that stiffnesses (1e4 N/m) move as much as speeds do.
-        value = z[j] if j < n else controls[j - n]
-        h = _STEP * max(abs(value), 1.0)
-        if j < n:
+        h = _STEP * max(abs(z[j] if j < 3 else controls[j - 3]), 1.0)
+        if j < 3:
             zc[j] += 1j * h
         else:
-            uc[j - n] += 1j * h
+            uc[j - 3] += 1j * h
         outcome = section_map(tables, model, kind, node, zc, uc, scratch, out)
-        if j < n:
+        if j < 3:
             zc[j] = z[j]
         else:
-            uc[j - n] = controls[j - n]
-        for i in range(m):
-            if j < n:
-                state_jacobian[i, j] = out[i].imag / h
-            else:
-                control_jacobian[i, j - n] = out[i].imag / h
-    for i in range(m):
-        z_next[i] = out[i].real
+            uc[j - 3] = controls[j - 3]
+        for i in range(RESULTS):
+            jacobian[i, c] = out[i].imag / h
+    for i in range(RESULTS):
+        result[i] = out[i].real
     return outcome

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.automaton import AUTOMATON, Automaton
+from template_control.slip.automaton import AUTOMATON
+from template_control.slip.hybrid import Automaton
 from template_control.slip.vocabulary import Outcome
 
 IntArray = NDArray[np.int64]
