@@ -13,6 +13,10 @@ class GaitError(TemplateControlError):
     """A gait that does not exist: no step of the template returns to the wanted state."""
 
 
+class ScenarioError(TemplateControlError):
+    """A scenario that cannot be read, or that no template can follow."""
+
+
 class RobotError(TemplateControlError):
     """A robot description that cannot be read or is not a planar biped."""
 

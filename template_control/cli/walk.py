@@ -5,21 +5,19 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from template_control.cli.output import progress_bar, writable
 from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.modified import ModifiedPlanner
 from template_control.embedding.planner import Planner
-from template_control.errors import ParameterError, RecordError
+from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.plant.record import Record
@@ -116,7 +114,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Walk as told; returns 0, 1 after a fall, 130 after Ctrl-C."""
     _check(options)
-    folder = _writable(options.output)
+    folder = writable(options.output)
     robot = load_robot(options.robot)
     parameters = SlipParameters(mass=robot.mass, gravity=robot.gravity)
     gait = _gait(options, parameters)
@@ -133,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
     )
     console = Console(stderr=True)
     with stdout_to_stderr():
-        with _progress(console, options.steps) as advance:
+        with progress_bar(console, "walking", options.steps) as advance:
             record = simulate(robot, planner, simulation, advance)
         path = record.save(folder / "run.npz")
         if not options.no_figures:
@@ -179,38 +177,6 @@ def _gait(options: argparse.Namespace, parameters: SlipParameters) -> WalkingGai
     if options.speed is not None:
         return gait_for_speed(parameters, options.speed)
     return gait_at(parameters, np.radians(66.0), 1.1)
-
-
-def _writable(folder: Path) -> Path:
-    """The folder, made if need be.
-
-    Raises:
-        RecordError: if nothing can be written there.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".write-probe"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise RecordError(
-            f"cannot write to {folder}: {error.strerror}; give another --output"
-        ) from None
-    return folder
-
-
-@contextmanager
-def _progress(console: Console, steps: int) -> Iterator[Any]:
-    """A progress bar on standard error; yields the function that sets the steps done."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console) as progress:
-        task = progress.add_task("walking", total=steps)
-        yield lambda done: progress.update(task, completed=done)
 
 
 def print_table(figures: dict[str, Any], record: Record) -> None:

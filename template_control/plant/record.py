@@ -5,16 +5,14 @@
 
 from __future__ import annotations
 
-import json
-import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.errors import RecordError
+from template_control import storage
 
 Array = NDArray[np.float64]
 
@@ -107,13 +105,7 @@ class Record:
         Raises:
             RecordError: if the file cannot be written.
         """
-        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "metadata"}
-        text = json.dumps({"format": FORMAT, **self.metadata})
-        try:
-            np.savez_compressed(path, metadata=np.array(text), **arrays)
-        except OSError as error:
-            raise RecordError(f"cannot write the run to {path}: {error.strerror}") from None
-        return Path(path)
+        return storage.save(self, path, FORMAT)
 
     @classmethod
     def load(cls, path: str | Path) -> Record:
@@ -122,16 +114,4 @@ class Record:
         Raises:
             RecordError: if the file is missing or is no recorded run.
         """
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                metadata = json.loads(str(data["metadata"]))
-                if metadata.pop("format", None) != FORMAT:
-                    raise KeyError("format")
-                names = [f.name for f in fields(cls) if f.name != "metadata"]
-                return cls(**{name: data[name] for name in names}, metadata=metadata)
-        except FileNotFoundError:
-            raise RecordError(f"there is no run at {path}: give a run.npz") from None
-        except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile):
-            raise RecordError(
-                f"{path} is no recorded run: give a run.npz of this library"
-            ) from None
+        return storage.load(cls, path, FORMAT)

@@ -199,7 +199,8 @@ class ModifiedWalking(Controller):
     ) -> StepSolution:
         """See :meth:`Controller.solve`; one control seldom reaches all of the target."""
         self._modified.target = finite("target", target, 3)
-        return super().solve(z, target, guess)
+        # With one control the error has several minima: the whole range is looked at first.
+        return super().solve(z, target)
 
 
 class WalkToRun(Controller):

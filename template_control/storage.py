@@ -1,0 +1,55 @@
+"""Records on disk: a compressed ``.npz`` with one array a field and the metadata as JSON."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from template_control.errors import RecordError
+
+T = TypeVar("T")
+
+
+def save(record: Any, path: str | Path, kind: str) -> Path:
+    """Write a dataclass of arrays with a ``metadata`` dictionary.
+
+    Args:
+        record: the dataclass instance.
+        path: of the ``.npz``.
+        kind: what :func:`load` must ask for.
+
+    Raises:
+        RecordError: if the file cannot be written.
+    """
+    arrays = {f.name: getattr(record, f.name) for f in fields(record) if f.name != "metadata"}
+    text = json.dumps({"format": kind, **record.metadata})
+    try:
+        np.savez_compressed(path, metadata=np.array(text), **arrays)
+    except OSError as error:
+        raise RecordError(f"cannot write the run to {path}: {error.strerror}") from None
+    return Path(path)
+
+
+def load(record_type: Callable[..., T], path: str | Path, kind: str) -> T:
+    """Read what :func:`save` wrote with the same ``kind``.
+
+    Raises:
+        RecordError: if the file is missing or is no such record.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            metadata = json.loads(str(data["metadata"]))
+            if metadata.pop("format", None) != kind:
+                raise KeyError("format")
+            names = [f.name for f in fields(record_type) if f.name != "metadata"]  # type: ignore[arg-type]
+            return record_type(**{name: data[name] for name in names}, metadata=metadata)
+    except FileNotFoundError:
+        raise RecordError(f"there is no run at {path}: give a run.npz") from None
+    except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile):
+        raise RecordError(f"{path} is no recorded run: give a run.npz of this library") from None
