@@ -1,14 +1,14 @@
 """``template-control walk`` as a user meets it."""
 
 import json
-import signal
 import subprocess
 import sys
-import threading
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
+from template_control.cli import walk
 from template_control.cli.main import main
 from template_control.errors import RecordError
 from template_control.plant.record import Record
@@ -58,23 +58,22 @@ def test_a_fall_exits_with_one_and_keeps_the_run(tmp_path, capfd):
     assert Record.load(tmp_path / "run.npz").fell
 
 
-def test_ctrl_c_keeps_what_was_walked(tmp_path):
-    arguments = ("walk", "--steps", "100000", "--no-figures", "--output", str(tmp_path))
-    with subprocess.Popen(
-        [sys.executable, "-u", "-m", "template_control.cli.main", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        # The bar is drawn at once; PyBullet announces itself when the loop is about to begin.
-        while "pybullet" not in process.stderr.readline():
-            assert process.poll() is None
-        threading.Event().wait(3.0)
-        process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=60)
-    assert process.returncode == 130, error
-    assert "interrupted: the run up to here is saved" in out
-    assert Record.load(tmp_path / "run.npz").metadata["interrupted"]
+def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
+    @contextmanager
+    def impatient(*_):
+        def advance(done):
+            if done == 2:
+                raise KeyboardInterrupt
+
+        yield advance
+
+    monkeypatch.setattr(walk, "progress_bar", impatient)
+    arguments = ["walk", "--steps", "100000", "--no-figures", "--output", str(tmp_path)]
+    assert main(arguments) == 130
+    assert "interrupted: the run up to here is saved" in capfd.readouterr().out
+    record = Record.load(tmp_path / "run.npz")
+    assert record.steps == 2
+    assert record.metadata["interrupted"]
 
 
 @pytest.mark.parametrize(

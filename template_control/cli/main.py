@@ -6,10 +6,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from template_control.cli import walk
+from template_control.cli import automaton, reproduce, slip, walk
 from template_control.errors import TemplateControlError
 
-_COMMANDS = (walk,)
+_COMMANDS = (walk, slip, automaton, reproduce)
 _USER_ERROR = 2
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
-from template_control.plant.quiet import stdout_to_stderr
+from template_control.plant.quiet import stdout_discarded
 from template_control.robot.planar_biped import BASE_DOF, PlanarBiped
 
-with stdout_to_stderr():  # PyBullet announces its build time on standard output
+with stdout_discarded():  # PyBullet announces its build time on standard output
     import pybullet
 
 Array = NDArray[np.float64]

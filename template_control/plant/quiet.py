@@ -14,11 +14,28 @@ _STDOUT, _STDERR = 1, 2
 @contextmanager
 def stdout_to_stderr() -> Iterator[None]:
     """Within it, everything written to standard output, by C code too, goes to stderr."""
+    with _redirected(_STDERR):
+        yield
+
+
+@contextmanager
+def stdout_discarded() -> Iterator[None]:
+    """Within it, everything written to standard output, by C code too, is lost."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        with _redirected(nowhere):
+            yield
+    finally:
+        os.close(nowhere)
+
+
+@contextmanager
+def _redirected(descriptor: int) -> Iterator[None]:
     libc = ctypes.CDLL(None)
     sys.stdout.flush()
     libc.fflush(None)
     saved = os.dup(_STDOUT)
-    os.dup2(_STDERR, _STDOUT)
+    os.dup2(descriptor, _STDOUT)
     try:
         yield
     finally:

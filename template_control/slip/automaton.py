@@ -142,6 +142,7 @@ def _walk_to_run() -> tuple[Node, ...]:
             Slot.K_SC,
             (
                 Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
                 *_DOUBLE_STANCE_FAILURES,
             ),
         ),
@@ -210,6 +211,7 @@ def _simplified_walk_to_run() -> tuple[Node, ...]:
             Slot.K_SC,
             (
                 Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
                 *_DOUBLE_STANCE_FAILURES,
             ),
         ),

@@ -141,6 +141,9 @@ def _stance(
     else:
         pivot = 0.5 * (toes[0] + toes[1])
         mean = 0.5 * (stiffness[0] + stiffness[1])
+        if stiffness[0].real != stiffness[1].real:
+            # The AT-SLIP stands for two equal legs; for others only the correction is right.
+            map_kind = _IMPROVED
         k, length, torsion = axial_torsional(toes[1] - toes[0], mean, mass, gravity, rest_length)
     r, theta = polar(state[0] - pivot, state[1])
     c, s = (state[0] - pivot) / r, state[1] / r

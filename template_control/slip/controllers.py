@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -170,6 +171,8 @@ class ModifiedWalking(Controller):
         weights: (3,) rho.
         kappa_1: stiffness until the virtual bottom [N/m]; k0 by default.
         stiffness_range: bounds of kappa_2 over k0.
+        top_margin: the angle stays this far [rad] below asin(y / l0), at which the front leg
+            would touch down at once.
     """
 
     def __init__(
@@ -179,6 +182,7 @@ class ModifiedWalking(Controller):
         weights: Sequence[float] = (1.0, 1.0, 1.0),
         kappa_1: float | None = None,
         stiffness_range: tuple[float, float] = (0.5, 1.5),
+        top_margin: float = 0.05,
     ) -> None:
         base = _nominal(parameters)
         if kappa_1 is not None:
@@ -190,6 +194,7 @@ class ModifiedWalking(Controller):
             _grid(parameters, base, {_ANGLE: np.arange(58.0, 81.0, 1.0)}),
         )
         self._modified = step
+        self._top_margin = top_margin
 
     def solve(
         self,
@@ -199,8 +204,17 @@ class ModifiedWalking(Controller):
     ) -> StepSolution:
         """See :meth:`Controller.solve`; one control seldom reaches all of the target."""
         self._modified.target = finite("target", target, 3)
-        # With one control the error has several minima: the whole range is looked at first.
-        return super().solve(z, target)
+        p = self._modified.parameters
+        top = np.arcsin(min(float(z[1]) / p.rest_length, 1.0)) - self._top_margin
+        self._problem.unknowns = replace(
+            self._problem.unknowns, upper=np.array([min(top, _ANGLES[1])])
+        )
+        near = None if guess is None else super().solve(z, target, guess)
+        if near is not None and near.reached:
+            return near
+        # With one control the error has several minima: the whole range is looked at.
+        anywhere = super().solve(z, target)
+        return anywhere if near is None or anywhere.residual < near.residual else near
 
 
 class WalkToRun(Controller):

@@ -28,7 +28,7 @@ class Segment:
         until_speed: ends when the wanted speed gets there, and the template's own is there
             too if the profile slows down [m/s].
         duration: [s].
-        steps: number of strides, the transition's included.
+        steps: number of strides after the transition.
     """
 
     gait: Gait
@@ -130,6 +130,9 @@ def example_one(
 ) -> Scenario:
     """The paper's Example I (Section V-A): walk, run up to 5 m/s and down again, walk.
 
+    It starts at the VLO speed that is 1.17 m/s on average, as Section V-A tells it (Table IV
+    has 1.1 m/s there, which is 1.13 m/s on average); it ends at Table IV's 1.1 m/s.
+
     Args:
         map_kind: return map of the controllers.
         steps_after: walking steps at the end.
@@ -137,13 +140,14 @@ def example_one(
     """
     return Scenario(
         segments=(
-            Segment("walk", speed=1.1, duration=0.8),
+            Segment("walk", speed=1.125, duration=0.8),
             Segment("run", speed=1.9, acceleration=acceleration, until_speed=5.0),
             Segment("run", duration=1.5),
             Segment("run", acceleration=-acceleration, until_speed=2.0),
             Segment("walk", speed=1.1, steps=steps_after),
         ),
         map_kind=map_kind,
+        start=(1.125, 0.98, 0.0),
         name="Example I",
     )
 

@@ -143,10 +143,11 @@ def simulate_scenario(
         toe = float(state[0])
         stride = run(p, STRIDE_START[kind], state, solution.controls, (toe, toe), scratch=scratch)
         _note(log, kind, stride, now, speed, target, solution, p.rest_length)
-        profile.strides += 1
         now += stride.duration
         if kind in ("wr", "rw"):
             profile.began = now  # the transition leads to where the segment's profile begins
+        else:
+            profile.strides += 1
         state = stride.state
         duration[kind] = stride.duration
         log.sections.append((now, state[[2, 1, 3]]))

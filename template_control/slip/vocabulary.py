@@ -98,9 +98,9 @@ class Outcome(IntEnum):
 _REASONS = {
     Outcome.SECTION: "reached its section",
     Outcome.FALL: "the CoM fell to the ground",
-    Outcome.UNWANTED_FLIGHT: "the last foot left the ground in a walking phase",
+    Outcome.UNWANTED_FLIGHT: "a stance foot left the ground too early",
     Outcome.BACKWARD: "the CoM turned backward",
-    Outcome.NO_TOUCHDOWN: "the swing leg never touched down",
+    Outcome.NO_TOUCHDOWN: "no leg touched down in time",
     Outcome.NO_LIFTOFF: "the CoM passed the front foot before the rear leg lifted off",
     Outcome.TIMEOUT: "no event within the time limit",
 }

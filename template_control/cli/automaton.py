@@ -1,0 +1,162 @@
+"""``template-control automaton``: the hybrid automaton as a table, as JSON and as Fig. 2."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from template_control.errors import ParameterError, RecordError
+from template_control.slip.automaton import AUTOMATON
+from template_control.slip.hybrid import Automaton, Edge, Node
+from template_control.slip.vocabulary import Outcome, Reset, Slot
+from template_control.view.automaton_figure import (
+    GAIT_NAMES,
+    automaton_figure,
+    gait_of,
+    gaits,
+    words,
+)
+
+_SUFFIXES = (".png", ".svg", ".pdf")
+_PIPE_WIDTH = 140  # columns where there is no terminal to ask
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command's options."""
+    parser = commands.add_parser(
+        "automaton",
+        help="show the hybrid automaton that simulator, planners and robot controller read",
+        description=(
+            "Print the nodes of the hybrid automaton by gait, with leg stiffnesses, guards,"
+            " successors, resets and ways to fail, and draw it (the paper's Fig. 2). Exit status:"
+            " 0, 2 for bad input."
+        ),
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("runs/automaton.png"),
+        metavar="FILE",
+        help=f"file of the figure ({', '.join(_SUFFIXES)}); its folder is made if need be",
+    )
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print the automaton as one JSON object, and nothing else, on stdout",
+    )
+    parser.add_argument("--no-figure", action="store_true", help="do not draw the figure")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Draw and print as told; returns 0."""
+    if not options.no_figure:
+        save(AUTOMATON, options.output)
+    if options.json:
+        print(json.dumps(describe(AUTOMATON)))
+        return 0
+    console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
+    for table in tables(AUTOMATON):
+        console.print(table)
+    if not options.no_figure:
+        console.print(f"figure: {options.output}", markup=False, soft_wrap=True)
+    return 0
+
+
+def save(automaton: Automaton, path: Path) -> None:
+    """Draw ``automaton`` into ``path``, a PNG, SVG or PDF.
+
+    Raises:
+        ParameterError: if the suffix is none of these.
+        RecordError: if the file cannot be written.
+    """
+    if path.suffix.lower() not in _SUFFIXES:
+        raise ParameterError(f"--output is {path}: give a file ending in {', '.join(_SUFFIXES)}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        automaton_figure(automaton).savefig(path, dpi=100)
+    except OSError as error:
+        raise RecordError(f"cannot write {path}: {error.strerror}; give another --output") from None
+
+
+def describe(automaton: Automaton) -> dict[str, Any]:
+    """The whole automaton in JSON's types: its nodes in order, each with its edges in order.
+
+    Phases, slots, events, resets and outcomes go by their names in
+    :mod:`template_control.slip.vocabulary`. An edge has either a ``target`` or a ``failure``.
+    """
+    return {"nodes": [_describe_node(node) for node in automaton.nodes]}
+
+
+def _describe_node(node: Node) -> dict[str, Any]:
+    return {
+        "name": node.name,
+        "gait": gait_of(node.name),
+        "phase": node.phase.name,
+        "rear": None if node.rear is None else node.rear.name,
+        "front": None if node.front is None else node.front.name,
+        "edges": [_describe_edge(edge) for edge in node.edges],
+    }
+
+
+def _describe_edge(edge: Edge) -> dict[str, Any]:
+    if isinstance(edge.target, Outcome):
+        end = {"failure": edge.target.name, "reason": edge.target.reason}
+    else:
+        end = {"target": edge.target}
+    return {
+        "event": edge.event.name,
+        "guard": edge.guard,
+        **end,
+        "reset": edge.reset.name,
+        "section": edge.section,
+    }
+
+
+def tables(automaton: Automaton) -> list[Table]:
+    """One table a gait, its nodes in order of first arrival."""
+    found = []
+    for gait, names in gaits(automaton).items():
+        table = Table(title=GAIT_NAMES.get(gait, f"gait {gait}"), show_lines=True)
+        table.title_justify = "left"
+        for heading in ("node", "phase", "rear leg", "front leg"):
+            table.add_column(heading, no_wrap=True)
+        table.add_column("guard -> successor (reset)")
+        table.add_column("fails")
+        for name in names:
+            node = automaton.node(name)
+            ways = [e for e in node.edges if not isinstance(e.target, Outcome)]
+            failures = [
+                f"{words(e.event)}: {e.target.reason}"
+                for e in node.edges
+                if isinstance(e.target, Outcome)
+            ]
+            table.add_row(
+                node.name,
+                node.phase.name,
+                _slot(node.rear),
+                _slot(node.front),
+                "\n".join(_way(edge) for edge in ways),
+                "\n".join(failures),
+            )
+        found.append(table)
+    return found
+
+
+def _slot(slot: Slot | None) -> str:
+    return "-" if slot is None else slot.name.lower()
+
+
+def _way(edge: Edge) -> str:
+    """``"G_t^w touchdown -> DS_sc^w (place front)"``; a section says it ends the stride."""
+    notes = [words(edge.reset)] if edge.reset is not Reset.NONE else []
+    notes += ["ends the stride"] if edge.section else []
+    tail = f" ({', '.join(notes)})" if notes else ""
+    return f"{edge.guard} {words(edge.event)} -> {edge.target}{tail}".lstrip()

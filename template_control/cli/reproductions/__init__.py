@@ -1,0 +1,20 @@
+"""The paper's tables and figures, ours beside the paper's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from template_control.cli.reproductions.example_one import fig10
+from template_control.cli.reproductions.map_errors import fig5, table3
+from template_control.cli.reproductions.reproduction import Reproduction
+from template_control.cli.reproductions.transitions import fig6, fig7, table4
+
+REPRODUCTIONS: dict[str, Callable[[], Reproduction]] = {
+    "table3": table3,
+    "fig5": fig5,
+    "table4": table4,
+    "fig6": fig6,
+    "fig7": fig7,
+    "fig10": fig10,
+}
+"""By the name ``template-control reproduce`` knows them by."""

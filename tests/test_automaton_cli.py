@@ -1,0 +1,269 @@
+"""``template-control automaton``: table, JSON and figure are the data, whatever it is."""
+
+import dataclasses
+import itertools
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import same_color
+from matplotlib.patches import FancyArrowPatch
+
+from template_control.cli.automaton import describe, save
+from template_control.cli.main import main
+from template_control.errors import RecordError
+from template_control.slip.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.hybrid import Automaton, Edge, Node
+from template_control.slip.vocabulary import Event, Outcome, Phase, Reset, Slot
+from template_control.view.automaton_figure import (
+    automaton_figure,
+    choices,
+    edge_label,
+    gaits,
+    layout,
+    mathtext,
+    successions,
+)
+
+
+def node(name, *edges, phase=Phase.SS):
+    return Node(name, phase, Slot.K_SC, None, edges)
+
+
+HOPPER = Automaton(
+    (
+        node("F_x^h", Edge(Event.TOUCHDOWN, "SS_x^h", Reset.PLACE_REAR, "G_t^h"), phase=Phase.F),
+        node(
+            "SS_x^h",
+            Edge(Event.APEX, "F_x^h", guard="G_a^h", section=True),
+            Edge(Event.FALL, Outcome.FALL),
+        ),
+        node("SS_y^s", Edge(Event.VLO, "SS_y^s", guard="G_v^s", section=True)),
+    )
+)
+
+
+def read(description):
+    """The automaton a JSON description tells of."""
+    return Automaton(
+        tuple(
+            Node(
+                n["name"],
+                Phase[n["phase"]],
+                n["rear"] and Slot[n["rear"]],
+                n["front"] and Slot[n["front"]],
+                tuple(
+                    Edge(
+                        Event[e["event"]],
+                        e["target"] if "target" in e else Outcome[e["failure"]],
+                        Reset[e["reset"]],
+                        e["guard"],
+                        e["section"],
+                    )
+                    for e in n["edges"]
+                ),
+            )
+            for n in description["nodes"]
+        )
+    )
+
+
+def with_edge(name, event, **changes):
+    """The library's automaton with one edge changed."""
+    return Automaton(
+        tuple(
+            dataclasses.replace(
+                n,
+                edges=tuple(
+                    dataclasses.replace(e, **changes) if e.event is event else e for e in n.edges
+                ),
+            )
+            if n.name == name
+            else n
+            for n in AUTOMATON.nodes
+        )
+    )
+
+
+def labels(figure):
+    return sorted(text.get_text() for text in figure.axes[0].texts)
+
+
+def arrows(figure):
+    """Ends of the drawn arrows' shafts as rows of four coordinates, those of edges first."""
+    patches = [p for p in figure.axes[0].patches if isinstance(p, FancyArrowPatch)]
+    paths = [p.get_path().vertices for p in patches]
+    return np.array([np.concatenate((path[0], path[2])) for path in paths])
+
+
+def test_json_is_all_there_is_on_stdout_and_equals_the_data(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "template_control.cli.main", "automaton", "--json", "--no-figure"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(Path(__file__).parents[1])},
+    )
+    assert done.returncode == 0, done.stderr
+    assert read(json.loads(done.stdout)) == AUTOMATON
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("automaton", [AUTOMATON, HOPPER], ids=["library", "hopper"])
+def test_description_survives_json(automaton):
+    description = json.loads(json.dumps(describe(automaton)))
+    assert read(description) == automaton
+    reasons = {e["reason"] for n in description["nodes"] for e in n["edges"] if "failure" in e}
+    ends = {e.target for n in automaton.nodes for e in n.edges if isinstance(e.target, Outcome)}
+    assert reasons == {outcome.reason for outcome in ends}
+
+
+def test_table_names_every_node_guard_and_failure(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["automaton"]) == 0
+    assert (tmp_path / "runs" / "automaton.png").read_bytes().startswith(b"\x89PNG")
+    out = capsys.readouterr().out
+    rows = {line.split("│")[1].strip() for line in out.splitlines() if line.startswith("│")}
+    assert rows - {""} == {n.name for n in AUTOMATON.nodes}
+    for _, target, edge in successions(AUTOMATON):
+        assert f"-> {target}" in out
+        assert f" {edge.guard} " in out
+    assert "no leg touched down in time" in out
+    assert "k_sd_wr" in out
+    assert str(Path("runs/automaton.png")) in out
+
+
+@pytest.mark.parametrize("suffix", ["png", "PNG", "svg", "pdf"])
+def test_figure_is_written_into_a_new_folder(suffix, tmp_path, capsys):
+    path = tmp_path / "new" / "deep" / f"fig.{suffix}"
+    assert main(["automaton", "--json", "--output", str(path)]) == 0
+    json.loads(capsys.readouterr().out)
+    magic = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix.lower()]
+    assert path.read_bytes().startswith(magic)
+
+
+@pytest.mark.parametrize("automaton", [AUTOMATON, HOPPER], ids=["library", "hopper"])
+def test_file_holds_every_node_guard_and_no_more_arrows(automaton, tmp_path):
+    save(automaton, tmp_path / "fig.svg")
+    svg = (tmp_path / "fig.svg").read_text()  # texts are outlines with their source beside
+    edges = list(successions(automaton))
+    for name in [n.name for n in automaton.nodes] + [e.guard for _, _, e in edges]:
+        assert f"<!-- {mathtext(name)} -->" in svg
+    figure = automaton_figure(automaton)
+    drawn = labels(figure)
+    for _, _, edge in edges:
+        same = [e for _, _, e in edges if edge_label(e) == edge_label(edge)]
+        assert drawn.count(edge_label(edge)) == len(same)
+    assert len(arrows(figure)) == len(edges) + len(choices(automaton))
+
+
+def test_arrows_run_from_rim_to_rim_of_their_nodes():
+    centre = layout(AUTOMATON)
+    for (a, b, _), ends in zip(
+        successions(AUTOMATON), arrows(automaton_figure(AUTOMATON)), strict=False
+    ):
+        for name, point in ((a, ends[:2]), (b, ends[2:])):
+            nearest = min(centre, key=lambda n: np.linalg.norm(centre[n] - point))
+            assert nearest == name
+
+
+def test_names_are_the_papers():
+    assert mathtext("SS_sc^w") == "$SS_{sc}^{w}$"
+    assert edge_label(Edge(Event.VLO, "SS_av^w", guard="G_v^w", section=True)) == (
+        "$G_{v}^{w}$\nVLO"
+    )
+    assert edge_label(Edge(Event.TOUCHDOWN, "DS_sc^w", Reset.PLACE_FRONT, "G_t^w")) == (
+        "$G_{t}^{w}$\nplace front"
+    )
+
+
+def test_gaits_begin_where_their_strides_do():
+    found = gaits(AUTOMATON)
+    assert {gait: names[0] for gait, names in found.items()} == STRIDE_START
+    assert sorted(itertools.chain(*found.values())) == sorted(n.name for n in AUTOMATON.nodes)
+    assert found["w"] == tuple(n.name for n in AUTOMATON.stride(STRIDE_START["w"]))
+
+
+def test_transitions_are_chosen_at_their_own_section():
+    starts = STRIDE_START
+    assert set(choices(AUTOMATON)) == {
+        (starts["w"], starts["wr"]),
+        (starts["w"], starts["wr*"]),
+        (starts["r"], starts["rw"]),
+    }
+
+
+@pytest.mark.parametrize("automaton", [AUTOMATON, HOPPER], ids=["library", "hopper"])
+def test_nothing_hides_anything(automaton):
+    figure = automaton_figure(automaton)
+    axes = figure.axes[0]
+    boxes = [(text.get_text(), text.get_window_extent()) for text in axes.texts]
+    boxes.append(("legend", axes.get_legend().get_window_extent()))
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        assert not a.overlaps(b), (one, other)
+    nodes = {mathtext(n.name) for n in automaton.nodes}
+    centre = axes.transData.transform(list(layout(automaton).values()))
+    radius = 0.66 * (axes.transData.transform((1, 0)) - axes.transData.transform((0, 0)))[0]
+    for text, box in boxes:
+        assert figure.bbox.contains(*box.min), text
+        assert figure.bbox.contains(*box.max), text
+        gap = np.linalg.norm(np.clip(centre, box.min, box.max) - centre, axis=1)
+        assert (gap < radius).sum() == (text in nodes), text
+    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(centre, 2)]
+    assert min(apart) > 2 * radius
+
+
+def test_section_edges_stand_out():
+    figure = automaton_figure(AUTOMATON)
+    patches = [p for p in figure.axes[0].patches if isinstance(p, FancyArrowPatch)]
+    edges = [e for _, _, e in successions(AUTOMATON)]
+    section = [p for p, e in zip(patches, edges, strict=False) if e.section]
+    others = [p for p, e in zip(patches, edges, strict=False) if not e.section]
+    assert section
+    assert min(p.get_linewidth() for p in section) > max(p.get_linewidth() for p in others)
+    assert not same_color(section[0].get_edgecolor(), others[0].get_edgecolor())
+
+
+def test_the_data_make_the_figure():
+    before = automaton_figure(AUTOMATON)
+    renamed = automaton_figure(with_edge("SS_sd^r", Event.REAR_LIFTOFF, guard="G_q^r"))
+    assert mathtext("G_q^r") in labels(renamed)
+    assert mathtext("G_l^r") not in labels(renamed)
+    sent = automaton_figure(with_edge("SS_sd^rw", Event.VLO, target="SS_bv^w"))
+    assert labels(sent) == labels(before)
+    moved = np.any(arrows(sent) != arrows(before), axis=1)
+    assert moved.sum() == 1
+    without = automaton_figure(with_edge("DS_sc^w", Event.REAR_LIFTOFF, target=Outcome.FALL))
+    assert len(arrows(without)) == len(arrows(before)) - 1
+
+
+@pytest.mark.parametrize(
+    ("output", "culprit"),
+    [
+        ("fig.jpg", "fig.jpg"),
+        ("fig", "fig"),
+        ("/proc/none/fig.png", "/proc/none/fig.png"),
+        ("file/fig.png", "file/fig.png"),
+        ("folder.png", "folder.png"),
+    ],
+)
+def test_a_bad_output_is_one_line(output, culprit, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.png").mkdir()
+    assert main(["automaton", "--output", output]) == 2
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    lines = captured.err.strip().splitlines()
+    assert len(lines) == 1
+    assert culprit in lines[0]
+    assert "give a" in lines[0]
+
+
+def test_save_raises_the_librarys_own_error(tmp_path):
+    with pytest.raises(RecordError, match="give another --output"):
+        save(AUTOMATON, tmp_path / ("x" * 300 + ".png"))
