@@ -33,10 +33,11 @@ _TIMEOUT = int(Outcome.TIMEOUT)
 _FALL = int(Outcome.FALL)
 _MAX_PIECES = 24
 _NO_EVENT, _GOES_ON = -1, -2
-_PIECE = 2.4  # radians of the spring's oscillation that one improved path covers at most
+_PIECE = 2.7  # radians of the spring's oscillation that one improved path covers at most
 _SAFE_SHARE = 0.7  # of a piece without an event: the corrected path may meet one before its end
 _SUBSTEP = 0.32  # of sqrt(l0 / g)
-_EVENT_TIME = 1e-9  # [s]
+_EVENT_TIME = 1e-11  # [s]
+_NODE_TIME = 1e-10  # [s], of the first path's event where it only places the correction's nodes
 
 
 @inner
@@ -151,16 +152,16 @@ def _stance(
     momentum = r * (state[3] * c - state[2] * s)
     w2 = k / mass
     harmonic(a, pivot, r, theta, radial, w2, length, momentum, gravity)
-    horizon = model.max_time + 0.0 * r
+    horizon, accuracy = model.max_time + 0.0 * r, _EVENT_TIME
     if map_kind == _IMPROVED:
-        horizon = _PIECE / a[5]
+        horizon, accuracy = _PIECE / a[5], _NODE_TIME
     edge, t = first_event(
         STANCE,
         a,
         a,
         horizon.real,
         _SUBSTEP * np.sqrt(rest_length / gravity),
-        _EVENT_TIME,
+        accuracy,
         events,
         toes,
         rest_length,

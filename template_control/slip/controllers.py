@@ -30,11 +30,15 @@ class Controller:
     Args:
         problem: least squares on a return map.
         grid: (n, NUM_SLOTS) controls to begin from when no guess is given or it fails.
+        dense: whether the grid shows every minimum; then only a guess that reaches the
+            target is taken without looking at it.
     """
 
-    def __init__(self, problem: StepProblem, grid: Array) -> None:
+    def __init__(self, problem: StepProblem, grid: Array, dense: bool = False) -> None:
         self._problem = problem
         self._grid = grid
+        self._dense = dense
+        self._content = problem.tolerance if dense else problem.acceptable
 
     def solve(
         self,
@@ -55,14 +59,17 @@ class Controller:
         n, m = self._problem.step.dimensions
         start, aim = finite("section state", z, n), finite("target", target, m)
         self._check(aim)
-        if guess is not None:
-            solution = self._problem.solve(start, aim, [guess])
-            if solution.residual <= self._problem.acceptable:
-                return solution
-            seeds = [guess, *self._seeds(start, aim)]
-        else:
-            seeds = self._seeds(start, aim)
-        return self._problem.solve(start, aim, seeds)
+        near = None if guess is None else self._problem.solve(start, aim, [guess])
+        if near is not None and near.residual <= self._content:
+            return near
+        costs = self._problem.costs(start, aim, self._grid)
+        # Where the grid is dense, a seed worse than what is found leads nowhere better.
+        limit = near.residual**2 if near is not None and self._dense else np.inf
+        seeds = [self._grid[i] for i in np.argsort(costs)[:_SEEDS] if costs[i] <= limit]
+        if near is not None and not seeds:
+            return near
+        far = self._problem.solve(start, aim, seeds or [self._grid[0]])
+        return far if near is None or far.residual < near.residual else near
 
     def _check(self, target: Array) -> None:
         p = self._problem.step.parameters
@@ -79,11 +86,6 @@ class Controller:
                 f"target height at VLO is {target[1]:g} m, not below the leg's rest length of"
                 f" {p.rest_length:g} m: give a lower one"
             )
-
-    def _seeds(self, z: Array, target: Array) -> list[Array]:
-        """The grid's controls whose strides end nearest the target."""
-        costs = self._problem.costs(z, target, self._grid)
-        return [self._grid[i] for i in np.argsort(costs)[:_SEEDS]]
 
 
 def _unknowns(parameters: SlipParameters, slots: tuple[Slot, ...]) -> Unknowns:
@@ -192,6 +194,7 @@ class ModifiedWalking(Controller):
         super().__init__(
             StepProblem(step, _unknowns(parameters, (_ANGLE,)), weights),
             _grid(parameters, base, {_ANGLE: np.arange(58.0, 81.0, 1.0)}),
+            dense=True,
         )
         self._modified = step
         self._top_margin = top_margin
@@ -209,12 +212,7 @@ class ModifiedWalking(Controller):
         self._problem.unknowns = replace(
             self._problem.unknowns, upper=np.array([min(top, _ANGLES[1])])
         )
-        near = None if guess is None else super().solve(z, target, guess)
-        if near is not None and near.reached:
-            return near
-        # With one control the error has several minima: the whole range is looked at.
-        anywhere = super().solve(z, target)
-        return anywhere if near is None or anywhere.residual < near.residual else near
+        return super().solve(z, target, guess)
 
 
 class WalkToRun(Controller):

@@ -18,7 +18,7 @@ IntArray = NDArray[np.int64]
 
 _FAILED = 10.0  # residual of a stride that fails, in each component
 _PENALTY = 10.0  # slope of the penalty on a control (in units of its scale) out of bounds
-_EVALUATIONS = 20
+_EVALUATIONS = 14
 _REAR_BOTTOM = 4  # of a map's results: length of the rear leg at the bottom
 
 

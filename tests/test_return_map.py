@@ -1,0 +1,215 @@
+"""Return maps, exact and closed-form: symmetries, scaling, derivatives, the paper's formulas."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from template_control.errors import ParameterError
+from template_control.slip.automaton import STRIDE_START
+from template_control.slip.error_study import Grid, study
+from template_control.slip.gait import gait_at, vlo_energy
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.path import COEFFICIENTS, STANCE, sample
+from template_control.slip.return_map import ReturnMap
+from template_control.slip.stance_map import axial_torsional, harmonic, momentum_changes
+from template_control.slip.stride import controls, run
+from template_control.slip.vocabulary import MapKind, Outcome
+
+P = SlipParameters()
+K0 = P.leg_stiffness
+RUN = controls(np.radians(70.0), 26e3, 30e3)
+STRIDES = {
+    "w": ([1.1, 0.978, 0.02], controls(np.radians(66.0), K0, 1.05 * K0)),
+    "r": ([4.8, 0.98], RUN),
+    "wr": ([1.101, 0.9797, -0.0442], controls(np.radians(71.94), K0, K0, 9.86e3, 48.51e3)),
+    "rw": ([1.754, 0.9766], controls(np.radians(71.53), 66.97e3, 18.35e3)),
+}
+CASES = [(stride, kind) for stride in STRIDES for kind in MapKind]
+walking = st.tuples(st.floats(0.95, 1.25), st.floats(0.965, 0.985), st.floats(-0.05, 0.05))
+
+
+@pytest.fixture(scope="module")
+def gait():
+    return gait_at(P, np.radians(66.0), 1.1)
+
+
+@pytest.mark.parametrize(("stride", "kind"), CASES)
+def test_derivatives_agree_with_central_differences(stride, kind):
+    z, u = (np.array(v) for v in STRIDES[stride])
+    step = ReturnMap(P, stride, kind)
+    linear = step.linearise(z, u)
+    assert linear.outcome is Outcome.SECTION
+    np.testing.assert_allclose(linear.state, step(z, u).state, rtol=1e-12)
+    size = np.maximum(np.abs(u), 1.0)
+    for jacobian, x, scale, at in (
+        (linear.state_jacobian, z, np.ones(len(z)), lambda v: step(v, u).state),
+        (linear.control_jacobian, u, size, lambda v: step(z, v).state),
+    ):
+        for j, unit in enumerate(np.eye(len(x))):
+            h = 1e-6 * scale[j]
+            difference = (at(x + h * unit) - at(x - h * unit)) / (2.0 * h)
+            np.testing.assert_allclose(
+                jacobian[:, j] * scale[j], difference * scale[j], atol=1e-6, rtol=1e-6
+            )
+
+
+@pytest.mark.parametrize(("stride", "kind"), CASES)
+def test_batch_equals_scalar(stride, kind):
+    z, u = STRIDES[stride]
+    rng = np.random.default_rng(3)
+    states = np.array(z) * (1.0 + 0.01 * rng.standard_normal((40, len(z))))
+    step = ReturnMap(P, stride, kind)
+    many = step(states, u)
+    for i, state in enumerate(states):
+        one = step(state, u)
+        assert one.outcome == many.outcome[i]
+        np.testing.assert_array_equal(one.state, many.state[i])
+        np.testing.assert_array_equal(one.advance, many.advance[i])
+        if one.outcome == Outcome.SECTION:
+            np.testing.assert_array_equal(step.step(state, u)[0], one.state)
+    assert np.any(many.outcome == Outcome.SECTION)
+    grid = step(states.reshape(8, 5, -1), np.tile(u, (8, 5, 1)))
+    np.testing.assert_array_equal(grid.state.reshape(40, -1), many.state)
+
+
+@pytest.mark.parametrize(("stride", "kind"), CASES)
+@settings(max_examples=10, deadline=None)
+@given(mass=st.floats(5.0, 120.0), length=st.floats(0.3, 1.3), gravity=st.floats(1.6, 12.0))
+def test_dynamic_similarity(stride, kind, mass, length, gravity):
+    z, u = STRIDES[stride]
+    z = np.array(z)
+    stiffness = mass * gravity / length / (P.mass * P.gravity / P.rest_length)
+    other = SlipParameters(mass, gravity, length, K0 * stiffness)
+    scale = np.full(len(z), np.sqrt(gravity * length / (P.gravity * P.rest_length)))
+    scale[1] = length / P.rest_length
+    u_other = np.array(u) * [1.0, *[stiffness] * 4]
+    here, there = ReturnMap(P, stride, kind), ReturnMap(other, stride, kind)
+    expected = here(z, u).state
+    out = np.ones(here.dimensions[1])
+    out[:] = scale[0]
+    out[1] = scale[1]
+    tolerance = 1e-9 if kind is MapKind.EXACT else 1e-7
+    np.testing.assert_allclose(
+        there(z * scale, u_other).state, expected * out, rtol=tolerance, atol=tolerance
+    )
+
+
+@given(walking)
+@settings(max_examples=30, deadline=None)
+def test_exact_and_improved_maps_conserve_energy(z):
+    u = controls(np.radians(68.0), K0, K0)
+    for kind in (MapKind.EXACT, MapKind.IMPROVED):
+        mapped = ReturnMap(P, "w", kind)(z, u)
+        if mapped.outcome == Outcome.SECTION:
+            energy = vlo_energy(P, mapped.state)
+            assert energy == pytest.approx(vlo_energy(P, np.array(z)), rel=1e-10)
+
+
+def test_a_passive_symmetric_step_is_its_own_mirror_image(gait):
+    stride = run(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], gait.controls)
+    t = np.linspace(0.0, stride.duration, 101)
+    there, back = stride.sample(t), stride.sample(stride.duration - t)
+    np.testing.assert_allclose(there[:, 1:3], back[:, 1:3], atol=1e-8)  # y, dx/dt
+    np.testing.assert_allclose(there[:, 3], -back[:, 3], atol=1e-7)
+    np.testing.assert_allclose(there[:, 0] + back[:, 0], stride.state[0], atol=1e-8)
+
+
+def test_composed_maps_equal_a_simulation_on_through_sections():
+    """Walk, walk to run, run, run to walk: maps composed against one continued simulation."""
+    plan = [("w", controls(np.radians(71.0), K0, K0)), ("wr", STRIDES["wr"][1])]
+    plan += [("r", controls(np.radians(76.0), 18e3, 20e3)), ("rw", STRIDES["rw"][1])]
+    z = np.array([1.1, 0.98, -0.03])
+    state = np.array([0.0, z[1], z[0], z[2]])
+    for stride, u in plan:
+        mapped = ReturnMap(P, stride)(z, u)
+        before = state[0]
+        simulated = run(P, STRIDE_START[stride], state, u, (state[0], state[0]))
+        assert mapped.outcome == simulated.outcome == Outcome.SECTION
+        state, z = simulated.state, mapped.state
+        np.testing.assert_allclose(state[[2, 1, 3]][: len(z)], z, rtol=1e-10, atol=1e-10)
+        assert mapped.advance == pytest.approx(state[0] - before, rel=1e-10)
+
+
+def test_double_stance_constants_solve_the_papers_equations():
+    """(18), (20), (23) with the notes' reading, (24), (25)."""
+    c, weight, l0 = 0.62, P.mass * P.gravity, P.rest_length
+    k_r, l_r0, k_t = axial_torsional(c, K0, P.mass, P.gravity, l0)
+    roots = np.roots(
+        [
+            1.0,
+            -2.0 * l0,
+            l0**2 - c**2 / 4 - (weight / K0) ** 2 / 4,
+            c**2 / 2 * l0,
+            -(c**2) / 4 * l0**2,
+        ]
+    )
+    l_eq = next(r.real for r in roots if abs(r.imag) < 1e-9 and c / 2 < r.real < l0)
+    y_eq = np.sqrt(l_eq**2 - c**2 / 4)
+    assert k_r == pytest.approx(weight / (np.sqrt(l0**2 - c**2 / 4) - y_eq), rel=1e-9)
+    assert l_r0 == pytest.approx(weight / k_r + y_eq, rel=1e-9)
+    assert k_t == pytest.approx(
+        4 * K0 * c**2 * l0 * l_r0**2 / (c**2 + 4 * l_r0**2) ** 1.5, rel=1e-9
+    )
+
+
+def test_momentum_changes_are_the_integrals_they_stand_for():
+    """(13) and (27) are exact integrals of (11); (12) is the trapezoid of gravity's torque."""
+    a, t = np.zeros(COEFFICIENTS), 0.12
+    harmonic(a, 0.3, 0.96, 1.7, -0.2, K0 / P.mass, 0.97, -1.05, P.gravity)
+
+    def polar(time):
+        out = np.empty(6)
+        sample(STANCE, a, a, time, out)
+        return np.hypot(out[0] - 0.3, out[1]), np.arctan2(out[1], out[0] - 0.3)
+
+    mean_r = quad(lambda s: polar(s)[0], 0.0, t)[0] / t
+    ends = np.cos(polar(0.0)[1]) + np.cos(polar(t)[1])
+    gravity = -0.5 * t * P.gravity * mean_r * ends
+    assert momentum_changes(a, t, P.gravity, 0.0) == pytest.approx(gravity, rel=1e-10)
+    torsion = 7.0 * quad(lambda s: np.pi / 2 - polar(s)[1], 0.0, t)[0]
+    assert momentum_changes(a, t, P.gravity, 7.0) - gravity == pytest.approx(torsion, rel=1e-9)
+
+
+def test_error_study_meets_its_targets():
+    result = study(Grid())
+    assert result.valid >= 5000
+    improved = result.errors[MapKind.IMPROVED].statistics()
+    paper = result.errors[MapKind.PAPER].statistics()
+    assert improved["position"]["mean"] <= 0.1 * paper["position"]["mean"] <= 0.1
+    assert improved["velocity"]["mean"] <= 0.1 * paper["velocity"]["mean"]
+    assert improved["velocity"]["mean"] <= 0.2
+    near = result.distance < 0.1
+    for errors in result.errors.values():
+        assert np.nanmean(errors.position[near]) < np.nanmean(errors.position[~near])
+
+
+@pytest.mark.parametrize(
+    ("z", "u", "expected"),
+    [
+        ([0.2, 0.93, 0.0], controls(np.radians(66.0), K0, K0), Outcome.BACKWARD),
+        ([0.3, 0.978, -1.0], controls(np.radians(85.0), 2e3, 2e3), Outcome.NO_TOUCHDOWN),
+        ([1.0, 0.99, 1.2], controls(np.radians(66.0), K0, K0), Outcome.UNWANTED_FLIGHT),
+    ],
+)
+def test_reasons_for_failure_are_values(z, u, expected):
+    mapped = ReturnMap(P)(z, u)
+    assert mapped.outcome == expected
+    assert np.all(np.isnan(mapped.state))
+    assert ReturnMap(P, "w", MapKind.IMPROVED)(z, u).outcome != Outcome.SECTION
+
+
+def test_nan_and_wrong_shapes_do_not_enter():
+    step = ReturnMap(P)
+    u = STRIDES["w"][1]
+    with pytest.raises(ParameterError, match="state holds a number that is not finite"):
+        step([1.1, np.nan, 0.0], u)
+    with pytest.raises(ParameterError, match="controls holds"):
+        step.linearise([1.1, 0.98, 0.0], u + np.inf)
+    with pytest.raises(ParameterError, match="last axis must hold 3"):
+        step([1.1, 0.98], u)
+    with pytest.raises(ParameterError, match="one state"):
+        step.linearise(np.ones((2, 3)), u)
+    with pytest.raises(ParameterError, match="no stride 'trot'"):
+        ReturnMap(P, "trot")

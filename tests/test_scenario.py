@@ -1,0 +1,168 @@
+"""Scenarios: Example I end to end, files, commands, and what is wrong with them."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from template_control.cli.main import main
+from template_control.cli.reproductions import REPRODUCTIONS
+from template_control.cli.reproductions.example_one import summary
+from template_control.errors import RecordError, ScenarioError
+from template_control.slip.scenario import Scenario, Segment, example_one, load_scenario
+from template_control.slip.scenario_record import ScenarioRecord
+from template_control.slip.scenario_run import simulate_scenario
+from template_control.slip.vocabulary import MapKind
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "example_one.toml"
+
+
+@pytest.fixture(scope="module", params=[MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT])
+def record(request):
+    return simulate_scenario(example_one(request.param))
+
+
+def test_example_one_goes_as_told(record):
+    s = summary(record)
+    assert s["completed"]
+    assert s["walking_speed_before"] == pytest.approx(1.17, abs=0.01)
+    assert s["stiffness_at_5"] == pytest.approx(28.2e3, rel=0.05)
+    assert s["walking_steps_after"] >= 20
+    kinds = record.strides
+    assert kinds.count("wr") == kinds.count("rw") == 1
+    first_run, last_run = kinds.index("r"), len(kinds) - 1 - kinds[::-1].index("r")
+    assert set(kinds[first_run : last_run + 1]) == {"r"}
+    assert record.section_time[kinds.index("wr")] >= 0.8
+    apex = record.section_state[kinds.index("rw"), 0]
+    assert apex < 2.0 <= record.section_state[kinds.index("rw") - 1, 0]
+    top = record.section_state[1:][np.array(record.wanted_speed) == 5.0]
+    assert np.all(np.abs(top[:, 0] - 5.0) < 0.05)
+    held = record.section_time[1:][np.array(record.wanted_speed) == 5.0]
+    assert np.ptp(held) == pytest.approx(1.5, abs=0.4)
+
+
+def test_energies_are_out_of_phase_walking_and_in_phase_running(record):
+    kinds = record.strides
+    phases = {
+        kind: [record.energy_phase(i) for i, k in enumerate(kinds) if k == kind]
+        for kind in ("w", "r")
+    }
+    assert max(phases["w"]) < -0.4
+    assert min(phases["r"]) > 0.4
+
+
+def test_profile_accelerates_as_asked(record):
+    kinds = np.array(record.strides)
+    running = kinds == "r"
+    rising = running & (record.wanted_speed < 5.0) & (np.arange(len(kinds)) < 15)
+    t, v = record.section_time[1:][rising], record.section_state[1:][rising, 0]
+    assert np.polyfit(t, v, 1)[0] == pytest.approx(1.05, rel=0.1)
+
+
+def test_energy_changes_only_where_a_stiffness_is_switched(record):
+    """Within a node of the automaton the exact model conserves energy."""
+    total = record.energies()["total"]
+    same = (np.diff(record.node) == 0) & (np.diff(np.sum(record.stiffness, axis=1)) == 0.0)
+    assert np.max(np.abs(np.diff(total)[same])) < 1e-6
+
+
+def test_the_file_is_example_one():
+    assert load_scenario(EXAMPLE) == example_one()
+
+
+def test_record_survives_the_disk(tmp_path):
+    scenario = replace(example_one(), segments=(Segment("walk", speed=1.125, steps=3),))
+    record = simulate_scenario(scenario)
+    again = ScenarioRecord.load(record.save(tmp_path / "run.npz"))
+    assert again.strides == ["w"] * 3
+    np.testing.assert_array_equal(again.state, record.state)
+    assert again.metadata == json.loads(json.dumps(record.metadata))
+    (tmp_path / "junk.npz").write_text("junk")
+    with pytest.raises(RecordError, match="no recorded run"):
+        ScenarioRecord.load(tmp_path / "junk.npz")
+
+
+def test_a_failed_stride_ends_the_run_and_is_told():
+    scenario = Scenario(
+        segments=(Segment("walk", speed=1.1, steps=1), Segment("run", speed=9.0, steps=3))
+    )
+    record = simulate_scenario(scenario)
+    assert not record.completed
+    assert "stride" in record.metadata["failure"]
+    assert len(record.section_state) == len(record.strides) + 1
+
+
+SEGMENT = '[[segment]]\ngait = "walk"\nspeed = 1.1\nsteps = 2\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "culprit"),
+    [
+        ("spead = 3\n" + SEGMENT, "unknown key 'spead'"),
+        (SEGMENT + "paces = 3\n", "segment 1 has an unknown key 'paces'"),
+        (SEGMENT + SEGMENT.replace("walk", "trot"), "segment 2 gait is 'trot'"),
+        (SEGMENT.replace("1.1", "inf"), "segment 1 speed is inf"),
+        (SEGMENT.replace("steps = 2", ""), "segment 1 never ends"),
+        (SEGMENT.replace("walk", "run"), "segment 1 must walk"),
+        (SEGMENT.replace("2", "0"), "steps is 0"),
+        ('map = "mercator"\n' + SEGMENT, "map is 'mercator'"),
+        ("apex_height = -1\n" + SEGMENT, "apex_height is -1"),
+        ("vlo = [1.2, 0.0]\n" + SEGMENT, "vlo height is 1.2"),
+        ("[parameters]\nmass = -80.0\n" + SEGMENT, "mass is -80"),
+        ("[parameters]\nweight = 80.0\n" + SEGMENT, "unknown key 'weight'"),
+        ("", "no segments"),
+        ("= 3", "is no TOML"),
+    ],
+)
+def test_bad_files_are_named_in_one_line(tmp_path, capfd, text, culprit):
+    path = tmp_path / "scenario.toml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError, match=culprit):
+        load_scenario(path)
+    assert main(["slip", str(path), "--output", str(tmp_path)]) == 2
+    out, error = capfd.readouterr()
+    assert out == ""
+    assert error.count("\n") == 1
+    assert culprit in error
+
+
+def test_unreachable_apex_is_named_with_its_segment():
+    scenario = replace(example_one(), apex_height=0.5)
+    with pytest.raises(ScenarioError, match=r"segment 2 at .* under the lowest touchdown height"):
+        simulate_scenario(scenario)
+
+
+def test_slip_command(tmp_path, capfd):
+    arguments = ["slip", str(EXAMPLE), "--map", "improved", "--output", str(tmp_path)]
+    assert main([*arguments, "--json"]) == 0
+    figures = json.loads(capfd.readouterr().out)
+    assert figures["completed"]
+    assert figures["map"] == "improved"
+    assert figures["strides"]["running"] > 10
+    assert figures["speed_error_rms"] < 0.01
+    assert {p.name for p in tmp_path.iterdir()} == {"run.npz", "scenario.png", "energies.png"}
+    assert main([*arguments, "--no-figures"]) == 0
+    assert "as planned" in capfd.readouterr().out
+    assert main(["slip", str(tmp_path / "none.toml")]) == 2
+    assert "cannot read" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("name", REPRODUCTIONS)
+def test_reproduce_command(name, tmp_path, capfd):
+    assert main(["reproduce", name, "--output", str(tmp_path), "--json"]) == 0
+    data = json.loads(capfd.readouterr().out)
+    assert data["name"] == name
+    assert [Path(p) for p in data["figures"]] == sorted(tmp_path.glob("*.png"))
+    if name == "table3":
+        assert data["valid"] >= 5000
+        assert data["improved"]["position"]["mean"] <= 0.35
+        assert data["improved"]["velocity"]["mean"] <= 2.0
+    if name == "fig6":
+        assert data["Table IV's gains"]["end"][1] == pytest.approx(0.98, abs=0.01)
+
+
+def test_unknown_reproduction_is_named(capfd):
+    assert main(["reproduce", "fig99"]) == 2
+    assert "no reproduction 'fig99'" in capfd.readouterr().err
