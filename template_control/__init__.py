@@ -17,6 +17,7 @@ from template_control.errors import (
     ParameterError,
     RecordError,
     RobotError,
+    ScenarioError,
     TemplateControlError,
 )
 from template_control.plant.bullet import PlantOptions
@@ -26,17 +27,31 @@ from template_control.plant.summary import summarise
 from template_control.robot.library import ROBOTS, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.controllers import (
+    ActiveRunning,
+    ActiveWalking,
+    ModifiedWalking,
+    RunToWalk,
+    WalkToRun,
+)
 from template_control.slip.gait import WalkingGait, gait_at, gait_for_speed, gait_from_energy
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.return_map import ReturnMap
+from template_control.slip.scenario import Scenario, Segment, example_one, load_scenario
+from template_control.slip.scenario_record import ScenarioRecord
+from template_control.slip.scenario_run import simulate_scenario
+from template_control.slip.step_solver import StepSolution
 from template_control.slip.stride import Stride, controls, run
 from template_control.slip.vocabulary import Event, MapKind, Outcome, Slot
 from template_control.view.figures import save_figures
+from template_control.view.scenario_figures import save_scenario_figures
 
 __all__ = [
     "AUTOMATON",
     "ROBOTS",
     "STRIDE_START",
+    "ActiveRunning",
+    "ActiveWalking",
     "Decision",
     "EmbeddingController",
     "EmbeddingOptions",
@@ -47,6 +62,7 @@ __all__ = [
     "MapKind",
     "ModifiedOptions",
     "ModifiedPlanner",
+    "ModifiedWalking",
     "Outcome",
     "ParameterError",
     "PlanarBiped",
@@ -57,20 +73,31 @@ __all__ = [
     "RecordError",
     "ReturnMap",
     "RobotError",
+    "RunToWalk",
+    "Scenario",
+    "ScenarioError",
+    "ScenarioRecord",
+    "Segment",
     "SimulationOptions",
     "SlipParameters",
     "Slot",
+    "StepSolution",
     "Stride",
     "TemplateControlError",
+    "WalkToRun",
     "WalkingGait",
     "controls",
+    "example_one",
     "gait_at",
     "gait_for_speed",
     "gait_from_energy",
     "load_robot",
+    "load_scenario",
     "perturbed_start",
     "run",
     "save_figures",
+    "save_scenario_figures",
     "simulate",
+    "simulate_scenario",
     "summarise",
 ]

@@ -1,11 +1,23 @@
 """Shared objects: the shipped robot and its default gait."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from template_control.robot.library import load_robot
 from template_control.slip.gait import gait_at
 from template_control.slip.parameters import SlipParameters
+
+PACKAGE = Path(__file__).parents[1] / "template_control"
+
+
+def pytest_configure():
+    """Drop compiled kernels older than a source: Numba looks at a function's own file only."""
+    newest = max(path.stat().st_mtime for path in PACKAGE.rglob("*.py"))
+    for compiled in PACKAGE.rglob("*.nb[ic]"):
+        if compiled.stat().st_mtime < newest:
+            compiled.unlink(missing_ok=True)
 
 
 @pytest.fixture

@@ -48,12 +48,12 @@ def test_the_two_commands_are_there():
 
 @pytest.mark.parametrize("line", [c for c in commands() if "venv -" not in c and "venv ." not in c])
 def test_other_commands_run_as_printed(line, tmp_path):
-    words = line.split()
+    words = [str(ROOT / w) if w.startswith("examples/") else w for w in line.split()]
     assert words[0] in ("template-control", "python")
     if words[0] == "template-control":
         words = [sys.executable, "-m", "template_control.cli.main", *words[1:]]
     else:
-        words = [sys.executable, str(ROOT / words[1]), *words[2:]]
+        words = [sys.executable, *words[1:]]
     done = subprocess.run(
         words,
         cwd=tmp_path,

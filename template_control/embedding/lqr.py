@@ -91,6 +91,9 @@ class LqrPlanner:
         self._scratch = new_scratch()
         self._spread = np.array(o.spread)
         self._law = self._aim()
+        # Compile now what a step would otherwise wait for.
+        linear(self._law, gait.vlo, u := np.empty(3))
+        search(TABLES, _NODE, self._law, self._scratch, gait.vlo, self._spread, u, np.empty(3))
 
     def _aim(self) -> Law:
         """The linear law about the fixed point the robot has with the present offset."""
