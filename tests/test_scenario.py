@@ -149,7 +149,12 @@ def test_slip_command(tmp_path, capfd):
     assert "cannot read" in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("name", REPRODUCTIONS)
+LONG = ("fig8", "fig9")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in REPRODUCTIONS]
+)
 def test_reproduce_command(name, tmp_path, capfd):
     assert main(["reproduce", name, "--output", str(tmp_path), "--json"]) == 0
     data = json.loads(capfd.readouterr().out)
@@ -159,6 +164,12 @@ def test_reproduce_command(name, tmp_path, capfd):
         assert data["valid"] >= 5000
         assert data["improved"]["position"]["mean"] <= 0.35
         assert data["improved"]["velocity"]["mean"] <= 2.0
+    if name == "fig8":
+        assert data["fold"] == pytest.approx(827.62, abs=0.02)
+        assert data["lower_by_steps_to_fall"] == pytest.approx(822.06, abs=0.3)
+        assert data["states"] >= 200_000
+    if name == "fig9":
+        assert data["paper map"]["failing"] > 100 > data["improved map"]["failing"]
     if name == "fig6":
         assert data["Table IV's gains"]["end"][1] == pytest.approx(0.98, abs=0.01)
 

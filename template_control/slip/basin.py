@@ -27,15 +27,15 @@ IntArray = NDArray[np.int64]
 _EXACT = int(MapKind.EXACT)
 _SECTION = int(Outcome.SECTION)
 _WINDOW = 5
-_NEAR = 0.5
 _THERE = 0.01  # as near as this, it need not come nearer
+_SHRINKS = 0.95  # of the distance half-way must be left at most: no other gait, no cycle
 _HEIGHT, _ANGLE = 0.01, np.radians(1.0)  # what counts as equally far, per l0 and in angle
 
 
 def vlo_state(parameters: SlipParameters, y: ArrayLike, phi: ArrayLike, energy: ArrayLike) -> Array:
     """VLO states (..., 3) dx/dt, y, dy/dt from height [m], velocity angle [rad], energy [J].
 
-    NaN where the energy does not suffice.
+    The speeds are NaN where the energy does not suffice.
     """
     p = parameters
     y, phi, energy = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (y, phi, energy)))
@@ -61,15 +61,15 @@ def _steps(
     limit: int,
     scratch: Scratch,
     result: Array,
-) -> tuple[int, float, float]:
-    """Steps taken (at most ``limit``), and the farthest from ``goal`` early and late.
+) -> tuple[int, bool]:
+    """Steps taken (at most ``limit``), and whether they lead to ``goal``.
 
     ``z`` (3,) is overwritten with the last VLO state; ``goal`` (2,) is y, phi.
     """
-    early = late = 0.0
+    early = middle = late = 0.0
     for step in range(limit):
         if section_map(tables, model, _EXACT, node, z, controls, scratch, result) != _SECTION:
-            return step, early, np.inf
+            return step, False
         for i in range(3):
             z[i] = result[i]
         height = (z[1] - goal[0]) / (_HEIGHT * model.rest_length)
@@ -77,9 +77,11 @@ def _steps(
         distance = np.sqrt(height * height + angle * angle)
         if step < _WINDOW:
             early = max(early, distance)
+        if 2 * step >= limit - _WINDOW and 2 * step < limit + _WINDOW:
+            middle = max(middle, distance)
         if step >= limit - _WINDOW:
             late = max(late, distance)
-    return limit, early, late
+    return limit, late < _THERE or (late < _SHRINKS * middle and late < early)
 
 
 @njit(cache=True)
@@ -100,10 +102,9 @@ def _many(
         steps[i] = 0
         converges[i] = False
         if np.isfinite(z[i, 0]):
-            steps[i], early, late = _steps(
+            steps[i], converges[i] = _steps(
                 tables, model, node, z[i], controls[i], goal[i], limit, scratch, result
             )
-            converges[i] = steps[i] == limit and late < min(max(early, _THERE), _NEAR)
 
 
 @dataclass(frozen=True)
@@ -112,8 +113,9 @@ class StepsToFall:
 
     Attributes:
         steps: (n,) steps taken before a failure, at most the limit.
-        converges: (n,) all steps were taken, and the last five stay within 5 mm (for l0 =
-            1 m) and 0.5 degrees of the gait, and nearer it than the first five did.
+        converges: (n,) all steps were taken, and the distance from the gait (1 cm, for l0 =
+            1 m, counting as much as 1 degree) shrank: the farthest of the last five is less
+            than that of the first five and of five half-way, or it is under 0.1 mm.
         last: (n, 3) VLO state after the last step taken.
     """
 
@@ -150,3 +152,37 @@ def steps_to_fall(
         converges,
     )
     return StepsToFall(steps, converges, states)
+
+
+def margin(
+    parameters: SlipParameters,
+    controls: Array,
+    goal: tuple[float, float],
+    energy: float,
+    largest: float = 0.05,
+    counts: tuple[int, int] = (50, 32),
+) -> float:
+    """Radius of the largest disc around a gait from which walking converges to it.
+
+    Args:
+        parameters: the template.
+        controls: (NUM_SLOTS,) of the gait.
+        goal: its y [m] and phi [rad] at VLO.
+        energy: its energy [J]; all states of the disc have it.
+        largest: where to stop looking, over l0.
+        counts: numbers of radii and of directions.
+
+    Returns:
+        The radius over l0 in height; in velocity angle 1 degree counts as 0.01.
+    """
+    radii = np.linspace(largest / counts[0], largest, counts[0])
+    turn = np.linspace(0.0, 2.0 * np.pi, counts[1], endpoint=False)
+    r, t = np.meshgrid(radii, turn, indexing="ij")
+    y = goal[0] + r * parameters.rest_length * np.cos(t)
+    phi = goal[1] + r / _HEIGHT * _ANGLE * np.sin(t)
+    z = vlo_state(parameters, y.ravel(), phi.ravel(), energy)
+    good = steps_to_fall(parameters, z, controls, np.array(goal)).converges.reshape(r.shape)
+    lost = np.flatnonzero(~good.all(axis=1))
+    if not lost.size:
+        return float(radii[-1])
+    return float(radii[lost[0] - 1]) if lost[0] else 0.0

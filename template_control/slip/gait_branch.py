@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 QUANTITIES = ("energy", "angle", "stiffness", "height", "speed")
 _NEWTON = 12
 _CONVERGED = 1e-10
-_SINGULAR = 1e-6  # where branches cross, the step leaves the crossing direction alone
+_SINGULAR = 1e-7  # where branches cross, a step leaves the crossing direction alone
 _SMALLEST_STEP = 1e-6
 _LOCATE = 40
 
@@ -249,7 +249,10 @@ class Family:
         low, high, point = 0.0, 1.0, a
         for _ in range(_LOCATE):
             middle = 0.5 * (low + high)
-            point = self.point(self.correct(xa + middle * (xb - xa), chord))
+            try:
+                point = self.point(self.correct(xa + middle * (xb - xa), chord))
+            except GaitError:
+                break  # so near a crossing of branches that Newton's method stalls
             tangent = point.tangent * np.sign(point.tangent @ direction)
             if left * test(point, tangent) > 0.0:
                 low = middle

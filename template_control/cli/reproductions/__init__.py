@@ -7,6 +7,7 @@ from collections.abc import Callable
 from template_control.cli.reproductions.example_one import fig10
 from template_control.cli.reproductions.map_errors import fig5, table3
 from template_control.cli.reproductions.reproduction import Reproduction
+from template_control.cli.reproductions.stability import fig8, fig9
 from template_control.cli.reproductions.transitions import fig6, fig7, table4
 
 REPRODUCTIONS: dict[str, Callable[[], Reproduction]] = {
@@ -15,6 +16,8 @@ REPRODUCTIONS: dict[str, Callable[[], Reproduction]] = {
     "table4": table4,
     "fig6": fig6,
     "fig7": fig7,
+    "fig8": fig8,
+    "fig9": fig9,
     "fig10": fig10,
 }
 """By the name ``template-control reproduce`` knows them by."""

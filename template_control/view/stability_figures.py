@@ -1,0 +1,148 @@
+"""Figures of gait branches, basins of attraction (Fig. 8) and the deadbeat set (Fig. 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from template_control.slip.gait_branch import BranchPoint, Special
+from template_control.slip.stability import Kind
+
+Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+_KINDS = {Kind.STABLE: "#2a6196", Kind.SADDLE: "#db7321", Kind.UNSTABLE: "#6b7078"}
+_MARKS = {
+    Special.FOLD: "D",
+    Special.SADDLE_NODE: "s",
+    Special.FLIP: "v",
+    Special.NEIMARK_SACKER: "o",
+}
+_MAPS = ("#db7321", "#2a6196", "#3a9a4a")
+UNITS = {
+    "energy": ("energy [J]", 1.0),
+    "angle": ("touchdown angle [deg]", 180.0 / np.pi),
+    "stiffness": ("leg stiffness [kN/m]", 1e-3),
+    "height": ("height [m]", 1.0),
+    "speed": ("dx/dt [m/s]", 1.0),
+}
+
+
+def branch_figure(points: Sequence[BranchPoint], over: str, show: Sequence[str]) -> Figure:
+    """Quantities and the largest eigenvalue along a branch, coloured by stability.
+
+    Args:
+        points: of the branch, in order.
+        over: quantity on the horizontal axis.
+        show: quantities on the vertical axes.
+    """
+    label, unit = UNITS[over]
+    x = unit * np.array([p.quantity(over) for p in points])
+    curves = [(UNITS[s][0], UNITS[s][1] * np.array([p.quantity(s) for p in points])) for s in show]
+    largest = np.array([np.abs(p.eigenvalues).max() for p in points])
+    curves.append(("largest |eigenvalue|", largest))
+    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+    for axes, (name, y) in zip(np.atleast_1d(figure.subplots(1, len(curves))), curves, strict=True):
+        axes.plot(x, y, color="0.8", linewidth=0.8, zorder=1)
+        for kind, color in _KINDS.items():
+            of = np.array([p.kind is kind and p.special is None for p in points])
+            if of.any():
+                axes.plot(x[of], y[of], ".", color=color, markersize=3, label=kind.value, zorder=2)
+        for i, point in enumerate(points):
+            if point.special is not None:
+                axes.plot(
+                    x[i], y[i], _MARKS[point.special], color="black", markersize=5, fillstyle="none"
+                )
+        axes.set(xlabel=label, ylabel=name)
+    axes.axhline(1.0, color="0.4", linewidth=0.8)
+    axes.set_ylim(0.0, min(3.0, 1.1 * largest.max()))
+    used = {p.special for p in points if p.special is not None}
+    marks = [
+        axes.plot([], [], _MARKS[s], color="black", fillstyle="none", markersize=5)[0] for s in used
+    ]
+    figure.legend(
+        [*axes.get_legend_handles_labels()[0], *marks],
+        [*axes.get_legend_handles_labels()[1], *(s.value for s in used)],
+        loc="outside upper center",
+        ncols=4,
+        fontsize=8,
+    )
+    return figure
+
+
+def basin_figure(
+    energies: Array, heights: Array, angles: Array, steps: Array, converges: BoolArray
+) -> Figure:
+    """Slices of a basin of attraction at several energies.
+
+    Args:
+        energies: (e,) [J].
+        heights: (h,) y at VLO [m].
+        angles: (a,) velocity angle, positive downward [deg].
+        steps: (e, a, h) steps to fall.
+        converges: (e, a, h) whether the walk converges to the equilibrium.
+    """
+    columns = min(4, len(energies))
+    rows = -(-len(energies) // columns)
+    figure = Figure(figsize=(9.0, 2.3 * rows + 0.3), layout="constrained")
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    extent = (heights[0], heights[-1], angles[0], angles[-1])
+    image = None
+    for axes, energy, fall, good in zip(panels, energies, steps, converges, strict=False):
+        image = axes.imshow(
+            np.where(good, np.nan, fall),
+            origin="lower",
+            extent=extent,
+            aspect="auto",
+            cmap="Greys",
+            vmin=0,
+            vmax=1.3 * steps.max(),
+        )
+        axes.contourf(
+            heights, angles, good.astype(float), levels=[0.5, 1.5], colors=["#2a6196"], alpha=0.85
+        )
+        axes.set_title(f"{energy:.2f} J", fontsize=9)
+    for axes in panels[len(energies) :]:
+        axes.set_visible(False)
+    figure.supxlabel("y at VLO [m]", fontsize=10)
+    figure.supylabel("velocity angle, downward [deg]", fontsize=10)
+    if image is not None:
+        figure.colorbar(image, ax=panels.tolist(), label="steps to fall (blue: converges)")
+    return figure
+
+
+def deadbeat_figure(
+    heights: Array,
+    angles: Array,
+    settled: Mapping[str, BoolArray],
+    least_angles: Array,
+    shares: Mapping[str, Array],
+    published: float,
+) -> Figure:
+    """The deadbeat set, where a map's controller fails on it, and Pz_in over alpha_min.
+
+    Args:
+        heights, angles: (n,) y [m] and velocity angle [deg] of the set.
+        settled: by map, (n,) whether the step leads into the basin; the first is drawn.
+        least_angles: (m,) alpha_min [deg].
+        shares: by map, (m,) Pz_in.
+        published: the paper's alpha_min [deg].
+    """
+    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    name, inside = next(iter(settled.items()))
+    left.plot(heights[inside], angles[inside], ".", color=_MAPS[1], markersize=1.5, label="settles")
+    left.plot(
+        heights[~inside], angles[~inside], "x", color="0.55", markersize=3, label=f"fails ({name})"
+    )
+    left.set(xlabel="y at VLO [m]", ylabel="velocity angle, downward [deg]")
+    left.legend(loc="best", markerscale=2)
+    for color, (label, values) in zip(_MAPS, shares.items(), strict=False):
+        right.plot(least_angles, 100.0 * values, color=color, linewidth=1.4, label=label)
+    right.axvline(published, color="0.4", linewidth=0.8, linestyle="--", label="paper, 100 %")
+    right.set(xlabel="alpha_min [deg]", ylabel="Pz_in [%]")
+    right.legend(loc="lower right")
+    return figure
