@@ -23,3 +23,7 @@ class RobotError(TemplateControlError):
 
 class RecordError(TemplateControlError):
     """A file that is not a recorded run, or a folder a run cannot be written to."""
+
+
+class SweepError(TemplateControlError):
+    """A sweep that cannot start or go on: its items, its results file or its executor."""

@@ -46,7 +46,14 @@ def test_the_two_commands_are_there():
     assert "README.md" in (ROOT / ".ci" / "run").read_text()
 
 
-@pytest.mark.parametrize("line", [c for c in commands() if "venv -" not in c and "venv ." not in c])
+LONG = ("reproduce fig8", "reproduce fig9")
+OTHERS = [c for c in commands() if "venv -" not in c and "venv ." not in c]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [pytest.param(c, marks=[pytest.mark.slow] * any(long in c for long in LONG)) for c in OTHERS],
+)
 def test_other_commands_run_as_printed(line, tmp_path):
     words = [str(ROOT / w) if w.startswith("examples/") else w for w in line.split()]
     assert words[0] in ("template-control", "python")

@@ -108,6 +108,29 @@ def price(
 
 
 @njit(cache=True)
+def _try(
+    tables: Tables,
+    node: int,
+    law: Law,
+    s: Scratch,
+    z: Array,
+    u: Array,
+    cheapest: float,
+    best: Array,
+    first: Array,
+    end: Array,
+) -> float:
+    """Price ``u`` once within bounds; if it is cheaper, it is the new best."""
+    bounded(law, z, u)
+    cost = price(tables, node, law, s, z, u, end)
+    if cost >= cheapest:
+        return cheapest
+    best[:] = u
+    first[:] = end
+    return cost
+
+
+@njit(cache=True)
 def search(
     tables: Tables,
     node: int,
@@ -118,21 +141,30 @@ def search(
     best: Array,
     first: Array,
 ) -> float:
-    """Improve ``best`` (3,) in place over shrinking grids in alpha, kappa_2 and in kappa_1.
+    """Improve ``best`` (3,) in place: a coarse grid over all bounds, then finer ones about it.
+
+    Far from the gait the good steps (hard braking, say, with a stiff leg before the virtual
+    bottom and a soft one after) are not near what the linear law says.
 
     Args:
-        spread: (2,) half-widths of the first grid in alpha [rad] and kappa/k0.
+        spread: (2,) half-widths of the first fine grid in alpha [rad] and kappa/k0.
         best: start of the search, and its result.
         first: (3,) overwritten with the state after the step.
 
     Returns:
         The price of ``best``.
     """
-    u = np.empty(3)
-    z1 = np.empty(3)
+    u, end = np.empty(3), np.empty(3)
     cheapest = price(tables, node, law, s, z, best, first)
+    for i in range(45):
+        u[0] = (i // 9 + 0.5) / 5.0
+        u[1] = (i // 3 % 3 + 0.5) / 3.0
+        u[2] = (i % 3 + 0.5) / 3.0
+        for j in range(3):
+            u[j] = law.lower[j] + u[j] * (law.upper[j] - law.lower[j])
+        cheapest = _try(tables, node, law, s, z, u, cheapest, best, first, end)
     width_alpha, width_kappa = spread[0], spread[1]
-    for _ in range(3):
+    for _ in range(2):
         c0, c1, c2 = best[0], best[1], best[2]
         for i in range(17):
             # 5 x 3 points in alpha and kappa_2 about the centre, and two in kappa_1.
@@ -142,12 +174,7 @@ def search(
                 u[2] += (i % 3 - 1) * width_kappa
             else:
                 u[1] += (2 * i - 31) * width_kappa
-            bounded(law, z, u)
-            cost = price(tables, node, law, s, z, u, z1)
-            if cost < cheapest:
-                cheapest = cost
-                best[:] = u
-                first[:] = z1
+            cheapest = _try(tables, node, law, s, z, u, cheapest, best, first, end)
         width_alpha *= 0.4
         width_kappa *= 0.4
     return cheapest

@@ -74,7 +74,11 @@ def branch_figure(points: Sequence[BranchPoint], over: str, show: Sequence[str])
 
 
 def basin_figure(
-    energies: Array, heights: Array, angles: Array, steps: Array, converges: BoolArray
+    energies: Array,
+    heights: Array,
+    angles: Array,
+    steps: NDArray[np.int64],
+    converges: BoolArray,
 ) -> Figure:
     """Slices of a basin of attraction at several energies.
 

@@ -1,0 +1,223 @@
+"""Results of a sweep on disk: JSON lines, one appended as each item finishes.
+
+The first line says which sweep it is; every other one is an item that finished. A process
+killed while it writes leaves at most a torn last line, which the next one drops.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import numbers
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, NamedTuple, NoReturn
+
+import numpy as np
+
+from template_control.errors import SweepError
+
+_FORMAT = "template-control sweep 1"
+
+
+class Outcome(NamedTuple):
+    """How an item ended.
+
+    Attributes:
+        result: plain data as of :func:`plain`; None where it failed.
+        error: None, or why it failed as 'TypeName: message'.
+    """
+
+    result: Any
+    error: str | None
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON keeps it, so that a result read back equals a fresh one.
+
+    Numbers of numpy become Python's, arrays and tuples lists, keys of dictionaries texts.
+
+    Raises:
+        TypeError: if it holds anything else.
+    """
+    if value is None or isinstance(value, bool | np.bool_):
+        return None if value is None else bool(value)
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real):
+        return float(value)
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    raise TypeError(
+        f"a {type(value).__name__} is no plain data: give numbers, texts, arrays, or lists and"
+        " dictionaries of them"
+    )
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """Module and qualified name; of a ``functools.partial`` its arguments too.
+
+    Raises:
+        TypeError: if a partial's arguments are no plain data.
+    """
+    if isinstance(function, partial):
+        return f"{name_of(function.func)}{json.dumps(plain([function.args, function.keywords]))}"
+    kind = function if hasattr(function, "__qualname__") else type(function)
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def header(function: Callable[..., Any], seed: int, items: Iterable[Any]) -> dict[str, Any]:
+    """What identifies a sweep: format, function, seed, number and SHA-256 of its plain items.
+
+    Raises:
+        SweepError: if the items or a partial's arguments are no plain data.
+    """
+    digest, count, what = hashlib.sha256(), 0, "the function"
+    try:
+        name = name_of(function)
+        for item in items:
+            what = f"item {count}"
+            digest.update(json.dumps(plain(item), sort_keys=True).encode() + b"\n")
+            count += 1
+    except TypeError as error:
+        raise SweepError(f"{what} cannot be told in a file: {error}") from None
+    return {
+        "format": _FORMAT,
+        "function": name,
+        "seed": seed,
+        "items": count,
+        "sha256": digest.hexdigest(),
+    }
+
+
+class SweepFile:
+    """A results file, open and locked for this process; a context manager.
+
+    Args:
+        path: of the file; a new one is begun where there is none.
+        head: of :func:`header`.
+
+    Attributes:
+        finished: outcome by item index, as the file had them; the last of an item counts.
+
+    Raises:
+        SweepError: if the file holds anything but this sweep, another process is writing it
+            or it cannot be written.
+    """
+
+    def __init__(self, path: str | Path, head: dict[str, Any]) -> None:
+        self.path = Path(path)
+        self.finished: dict[int, Outcome] = {}
+        if self.path.exists() and not self.path.is_file():
+            self._refuse("is no file")
+        try:
+            self._file: BinaryIO = self.path.open("a+b")
+        except OSError as error:
+            self._refuse(f"cannot be written ({error.strerror})")
+        try:
+            self._lock()
+            self._read(head)
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _refuse(self, why: str, mend: str = "give another path") -> NoReturn:
+        raise SweepError(f"{self.path} {why}: {mend}") from None
+
+    def _lock(self) -> None:
+        """Ours until it is closed; worker processes do not inherit it, the kernel frees it."""
+        try:
+            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except (BlockingIOError, PermissionError):
+            self._refuse("is being written by another sweep", "wait for that")
+        except OSError as error:
+            self._refuse(f"cannot be locked ({error.strerror})")
+
+    def _read(self, head: dict[str, Any]) -> None:
+        """Take over what is there, cut a torn end off, begin an empty file."""
+        first = json.dumps(head).encode() + b"\n"
+        self._file.seek(0)
+        end = 0
+        for number, line in enumerate(self._file):
+            if not line.endswith(b"\n"):
+                if number == 0 and not first.startswith(line):
+                    self._refuse("holds no sweep")
+                break
+            if number == 0:
+                self._compare(line, head)
+            else:
+                self._take(number, line, head["items"])
+            end += len(line)
+        self._file.seek(end)
+        self._file.truncate()
+        if end == 0:
+            self._write(first)
+
+    def _compare(self, line: bytes, head: dict[str, Any]) -> None:
+        try:
+            found = json.loads(line)
+            known = found["format"] == _FORMAT
+        except (ValueError, KeyError, TypeError):
+            known = False
+        if not known:
+            self._refuse("holds no sweep")
+        for key, value in head.items():
+            if found.get(key) != value:
+                what = "other items" if key == "sha256" else f"{key} {found.get(key)}, not {value}"
+                self._refuse(f"holds another sweep ({what})")
+
+    def _take(self, number: int, line: bytes, count: int) -> None:
+        try:
+            entry = json.loads(line)
+            index, error = entry["index"], entry.get("error")
+            known = 0 <= index < count and (isinstance(error, str) or "result" in entry)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            known = False
+        if not known:
+            raise SweepError(
+                f"{self.path} line {number + 1} is no result: delete the line, its item runs again"
+            )
+        self.finished[index] = Outcome(entry.get("result"), error)
+
+    def append(self, index: int, item: Mapping[str, Any], seed: int, outcome: Outcome) -> None:
+        """Write an item that finished; it is with the operating system when this returns.
+
+        Raises:
+            SweepError: if it cannot be written.
+        """
+        end = {"result": outcome.result} if outcome.error is None else {"error": outcome.error}
+        entry = {"index": index, "item": plain(item), "seed": seed, **end}
+        self._write(json.dumps(entry).encode() + b"\n")
+
+    def _write(self, line: bytes) -> None:
+        try:
+            self._file.write(line)
+            self._file.flush()
+        except OSError as error:
+            raise SweepError(
+                f"cannot write to {self.path}: {error.strerror}; mend that and run the same sweep"
+                " again, it goes on from what is there"
+            ) from None
+
+    def __enter__(self) -> SweepFile:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        # What a full disk refused is told by then; closing tries it once more.
+        with suppress(OSError):
+            self._file.close()
