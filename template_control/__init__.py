@@ -2,7 +2,7 @@
 
 >>> import template_control as tc
 >>> robot = tc.load_robot("five-link")
->>> gait = tc.gait_for_speed(tc.SlipParameters(mass=robot.mass), mean_speed=1.2)
+>>> gait = tc.gait_for_speed(tc.template_for(robot), mean_speed=1.2)
 >>> record = tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=4))
 >>> record.steps, record.fell
 (4, False)
@@ -12,6 +12,7 @@ from template_control.embedding.controller import EmbeddingController, Embedding
 from template_control.embedding.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planner import Decision, Planner
+from template_control.embedding.scaling import default_gait, paper_gait, template_for
 from template_control.errors import (
     GaitError,
     ParameterError,
@@ -87,12 +88,14 @@ __all__ = [
     "WalkToRun",
     "WalkingGait",
     "controls",
+    "default_gait",
     "example_one",
     "gait_at",
     "gait_for_speed",
     "gait_from_energy",
     "load_robot",
     "load_scenario",
+    "paper_gait",
     "perturbed_start",
     "run",
     "save_figures",
@@ -100,4 +103,5 @@ __all__ = [
     "simulate",
     "simulate_scenario",
     "summarise",
+    "template_for",
 ]

@@ -189,7 +189,7 @@ def test_other_speeds(speed):
 @pytest.mark.parametrize("seed", range(20))
 def test_perturbed_starts(seed):
     gait = gait_at(P, np.radians(66.0), 1.1)
-    assert not walk(gait, steps=50, start=perturbed_start(gait.vlo, seed)).fell
+    assert not walk(gait, steps=50, start=perturbed_start(gait, seed)).fell
 
 
 @pytest.mark.slow

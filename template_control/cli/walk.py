@@ -8,7 +8,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -17,6 +16,7 @@ from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.modified import ModifiedPlanner
 from template_control.embedding.planner import Planner
+from template_control.embedding.scaling import default_gait, paper_gait, template_for
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.quiet import stdout_to_stderr
@@ -24,7 +24,7 @@ from template_control.plant.record import Record
 from template_control.plant.simulation import SimulationOptions, perturbed_start, simulate
 from template_control.plant.summary import summarise
 from template_control.robot.library import ROBOTS, load_robot
-from template_control.slip.gait import WalkingGait, gait_at, gait_for_speed, gait_from_energy
+from template_control.slip.gait import WalkingGait, gait_for_speed
 from template_control.slip.parameters import SlipParameters
 from template_control.view.figures import save_figures
 
@@ -116,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
     _check(options)
     folder = writable(options.output)
     robot = load_robot(options.robot)
-    parameters = SlipParameters(mass=robot.mass, gravity=robot.gravity)
+    parameters = template_for(robot)
     gait = _gait(options, parameters)
     planner: Planner = _PLANNERS[options.planner](gait)
     every = options.record_every or (1 if options.steps <= _LONG else 5)
@@ -126,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
         embedding=EmbeddingOptions(
             friction=_CONE_MARGIN * options.friction, torque_scale=options.torque_scale
         ),
-        start=None if options.seed is None else perturbed_start(gait.vlo, options.seed),
+        start=None if options.seed is None else perturbed_start(gait, options.seed),
         record_every=every,
     )
     console = Console(stderr=True)
@@ -173,10 +173,10 @@ def _check(options: argparse.Namespace) -> None:
 
 def _gait(options: argparse.Namespace, parameters: SlipParameters) -> WalkingGait:
     if options.gait == "paper":
-        return gait_from_energy(parameters, 0.9818, 826.0)
+        return paper_gait(parameters)
     if options.speed is not None:
         return gait_for_speed(parameters, options.speed)
-    return gait_at(parameters, np.radians(66.0), 1.1)
+    return default_gait(parameters)
 
 
 def print_table(figures: dict[str, Any], record: Record) -> None:

@@ -8,7 +8,7 @@ to the CoM (beta of Section V-B).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from template_control.embedding.load import LoadEstimate, LoadOptions
 from template_control.embedding.plan import at_phase
 from template_control.embedding.planner import Planner
 from template_control.embedding.references import leg_forces, pd, unloading_cap
+from template_control.embedding.scaling import Scale
 from template_control.embedding.step_planning import ReplanOptions, StepPlanning, StepReport
 from template_control.embedding.swing_foot import SwingFoot, SwingOptions
 from template_control.robot.planar_biped import PlanarBiped
@@ -41,7 +42,9 @@ _NO_CAP = np.full(1, np.inf)
 
 @dataclass(frozen=True)
 class EmbeddingOptions:
-    """Tuning of the embedding; the defaults walk the five-link robot.
+    """Tuning of the embedding for the reference template (80 kg, 1 m, 9.81 m/s^2).
+
+    The controller scales it to its gait's template by dynamic similarity.
 
     Attributes:
         gains: PD gains of (45).
@@ -51,6 +54,7 @@ class EmbeddingOptions:
         friction: coefficient the QP's cones are built with.
         torque_scale: share of the URDF's torque limits that may be used.
         trunk_pitch: where the trunk is held [rad].
+        contact_damping: brings a foot that landed sliding to rest [1/s].
         replan: when a step is planned anew.
     """
 
@@ -62,7 +66,20 @@ class EmbeddingOptions:
     friction: float = 0.63
     torque_scale: float = 1.0
     trunk_pitch: float = 0.0
+    contact_damping: float = 40.0
     replan: ReplanOptions = field(default_factory=ReplanOptions)
+
+    def scaled(self, scale: Scale) -> EmbeddingOptions:
+        """The same tuning for a template of another size."""
+        return replace(
+            self,
+            gains=scale.gains(self.gains),
+            single_stance=scale.weights(self.single_stance),
+            double_stance=scale.weights(self.double_stance),
+            swing=scale.swing(self.swing),
+            contact_damping=self.contact_damping / scale.time,
+            replan=scale.replan(self.replan),
+        )
 
 
 class EmbeddingController:
@@ -86,11 +103,11 @@ class EmbeddingController:
         self, robot: PlanarBiped, planner: Planner, options: EmbeddingOptions | None = None
     ) -> None:
         self.robot = robot
-        self.options = options or EmbeddingOptions()
+        self.options = (options or EmbeddingOptions()).scaled(Scale.of(planner.gait.parameters))
         o = self.options
         self.planning = StepPlanning(planner, o.replan)
         self.parameters = planner.gait.parameters
-        self.qp = WholeBodyQp(robot, o.friction, o.torque_scale)
+        self.qp = WholeBodyQp(robot, o.friction, o.torque_scale, o.contact_damping)
         self.tasks = TaskStack(robot.nv)
         self.swing = SwingFoot(o.swing)
         self.load = LoadEstimate(o.load, robot.gravity)

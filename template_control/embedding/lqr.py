@@ -8,13 +8,14 @@ gait and not beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from template_control.embedding.planner import Decision
+from template_control.embedding.scaling import Scale
 from template_control.embedding.step_search import FALL_PRICE, Law, linear, price, search
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import WalkingGait
@@ -33,6 +34,9 @@ _NODE = AUTOMATON.index[STRIDE_START["w"]]
 @dataclass(frozen=True)
 class LqrOptions:
     """Tuning of the LQR; states in m/s, m, m/s, controls in rad and shares of k0.
+
+    States are those of the reference template (80 kg, 1 m, 9.81 m/s^2); the planner scales
+    them to its gait's by dynamic similarity.
 
     Attributes:
         state_cost: on dx/dt, y, dy/dt.
@@ -63,6 +67,16 @@ class LqrOptions:
     trusted_price: float = 2.0
     spread: tuple[float, float] = (0.16, 0.25)
 
+    def scaled(self, scale: Scale) -> LqrOptions:
+        """The same tuning for a template of another size."""
+        return replace(
+            self,
+            state_cost=scale.state_cost(self.state_cost),
+            offset_bound=scale.state(self.offset_bound),
+            surprise_bound=scale.state(self.surprise_bound),
+            tolerance=scale.state(self.tolerance),
+        )
+
 
 class LqrPlanner:
     """u = u_s - K (z - z_s), where the template completes its step; else a search.
@@ -78,7 +92,7 @@ class LqrPlanner:
 
     def __init__(self, gait: WalkingGait, options: LqrOptions | None = None) -> None:
         self.gait = gait
-        self.options = options or LqrOptions()
+        self.options = (options or LqrOptions()).scaled(Scale.of(gait.parameters))
         self.offset: Array = np.zeros(3)
         self.a, self.b = _jacobians(gait)
         o = self.options

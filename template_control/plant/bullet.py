@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,17 @@ with stdout_discarded():  # PyBullet announces its build time on standard output
 
 Array = NDArray[np.float64]
 
-_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE  # the default recomputes inertias from shapes
+# By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
+_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
+
+
+def _load(urdf: str, client: int) -> int:
+    """Body of a URDF given as text; PyBullet only reads files."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.urdf"
+        path.write_text(urdf)
+        body = pybullet.loadURDF(str(path), useFixedBase=True, flags=_FLAGS, physicsClientId=client)
+    return int(body)
 
 
 @dataclass(frozen=True)
@@ -61,7 +73,7 @@ class BulletPlant:
         p.setTimeStep(options.time_step, physicsClientId=c)
         plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=c)
         self._ground = p.createMultiBody(0, plane, physicsClientId=c)
-        self.body = p.loadURDF(str(robot.path), useFixedBase=True, flags=_FLAGS, physicsClientId=c)
+        self.body = _load(robot.urdf, c)
         info = [
             p.getJointInfo(self.body, i, physicsClientId=c)
             for i in range(p.getNumJoints(self.body, physicsClientId=c))

@@ -20,6 +20,7 @@ from template_control.plant.record import Record
 from template_control.plant.recorder import Recorder
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON
+from template_control.slip.gait import WalkingGait
 
 Array = NDArray[np.float64]
 
@@ -73,10 +74,12 @@ class SimulationOptions:
             raise ParameterError(f"record_every is {self.record_every}: give at least 1")
 
 
-def perturbed_start(z: Array, seed: int) -> tuple[float, float, float]:
-    """The VLO state ``z`` with up to 5 % more or less speed and 2 cm of height, drawn."""
+def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:
+    """The gait's VLO state with up to 5 % more or less speed and 2 % of l0 in height, drawn."""
+    z, length = gait.vlo, gait.parameters.rest_length
     draw = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
-    return float(z[0] * (1.0 + 0.05 * draw[0])), float(z[1] + 0.02 * draw[1]), float(z[2])
+    height = z[1] + 0.02 * draw[1] * length
+    return float(z[0] * (1.0 + 0.05 * draw[0])), float(height), float(z[2])
 
 
 def simulate(
@@ -105,7 +108,7 @@ def simulate(
     z = np.array(o.start) if o.start is not None else gait.vlo
     length = gait.parameters.rest_length
     # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
-    swing = np.array([0.0, o.embedding.swing.clearance])
+    swing = np.array([0.0, controller.options.swing.clearance])
     q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), o.embedding.trunk_pitch)
     controller.start(0)
     begin = time.perf_counter()
@@ -207,7 +210,7 @@ def _metadata(
     parameters = asdict(gait.parameters)
     metadata = {
         "robot": robot.name,
-        "urdf": str(robot.path),
+        "urdf": robot.urdf,
         "mass": robot.mass,
         "joints": list(robot.joint_names),
         "torque_limit": controller.qp.torque_limit.tolist(),

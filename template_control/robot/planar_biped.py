@@ -31,6 +31,7 @@ class PlanarBiped:
     Attributes (constant):
         name: the URDF's robot name.
         path: the URDF file.
+        urdf: its text, as Pinocchio and PyBullet load it.
         model: the Pinocchio model.
         nv: degrees of freedom, 3 + number of actuated joints.
         mass: total mass [kg].
@@ -60,11 +61,13 @@ class PlanarBiped:
     def __init__(
         self,
         path: Path,
+        urdf: str,
         model: pin.Model,
         feet: tuple[str, str],
         foot_radius: float,
     ) -> None:
         self.path = path
+        self.urdf = urdf
         self.model = model
         self.name: str = model.name
         self.feet = feet
@@ -112,6 +115,7 @@ class PlanarBiped:
 
         Args:
             path: the URDF file.
+        urdf: its text, as Pinocchio and PyBullet load it.
             feet: the two foot links; each has one sphere as collision geometry.
 
         Raises:
@@ -121,8 +125,9 @@ class PlanarBiped:
         if not path.is_file():
             raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
         try:
-            model = pin.buildModelFromUrdf(str(path))
-        except (ValueError, RuntimeError) as error:
+            urdf = path.read_text()
+            model = pin.buildModelFromXML(urdf)
+        except (OSError, ValueError, RuntimeError) as error:
             reason = str(error).strip().splitlines()[0] if str(error).strip() else "unreadable"
             raise RobotError(f"{path} is no URDF that Pinocchio reads ({reason})") from None
         _check_planar(path, model)
@@ -132,8 +137,8 @@ class PlanarBiped:
             if not model.existFrame(foot):
                 links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
                 raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
-        radius = _foot_radius(path, model, feet)
-        return cls(path, model, (feet[0], feet[1]), radius)
+        radius = _foot_radius(path, urdf, model, feet)
+        return cls(path, urdf, model, (feet[0], feet[1]), radius)
 
     def update(self, q: Array, v: Array) -> None:
         """Compute everything the controller needs at (q, v), each quantity once.
@@ -219,8 +224,8 @@ def _check_planar(path: Path, model: pin.Model) -> None:
             raise RobotError(f"{path}: joint {name!r} has effort {limit}: give its torque limit")
 
 
-def _foot_radius(path: Path, model: pin.Model, feet: Sequence[str]) -> float:
-    geometry = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.COLLISION)
+def _foot_radius(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> float:
+    geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
     radii = set()
     for foot in feet:
         frame = model.getFrameId(foot)

@@ -17,7 +17,6 @@ from template_control.whole_body.tasks import TaskStack, Weights
 Array = NDArray[np.float64]
 
 _proxqp = proxsuite.proxqp
-_CONTACT_DAMPING = 40.0  # [1/s], brings a foot that landed sliding to rest
 _SOLVED = _proxqp.QPSolverOutput.PROXQP_SOLVED
 
 
@@ -113,18 +112,23 @@ class WholeBodyQp:
         robot: the model; :meth:`solve` reads its last update.
         friction: coefficient the cones are built with.
         torque_scale: fraction of the URDF's torque limits that may be used.
+        contact_damping: brings a foot that landed sliding to rest [1/s].
     """
 
-    def __init__(self, robot: PlanarBiped, friction: float, torque_scale: float = 1.0) -> None:
+    def __init__(
+        self,
+        robot: PlanarBiped,
+        friction: float,
+        torque_scale: float = 1.0,
+        contact_damping: float = 40.0,
+    ) -> None:
         self.robot = robot
         self.friction = friction
         self.torque_limit: Array = robot.torque_limit * torque_scale
         nu = len(self.torque_limit)
         self._workspaces = {n: _Workspace(robot.nv, nu, n) for n in (1, 2)}
         self._torque = np.zeros(nu)
-        import os
-
-        self.contact_damping = float(os.environ.get("CD", "40"))
+        self.contact_damping = contact_damping
 
     def solve(
         self,
@@ -154,7 +158,7 @@ class WholeBodyQp:
         for i, foot in enumerate(stance):
             w.jacobian[2 * i : 2 * i + 2] = robot.foot_jacobian[foot]
             w.bias[2 * i : 2 * i + 2] = (
-                robot.foot_bias[foot] + _CONTACT_DAMPING * robot.foot_velocity[foot]
+                robot.foot_bias[foot] + self.contact_damping * robot.foot_velocity[foot]
             )
         regular = assemble(
             robot.mass_matrix,

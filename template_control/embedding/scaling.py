@@ -1,0 +1,117 @@
+"""Dynamic similarity: one tuning for robots of any size.
+
+The controller and the planners are tuned for the reference template (80 kg, 1 m, 9.81 m/s^2).
+For another one lengths, times and speeds are scaled so that the dimensionless robot walks the
+same; masses and forces follow from the robot's own model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from template_control.embedding.step_planning import ReplanOptions
+from template_control.embedding.swing_foot import SwingOptions
+from template_control.robot.planar_biped import BASE_DOF, PlanarBiped
+from template_control.slip.gait import WalkingGait, gait_at, gait_from_energy
+from template_control.slip.parameters import SlipParameters
+from template_control.whole_body.tasks import Gains, Weights
+
+REFERENCE = SlipParameters()
+_REST_SHARE = 1.0 / 1.109  # of the CoM's height over straight legs: five-link's 1 m
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Units of a template over those of the reference.
+
+    Attributes:
+        length: l0 over l0.
+        time: sqrt(l0 / g) over sqrt(l0 / g).
+    """
+
+    length: float
+    time: float
+
+    @classmethod
+    def of(cls, parameters: SlipParameters) -> Scale:
+        """Of a template."""
+        length = parameters.rest_length / REFERENCE.rest_length
+        return cls(length, float(np.sqrt(length * REFERENCE.gravity / parameters.gravity)))
+
+    @property
+    def speed(self) -> float:
+        """Of velocities."""
+        return self.length / self.time
+
+    def state(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
+        """A VLO state (or a tolerance of one) in this template's units."""
+        return values[0] * self.speed, values[1] * self.length, values[2] * self.speed
+
+    def state_cost(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Weights of a VLO state's squares."""
+        speed, length = self.speed**-2, self.length**-2
+        return values[0] * speed, values[1] * length, values[2] * speed
+
+    def gains(self, gains: Gains) -> Gains:
+        """PD gains."""
+
+        def scaled(pair: tuple[float, float]) -> tuple[float, float]:
+            return pair[0] / self.time**2, pair[1] / self.time
+
+        return Gains(scaled(gains.com), scaled(gains.trunk), scaled(gains.swing))
+
+    def weights(self, weights: Weights) -> Weights:
+        """Task weights: those of linear accelerations, and of the trunk's."""
+        linear, angular = (self.time**2 / self.length) ** 2, self.time**4
+        x, y, trunk, swing_x, swing_y = weights.rows
+        rows = (x * linear, y * linear, trunk * angular, swing_x * linear, swing_y * linear)
+        return replace(weights, rows=rows)
+
+    def swing(self, options: SwingOptions) -> SwingOptions:
+        """Shape of the swing."""
+        return replace(
+            options,
+            clearance=options.clearance * self.length,
+            landing_speed=options.landing_speed * self.speed,
+            horizon=options.horizon * self.time,
+            lead=options.lead * self.time,
+        )
+
+    def replan(self, options: ReplanOptions) -> ReplanOptions:
+        """When to plan anew."""
+        return ReplanOptions(options.speed * self.speed, options.interval * self.time)
+
+
+def default_gait(parameters: SlipParameters) -> WalkingGait:
+    """The walk that suits most robots: touchdown angle 66 degrees, 1.1 m/s for l0 = 1 m."""
+    return gait_at(parameters, np.radians(66.0), 1.1 * Scale.of(parameters).speed)
+
+
+def paper_gait(parameters: SlipParameters) -> WalkingGait:
+    """The equilibrium of Section IV-D: 0.9818 m and 826 J for 80 kg and l0 = 1 m."""
+    scale = Scale.of(parameters)
+    energy = parameters.mass / REFERENCE.mass * scale.speed**2
+    return gait_from_energy(parameters, 0.9818 * scale.length, 826.0 * energy)
+
+
+def template_for(robot: PlanarBiped) -> SlipParameters:
+    """The reference template scaled to a robot's mass and legs by dynamic similarity.
+
+    l0 is a fixed share of the height of the CoM over the feet with straight legs; the
+    stiffness keeps k l0 / (m g).
+
+    Args:
+        robot: its last update is overwritten.
+    """
+    q = np.zeros(robot.nv)
+    for leg in robot.legs:
+        q[[BASE_DOF + joint for joint in leg]] = 0.0
+    robot.update(q, np.zeros(robot.nv))
+    height = float(robot.com[1] - robot.foot_position[:, 1].min())
+    length = _REST_SHARE * height
+    weight = robot.mass * robot.gravity
+    relative = REFERENCE.leg_stiffness * REFERENCE.rest_length
+    relative /= REFERENCE.mass * REFERENCE.gravity
+    return SlipParameters(robot.mass, robot.gravity, length, relative * weight / length)
