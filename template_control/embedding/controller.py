@@ -4,6 +4,11 @@ It stands in a node of the automaton, moves along the automaton's edges when the
 fires them, plans at VLO (and re-plans where a foot has landed), and turns the plan into
 references for the whole-body QP, parameterised by the direction from the rear stance foot
 to the CoM (beta of Section V-B).
+
+The legs' swing makes the robot's CoM run ahead of the template and fall back behind it within
+a step, while its angular momentum about the foot, on which all forces depend, stays the
+template's. So beta is taken to the point that moves with dx/dt + L / (m y), L the angular
+momentum about the CoM: it starts in the CoM at every plan, and leads or lags it by centimetres.
 """
 
 from __future__ import annotations
@@ -95,6 +100,7 @@ class EmbeddingController:
         rear, front: indices of the feet; in single stance the rear one carries.
         planning: the step's decision and the path that follows it.
         reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
+        lead: of the point whose direction is the phase over the CoM [m].
         template_forces: (2, 2) leg forces of the template at this phase [N], rear and front.
         swing: reference of the swing foot.
     """
@@ -116,6 +122,7 @@ class EmbeddingController:
         self.reference = np.zeros(6)
         self.template_forces = np.zeros((2, 2))
         self.phase_time = 0.0
+        self.lead = 0.0
         self.time = 0.0
         self._sensed = Sensed(np.zeros(4), np.zeros(2))
         self._rows = {
@@ -167,13 +174,15 @@ class EmbeddingController:
             self._sensed.state[2] - self.reference[2], self.phase_time, self.time
         ):
             self.planning.reconsider(self.node, self._sensed, self.time)
-            self.phase_time = 0.0
-        x, y = self._sensed.state[0] - self._sensed.toes[0], self._sensed.state[1]
+            self._on_new_path()
+        s = self._sensed
+        x, y = s.state[0] + self.lead - s.toes[0], s.state[1]
         path, toe = self.planning.path, self.planning.toe
         self.phase_time, row = at_phase(
             path.cx, path.cy, path.meta, toe, x, y, self.phase_time + dt, self.reference
         )
-        self._track_com(x, y, dt)
+        self.lead += (s.state[2] - r.com_velocity[0]) * dt
+        self._track_com(s.state[0] - s.toes[0], y, dt)
         trunk = self.options.gains.trunk
         self.tasks.desired[Row.TRUNK] = pd(
             0.0, self.options.trunk_pitch, 0.0, q[2], v[2], trunk[0], trunk[1]
@@ -224,7 +233,7 @@ class EmbeddingController:
                 self._lift_off()
             elif edge.reset is Reset.PLACE_FRONT:
                 self.planning.follow(self.node, self._sensed, self.time)
-                self.phase_time = 0.0
+                self._on_new_path()
             if edge.section:
                 self._decide()
             return
@@ -242,7 +251,11 @@ class EmbeddingController:
         if self.steps:
             self.load.end_step()
         self.planning.decide(self.node, self._sensed, self.time, self.load.factor)
-        self.phase_time = 0.0
+        self._on_new_path()
+
+    def _on_new_path(self) -> None:
+        """The path starts where the robot is."""
+        self.phase_time = self.lead = 0.0
 
     # -- control ----------------------------------------------------------------------
 
