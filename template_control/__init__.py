@@ -22,7 +22,9 @@ from template_control.errors import (
     TemplateControlError,
 )
 from template_control.plant.bullet import PlantOptions
+from template_control.plant.ground import GroundStep
 from template_control.plant.record import Record
+from template_control.plant.sensing import SensorOptions
 from template_control.plant.simulation import Push, SimulationOptions, perturbed_start, simulate
 from template_control.plant.summary import summarise
 from template_control.robot.library import ROBOTS, load_robot
@@ -58,6 +60,7 @@ __all__ = [
     "EmbeddingOptions",
     "Event",
     "GaitError",
+    "GroundStep",
     "LqrOptions",
     "LqrPlanner",
     "MapKind",
@@ -79,6 +82,7 @@ __all__ = [
     "ScenarioError",
     "ScenarioRecord",
     "Segment",
+    "SensorOptions",
     "SimulationOptions",
     "SlipParameters",
     "Slot",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
+from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import stdout_discarded
 from template_control.robot.planar_biped import BASE_DOF, PlanarBiped
 
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 
 # By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
+_BOX = (1000.0, 1.0, 1.0)  # half sides of a step's box [m]
 
 
 def _load(urdf: str, client: int) -> int:
@@ -31,6 +33,26 @@ def _load(urdf: str, client: int) -> int:
     return int(body)
 
 
+def _ground_bodies(step: GroundStep | None, client: int) -> tuple[int, ...]:
+    """The ground: a plane at the lower level, and a long box up to the higher one."""
+    p = pybullet
+
+    def body(shape: int, position: tuple[float, float, float]) -> int:
+        made = p.createMultiBody(0, shape, basePosition=position, physicsClientId=client)
+        return int(made)
+
+    plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client)
+    if step is None:
+        return (body(plane, (0.0, 0.0, 0.0)),)
+    side = 1.0 if step.height > 0.0 else -1.0  # of the edge, where the ground is higher
+    box = p.createCollisionShape(p.GEOM_BOX, halfExtents=_BOX, physicsClientId=client)
+    top = max(step.height, 0.0)
+    return (
+        body(plane, (0.0, 0.0, min(step.height, 0.0))),
+        body(box, (step.x + side * _BOX[0], 0.0, top - _BOX[2])),
+    )
+
+
 @dataclass(frozen=True)
 class PlantOptions:
     """What the world is like.
@@ -39,11 +61,13 @@ class PlantOptions:
         friction: Coulomb coefficient between foot and ground.
         time_step: physics step [s].
         mass_scale: every link's mass and inertia times this (the controller is not told).
+        ground_step: a step of the ground (the controller is not told); None for flat ground.
     """
 
     friction: float = 0.7
     time_step: float = 1e-3
     mass_scale: float = 1.0
+    ground_step: GroundStep | None = None
 
     def __post_init__(self) -> None:
         for name in ("friction", "time_step", "mass_scale"):
@@ -51,13 +75,17 @@ class PlantOptions:
             if not (np.isfinite(value) and value > 0.0):
                 raise ParameterError(f"plant option {name} is {value!r}: give a positive number")
 
+    def ground_height(self, x: float) -> float:
+        """Height of the ground at ``x`` [m]."""
+        return self.ground_step.height_at(x) if self.ground_step is not None else 0.0
+
 
 class BulletPlant:
-    """A PyBullet world in DIRECT mode with flat ground at height 0 and one robot.
+    """A PyBullet world in DIRECT mode with ground at height 0, maybe a step, and one robot.
 
     Args:
         robot: whose URDF to load and whose joint order to speak.
-        options: friction, physics step, mass error.
+        options: friction, physics step, mass error, step of the ground.
 
     Attributes:
         client, body: PyBullet's handles of the world and the robot.
@@ -71,8 +99,7 @@ class BulletPlant:
         p, c = pybullet, self.client
         p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
         p.setTimeStep(options.time_step, physicsClientId=c)
-        plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=c)
-        self._ground = p.createMultiBody(0, plane, physicsClientId=c)
+        self._ground = _ground_bodies(options.ground_step, c)
         self.body = _load(robot.urdf, c)
         info = [
             p.getJointInfo(self.body, i, physicsClientId=c)
@@ -92,8 +119,9 @@ class BulletPlant:
         p, c, body = pybullet, self.client, self.body
         friction = self.options.friction
         # One property a call: a combined call silently drops some of them.
-        p.changeDynamics(self._ground, -1, lateralFriction=1.0, physicsClientId=c)
-        p.changeDynamics(self._ground, -1, restitution=0.0, physicsClientId=c)
+        for ground in self._ground:
+            p.changeDynamics(ground, -1, lateralFriction=1.0, physicsClientId=c)
+            p.changeDynamics(ground, -1, restitution=0.0, physicsClientId=c)
         for link in range(-1, joints):
             for name, value in (
                 ("lateralFriction", friction),  # Bullet multiplies the two bodies' values
@@ -139,21 +167,28 @@ class BulletPlant:
         divided by that step.
         """
         out[:] = 0.0
-        for contact in pybullet.getContactPoints(
-            self.body, self._ground, physicsClientId=self.client
-        ):
-            foot = self._feet.get(contact[3])
+        # Asked for one body, PyBullet turns the normal towards it but not the friction, so
+        # ask for all. Whatever touches the robot is ground: it does not collide with itself.
+        for contact in pybullet.getContactPoints(physicsClientId=self.client):
+            sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
+            foot = self._feet.get(link)
             if foot is None:
                 continue
-            out[foot, 1] += contact[9]
-            out[foot, 0] += contact[10] * contact[11][0] + contact[12] * contact[13][0]
+            # Normal force and direction (a step's wall pushes sideways), two of friction.
+            for i, axis in enumerate((0, 2)):
+                out[foot, i] += sign * (
+                    contact[9] * contact[7][axis]
+                    + contact[10] * contact[11][axis]
+                    + contact[12] * contact[13][axis]
+                )
 
     def trunk_touches_ground(self) -> bool:
         """True where the trunk itself lies on the ground."""
-        return bool(
+        return any(
             pybullet.getContactPoints(
-                self.body, self._ground, self._trunk, -1, physicsClientId=self.client
+                self.body, ground, self._trunk, -1, physicsClientId=self.client
             )
+            for ground in self._ground
         )
 
     def step(self, torque: Array, push: float = 0.0) -> None:

@@ -25,8 +25,9 @@ class Record:
 
     Attributes:
         time: (T,) [s].
-        q, v: (T, nv) measured configuration and velocity.
-        torque: (T, nu) joint torques applied after the sample [N m].
+        q, v: (T, nv) true configuration and velocity, without the noise of the sensors.
+        torque: (T, nu) joint torques computed at the sample, applied right after it, or the
+            options' ``delay`` later [N m].
         com, com_velocity: (T, 2).
         angular_momentum: (T,) about the CoM, forward pitch positive [kg m^2/s].
         template_com, template_velocity: (T, 2) the template at the robot's phase.
@@ -41,7 +42,8 @@ class Record:
         swing_reference: (T, 2) position of the swing foot's reference.
         push: (T,) disturbance on the trunk [N].
         vlo_time: (S,) time of each VLO, the start's included.
-        vlo_state: (S, 3) dx/dt (angular-momentum based), y, dy/dt.
+        vlo_state: (S, 3) dx/dt (angular-momentum based), y over the stance foot, dy/dt, as
+            measured.
         vlo_predicted: (S, 3) state the planner expected at the next VLO.
         vlo_controls: (S, 5) controls of the step that begins, by Slot.
         vlo_offset: (S, 3) the planner's offset estimate.

@@ -18,6 +18,7 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.record import Record
 from template_control.plant.recorder import Recorder
+from template_control.plant.sensing import SensorOptions, Sensors, TorqueDelay
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON
 from template_control.slip.gait import WalkingGait
@@ -28,6 +29,7 @@ _CONTACT_FORCE = 0.005  # of the weight: what a foot must carry to count as touc
 _FALL_HEIGHT = 0.35  # of the template's rest length: hip nearer to the ground than that
 _FALL_PITCH = np.radians(60.0)
 _PATIENCE = 4.0  # step durations without a VLO
+_LONGEST_DELAY = 1.0  # [s]
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,10 @@ class SimulationOptions:
         embedding: the controller's tuning.
         start: (3,) VLO state to start in; None for the gait's.
         pushes: disturbances.
+        sensors: noise on the state the controller gets; the plant and the record have the
+            true one.
+        delay: from a measurement to the torques computed from it [s], a whole number of
+            physics steps.
         record_every: keep every n-th sample.
     """
 
@@ -65,6 +71,8 @@ class SimulationOptions:
     embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
     start: tuple[float, float, float] | None = None
     pushes: tuple[Push, ...] = ()
+    sensors: SensorOptions = field(default_factory=SensorOptions)
+    delay: float = 0.0
     record_every: int = 1
 
     def __post_init__(self) -> None:
@@ -72,6 +80,18 @@ class SimulationOptions:
             raise ParameterError(f"steps is {self.steps}: give at least 1")
         if self.record_every < 1:
             raise ParameterError(f"record_every is {self.record_every}: give at least 1")
+        step = self.plant.time_step
+        whole = np.isfinite(self.delay) and abs(self.delay / step - self.delay_ticks) < 1e-6
+        if not (whole and 0.0 <= self.delay <= _LONGEST_DELAY):
+            raise ParameterError(
+                f"delay is {self.delay!r} s: give a multiple of the time step, {step:g} s, from 0"
+                f" to {_LONGEST_DELAY:g} s"
+            )
+
+    @property
+    def delay_ticks(self) -> int:
+        """The delay in physics steps."""
+        return round(self.delay / self.plant.time_step) if np.isfinite(self.delay) else 0
 
 
 def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:
@@ -138,6 +158,7 @@ def _loop(
     """Run until the steps are done ("") or the robot falls (why)."""
     robot, gait = controller.robot, controller.planner.gait
     dt = o.plant.time_step
+    sensors, delay = Sensors(o.sensors, robot, length), TorqueDelay(o.delay_ticks)
     q, v, forces = np.zeros(robot.nv), np.zeros(robot.nv), np.zeros((2, 2))
     threshold = _CONTACT_FORCE * robot.mass * robot.gravity
     patience = _PATIENCE * gait.step_duration
@@ -148,20 +169,22 @@ def _loop(
         plant.contact_forces(forces)
         start = time.perf_counter()
         try:
-            solution = controller.tick(q, v, forces[:, 1] > threshold, dt)
+            solution = controller.tick(*sensors.measure(q, v), forces[:, 1] > threshold, dt)
         except ParameterError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start
+        if sensors.noisy:
+            robot.update(q, v)  # what is recorded is true
         push = _push(o.pushes, controller, gait.step_duration, now)
         recorder.tick(now, q, v, forces, solution, push, seconds)
-        reason = _fallen(plant, controller, q, length, patience, now)
+        reason = _fallen(plant, controller, q, o.plant.ground_height(q[0]), length, patience, now)
         if reason:
             return f"{reason} at {now:.3f} s, in step {done + 1}"
         if len(controller.steps) - 1 > done:
             done = len(controller.steps) - 1
             if progress is not None:
                 progress(done)
-        plant.step(solution.torque, push)
+        plant.step(delay.pass_on(solution.torque), push)
         tick += 1
     return ""
 
@@ -183,13 +206,14 @@ def _fallen(
     plant: BulletPlant,
     controller: EmbeddingController,
     q: Array,
+    ground: float,
     length: float,
     patience: float,
     now: float,
 ) -> str:
-    robot = controller.robot
-    if robot.hip_height(q) < _FALL_HEIGHT * length:
-        return f"the hip was {robot.hip_height(q):.2f} m above the ground"
+    hip = controller.robot.hip_height(q) - ground
+    if hip < _FALL_HEIGHT * length:
+        return f"the hip was {hip:.2f} m above the ground"
     if abs(q[2]) > _FALL_PITCH:
         return f"the trunk pitched to {np.degrees(q[2]):.0f} degrees"
     if now - controller.steps[-1].time > patience:

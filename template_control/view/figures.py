@@ -46,6 +46,18 @@ def _shade(axes: Axes, record: Record, w: slice) -> None:
     axes.margins(x=0)
 
 
+def _ground(axes: Axes, record: Record) -> None:
+    """A line along the ground, with its step where it is in sight."""
+    step = record.metadata["options"]["plant"].get("ground_step")
+    low, high = axes.get_xlim()
+    x, y = [low, high], [0.0, 0.0]
+    if step is not None:
+        edge = min(max(step["x"], low), high)
+        x, y = [low, edge, edge, high], [0.0, 0.0, step["height"], step["height"]]
+    axes.plot(x, y, color="0.3", linewidth=0.8)
+    axes.set_xlim(low, high)
+
+
 def stick_diagram(record: Record, seconds: float = _WINDOW, interval: float = 0.06) -> Figure:
     """The robot every ``interval`` seconds with its CoM and the template's path (Fig. 12)."""
     w = _window(record, seconds)
@@ -67,7 +79,7 @@ def stick_diagram(record: Record, seconds: float = _WINDOW, interval: float = 0.
     axes.plot(*record.com[rows].T, "o", color=COM, markersize=3.5, label="robot CoM")
     for foot, name in enumerate(("left leg", "right leg")):
         axes.plot([], [], color=_LEGS[foot], label=name)
-    axes.axhline(0.0, color="0.3", linewidth=0.8)
+    _ground(axes, record)
     axes.set(xlabel="x [m]", ylabel="y [m]", title=f"{record.metadata['robot']}: stick diagram")
     axes.set_aspect("equal")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4, frameon=False)

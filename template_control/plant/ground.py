@@ -1,0 +1,68 @@
+"""The ground a robot walks on: flat, or with one step it is not told of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from template_control.errors import ParameterError
+from template_control.slip.gait import WalkingGait
+
+_HIGHEST = 1.0  # [m]
+_FARTHEST = 1000.0  # [m]
+
+
+@dataclass(frozen=True)
+class GroundStep:
+    """A single step of the ground: at height 0 before ``x``, at ``height`` from there on.
+
+    The edge is a vertical wall, on which a foot can trip; place it between footholds, as
+    :meth:`at_step` does.
+
+    Attributes:
+        height: up positive [m].
+        x: of the edge [m]; a run begins with the stance foot at x = 0.
+
+    Raises:
+        ParameterError: if the height is 0 or more than 1 m, or x is not within 0 to 1000 m.
+    """
+
+    height: float
+    x: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.height) and 0.0 < abs(self.height) <= _HIGHEST):
+            raise ParameterError(
+                f"ground step height is {self.height!r} m: give a number other than 0 from"
+                f" {-_HIGHEST:g} to {_HIGHEST:g}"
+            )
+        if not (np.isfinite(self.x) and 0.0 < self.x <= _FARTHEST):
+            raise ParameterError(
+                f"ground step x is {self.x!r} m: give a number above 0, where the robot starts,"
+                f" up to {_FARTHEST:g}"
+            )
+
+    @classmethod
+    def at_step(cls, gait: WalkingGait, height: float, step: int, share: float = 0.5) -> GroundStep:
+        """The step that the robot meets when it treads on its ``step``-th foothold.
+
+        Args:
+            gait: its footholds are at multiples of the step length, the first stance foot
+                (number 0) at x = 0.
+            height: up positive [m].
+            step: number of the first foothold beyond the edge, at least 1.
+            share: of the way from the foothold before to that one, where the edge is.
+
+        Raises:
+            ParameterError: if a number is out of its range.
+        """
+        if step < 1:
+            raise ParameterError(f"foothold is {step}: give at least 1")
+        if not 0.0 < share < 1.0:
+            raise ParameterError(f"share is {share!r}: give a number between 0 and 1")
+        return cls(height, (step - 1 + share) * gait.step_length)
+
+    def height_at(self, x: float) -> float:
+        """Height of the ground at ``x`` [m]."""
+        return self.height if x >= self.x else 0.0

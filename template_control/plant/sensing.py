@@ -1,0 +1,85 @@
+"""What the controller gets to know of the state, and when its torques take effect."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import ParameterError
+from template_control.robot.planar_biped import PlanarBiped
+
+Array = NDArray[np.float64]
+
+_TRANSLATIONS = 2  # the base's x and y come first
+
+
+@dataclass(frozen=True)
+class SensorOptions:
+    """White Gaussian noise on the measured state, drawn anew at every tick.
+
+    Attributes:
+        position_noise: standard deviation of the pitch and of every joint's angle [rad]; of
+            the base's x and y it is this times the template's rest length [m].
+        velocity_noise: the same of the velocities [rad/s], [m/s].
+        seed: of the draws.
+
+    Raises:
+        ParameterError: if a number is negative or not finite.
+    """
+
+    position_noise: float = 0.0
+    velocity_noise: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("position_noise", "velocity_noise", "seed"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise ParameterError(f"sensor option {name} is {value!r}: give 0 or more")
+
+
+class Sensors:
+    """Measures the state of a robot.
+
+    Args:
+        options: the noise.
+        robot: whose state.
+        length: rest length of the template [m].
+    """
+
+    def __init__(self, options: SensorOptions, robot: PlanarBiped, length: float) -> None:
+        self.noisy = options.position_noise > 0.0 or options.velocity_noise > 0.0
+        self._draws = np.random.default_rng(options.seed)
+        scale = np.ones(robot.nv)
+        scale[:_TRANSLATIONS] = length
+        self._deviation = np.outer((options.position_noise, options.velocity_noise), scale)
+
+    def measure(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """The measured configuration and velocity (nv,); the true ones are left alone."""
+        if not self.noisy:
+            return q, v
+        noise = self._deviation * self._draws.standard_normal(self._deviation.shape)
+        return q + noise[0], v + noise[1]
+
+
+class TorqueDelay:
+    """Torques that take effect some ticks after the measurement they were computed from.
+
+    Until the first one is due, it is held.
+
+    Args:
+        ticks: how many.
+    """
+
+    def __init__(self, ticks: int) -> None:
+        self._line: deque[Array] = deque(maxlen=ticks + 1)
+
+    def pass_on(self, torque: Array) -> Array:
+        """Take this tick's torques (nu,); returns those that act now."""
+        self._line.append(torque.copy())
+        while len(self._line) < (self._line.maxlen or 0):
+            self._line.append(self._line[0])
+        return self._line[0]
