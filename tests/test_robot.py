@@ -1,4 +1,4 @@
-"""The five-link model: physics, agreement with PyBullet, and what is refused."""
+"""The robots' models: physics, agreement with PyBullet, and what is refused."""
 
 from pathlib import Path
 
@@ -9,8 +9,13 @@ import pytest
 
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions
-from template_control.robot.library import load_robot, robot_path
+from template_control.robot.library import ROBOTS, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
+
+
+@pytest.fixture(params=ROBOTS)
+def any_robot(request):
+    return load_robot(request.param)
 
 
 def test_masses_and_limits_are_those_of_the_readme(robot):
@@ -21,8 +26,8 @@ def test_masses_and_limits_are_those_of_the_readme(robot):
     assert robot.foot_radius == 0.01
 
 
-def test_inertias_are_physically_valid(robot):
-    for inertia in robot.model.inertias:
+def test_inertias_are_physically_valid(any_robot):
+    for inertia in any_robot.model.inertias:
         if inertia.mass == 0.0:
             continue
         principal = np.linalg.eigvalsh(inertia.inertia)
@@ -38,47 +43,47 @@ def differentiate(robot, read, q, v, h=1e-6):
     return (ahead - np.copy(read())) / (2 * h)
 
 
-def test_jacobians_and_biases_match_finite_differences(robot, random_states):
+def test_jacobians_and_biases_match_finite_differences(any_robot, random_states):
     for q, v in random_states:
-        com_bias = differentiate(robot, lambda: robot.com_velocity, q, v)
-        momentum_rate = differentiate(robot, lambda: robot.angular_momentum, q, v)
-        com_velocity = differentiate(robot, lambda: robot.com, q, v)
-        robot.update(q, v)
-        np.testing.assert_allclose(robot.com_velocity, com_velocity, atol=1e-7)
-        np.testing.assert_allclose(robot.com_jacobian @ v, robot.com_velocity, atol=1e-12)
-        np.testing.assert_allclose(robot.com_bias, com_bias, atol=1e-6)
-        assert robot.angular_momentum_bias == pytest.approx(momentum_rate, abs=1e-6)
-        momentum = robot.angular_momentum_jacobian @ v
-        assert momentum == pytest.approx(robot.angular_momentum, abs=1e-12)
+        com_bias = differentiate(any_robot, lambda: any_robot.com_velocity, q, v)
+        momentum_rate = differentiate(any_robot, lambda: any_robot.angular_momentum, q, v)
+        com_velocity = differentiate(any_robot, lambda: any_robot.com, q, v)
+        any_robot.update(q, v)
+        np.testing.assert_allclose(any_robot.com_velocity, com_velocity, atol=1e-7)
+        np.testing.assert_allclose(any_robot.com_jacobian @ v, any_robot.com_velocity, atol=1e-12)
+        np.testing.assert_allclose(any_robot.com_bias, com_bias, atol=1e-6)
+        assert any_robot.angular_momentum_bias == pytest.approx(momentum_rate, abs=1e-6)
+        momentum = any_robot.angular_momentum_jacobian @ v
+        assert momentum == pytest.approx(any_robot.angular_momentum, abs=1e-12)
 
 
-def test_foot_rows_are_those_of_a_rolling_sphere(robot, random_states):
+def test_foot_rows_are_those_of_a_rolling_sphere(any_robot, random_states):
     for q, v in random_states:
-        foot = differentiate(robot, lambda: robot.foot_velocity, q, v)
-        lowest = differentiate(robot, lambda: robot.foot_position, q, v)
-        robot.update(q, v)
-        np.testing.assert_allclose(robot.foot_bias, foot, atol=1e-5)
-        for i, leg in enumerate(robot.legs):
+        foot = differentiate(any_robot, lambda: any_robot.foot_velocity, q, v)
+        lowest = differentiate(any_robot, lambda: any_robot.foot_position, q, v)
+        any_robot.update(q, v)
+        np.testing.assert_allclose(any_robot.foot_bias, foot, atol=1e-5)
+        for i, leg in enumerate(any_robot.legs):
             pitch_rate = v[2] + sum(v[3 + j] for j in leg)
-            rolling = lowest[i] - [robot.foot_radius * pitch_rate, 0.0]
-            np.testing.assert_allclose(robot.foot_velocity[i], rolling, atol=1e-7)
+            rolling = lowest[i] - [any_robot.foot_radius * pitch_rate, 0.0]
+            np.testing.assert_allclose(any_robot.foot_velocity[i], rolling, atol=1e-7)
 
 
-def test_mass_matrix_and_bias_forces_agree_with_pybullet(robot, random_states):
-    with BulletPlant(robot, PlantOptions()) as plant:
+def test_mass_matrix_and_bias_forces_agree_with_pybullet(any_robot, random_states):
+    with BulletPlant(any_robot, PlantOptions()) as plant:
         client, body, joints = plant.client, plant.body, plant.joints
         order = np.argsort(joints)  # PyBullet speaks the file's order
         for q, v in random_states:
-            robot.update(q, v)
+            any_robot.update(q, v)
             file_q, file_v = q[order].tolist(), v[order].tolist()
             mass = pybullet.calculateMassMatrix(body, file_q, physicsClientId=client)
             bias = pybullet.calculateInverseDynamics(
                 body, file_q, file_v, [0.0] * 7, physicsClientId=client
             )
             np.testing.assert_allclose(
-                np.array(mass), robot.mass_matrix[np.ix_(order, order)], atol=1e-8
+                np.array(mass), any_robot.mass_matrix[np.ix_(order, order)], atol=1e-8
             )
-            np.testing.assert_allclose(bias, robot.nonlinear_effects[order], atol=1e-8)
+            np.testing.assert_allclose(bias, any_robot.nonlinear_effects[order], atol=1e-8)
 
 
 FLIGHT_Q = np.array([0.0, 3.0, 0.1, -0.5, 0.8, 0.2, 0.9])

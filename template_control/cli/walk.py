@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from template_control.cli.output import progress_bar, writable
+from template_control.cli.robot_options import add_robot_options, robot_from
 from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.modified import ModifiedPlanner
@@ -23,9 +24,8 @@ from template_control.plant.quiet import stdout_to_stderr
 from template_control.plant.record import Record
 from template_control.plant.simulation import SimulationOptions, perturbed_start, simulate
 from template_control.plant.summary import summarise
-from template_control.robot.library import ROBOTS, load_robot
+from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.gait import WalkingGait, gait_for_speed
-from template_control.slip.parameters import SlipParameters
 from template_control.view.figures import save_figures
 
 INTERRUPTED = 130  # exit status after Ctrl-C, as shells have it
@@ -50,25 +50,21 @@ def add_parser(commands: Any) -> None:
         ),
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
-    parser.add_argument(
-        "--robot",
-        default="five-link",
-        metavar="NAME|URDF",
-        help=f"a shipped robot ({', '.join(ROBOTS)}) or the path of a planar URDF",
-    )
+    add_robot_options(parser)
     parser.add_argument("--steps", type=int, default=50, help="steps to walk, VLO to VLO")
     parser.add_argument(
         "--gait",
         choices=("walk", "paper"),
         default="walk",
-        help="walk: touchdown angle 66 deg, 1.1 m/s at VLO; paper: the equilibrium of"
-        " Section IV-D, 0.9818 m and 826 J",
+        help="walk: the robot's own, for most touchdown angle 66 deg and 1.1 m/s at VLO;"
+        " paper: the equilibrium of Section IV-D, 0.9818 m and 826 J; both are given for l0 = 1 m"
+        " and 80 kg and scaled to the robot",
     )
     parser.add_argument(
         "--speed",
         type=float,
         metavar="M/S",
-        help="mean forward speed of the gait instead of the walk gait's own 1.21 m/s",
+        help="mean forward speed of the gait instead of the walk gait's own",
     )
     parser.add_argument(
         "--planner",
@@ -115,9 +111,8 @@ def run(options: argparse.Namespace) -> int:
     """Walk as told; returns 0, 1 after a fall, 130 after Ctrl-C."""
     _check(options)
     folder = writable(options.output)
-    robot = load_robot(options.robot)
-    parameters = template_for(robot)
-    gait = _gait(options, parameters)
+    robot = robot_from(options)
+    gait = _gait(options, robot)
     planner: Planner = _PLANNERS[options.planner](gait)
     every = options.record_every or (1 if options.steps <= _LONG else 5)
     simulation = SimulationOptions(
@@ -171,12 +166,12 @@ def _check(options: argparse.Namespace) -> None:
         raise ParameterError(f"--speed does not go with --gait {options.gait}: leave one out")
 
 
-def _gait(options: argparse.Namespace, parameters: SlipParameters) -> WalkingGait:
+def _gait(options: argparse.Namespace, robot: PlanarBiped) -> WalkingGait:
     if options.gait == "paper":
-        return paper_gait(parameters)
+        return paper_gait(template_for(robot))
     if options.speed is not None:
-        return gait_for_speed(parameters, options.speed)
-    return default_gait(parameters)
+        return gait_for_speed(template_for(robot), options.speed)
+    return default_gait(robot)
 
 
 def print_table(figures: dict[str, Any], record: Record) -> None:
@@ -208,7 +203,7 @@ def print_table(figures: dict[str, Any], record: Record) -> None:
     for joint, torque in figures["joint_torque"].items():
         row(
             f"{joint} torque, peak / RMS of limit",
-            f"{torque['peak']:.0f} / {torque['rms']:.0f} of {torque['limit']:.0f} N m",
+            f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g} N m",
         )
     row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
     row("QP failures", f"{figures['qp_failures']}")

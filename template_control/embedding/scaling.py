@@ -19,7 +19,9 @@ from template_control.slip.parameters import SlipParameters
 from template_control.whole_body.tasks import Gains, Weights
 
 REFERENCE = SlipParameters()
-_REST_SHARE = 1.0 / 1.109  # of the CoM's height over straight legs: five-link's 1 m
+_TOUCHDOWN = float(np.radians(66.0))
+_WALK = (_TOUCHDOWN, 1.1 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length)))
+_STRETCH = 0.903514524055713  # of the straight leg at touchdown, as five-link with l0 = 1 m
 
 
 @dataclass(frozen=True)
@@ -84,9 +86,16 @@ class Scale:
         return ReplanOptions(options.speed * self.speed, options.interval * self.time)
 
 
-def default_gait(parameters: SlipParameters) -> WalkingGait:
-    """The walk that suits most robots: touchdown angle 66 degrees, 1.1 m/s for l0 = 1 m."""
-    return gait_at(parameters, np.radians(66.0), 1.1 * Scale.of(parameters).speed)
+def default_gait(robot: PlanarBiped) -> WalkingGait:
+    """The robot's walk: its own if it has one, else 66 degrees and 1.1 m/s for l0 = 1 m.
+
+    Args:
+        robot: its last update is overwritten.
+    """
+    parameters = template_for(robot)
+    angle, speed = robot.walk or _WALK
+    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    return gait_at(parameters, angle, float(speed * unit))
 
 
 def paper_gait(parameters: SlipParameters) -> WalkingGait:
@@ -99,8 +108,8 @@ def paper_gait(parameters: SlipParameters) -> WalkingGait:
 def template_for(robot: PlanarBiped) -> SlipParameters:
     """The reference template scaled to a robot's mass and legs by dynamic similarity.
 
-    l0 is a fixed share of the height of the CoM over the feet with straight legs; the
-    stiffness keeps k l0 / (m g).
+    l0 is such that the leg is stretched as far at the default gait's touchdown as the
+    five-link robot's, whose CoM is 1 m from its foot then; the stiffness keeps k l0 / (m g).
 
     Args:
         robot: its last update is overwritten.
@@ -109,8 +118,10 @@ def template_for(robot: PlanarBiped) -> SlipParameters:
     for leg in robot.legs:
         q[[BASE_DOF + joint for joint in leg]] = 0.0
     robot.update(q, np.zeros(robot.nv))
-    height = float(robot.com[1] - robot.foot_position[:, 1].min())
-    length = _REST_SHARE * height
+    above_hip = float(robot.com[1] - robot.hip_height(q))
+    reach = _STRETCH * (robot.leg_length + robot.foot_radius)
+    sine, cosine = float(np.sin(_TOUCHDOWN)), float(np.cos(_TOUCHDOWN))
+    length = above_hip * sine + float(np.sqrt(reach**2 - (above_hip * cosine) ** 2))
     weight = robot.mass * robot.gravity
     relative = REFERENCE.leg_stiffness * REFERENCE.rest_length
     relative /= REFERENCE.mass * REFERENCE.gravity

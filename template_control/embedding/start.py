@@ -33,16 +33,20 @@ def state_at_vlo(
     Raises:
         RobotError: if the legs do not reach.
     """
-    if robot.nv != _OUTPUTS:
-        raise RobotError(
-            f"{robot.name} has {robot.nv} coordinates: only five-link bipeds start here"
-        )
     swing = 1 - stance
     q = np.zeros(robot.nv)
     q[1] = 0.8 * z[1]
     q[2] = pitch
     for leg in robot.legs:
-        q[[BASE_DOF + leg[0], BASE_DOF + leg[1]]] = -0.4, 0.8
+        # Knees forward, unless the knee's range says otherwise.
+        hip, knee = (BASE_DOF + joint for joint in leg)
+        sign = robot.joint_sign[[*leg]]
+        model = robot.model
+        ranges = sign * (
+            model.lowerPositionLimit[[hip, knee]] + model.upperPositionLimit[[hip, knee]]
+        )
+        bend = 1.0 if ranges[1] >= 0.0 else -1.0
+        q[[hip, knee]] = bend * sign * [-0.4, 0.8]
     zero = np.zeros(robot.nv)
 
     def residual() -> Array:
@@ -64,7 +68,9 @@ def state_at_vlo(
             rows[3 + 2 * i : 5 + 2 * i] = robot.foot_jacobian[foot]
             # The lowest point's path, not that of the material point which touches there.
             rows[3 + 2 * i, 2] += r
-            rows[3 + 2 * i, [BASE_DOF + j for j in robot.legs[foot]]] += r
+            rows[3 + 2 * i, [BASE_DOF + j for j in robot.legs[foot]]] += (
+                r * robot.joint_sign[[*robot.legs[foot]]]
+            )
         return rows
 
     for _ in range(50):

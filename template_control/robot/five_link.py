@@ -71,7 +71,7 @@ class FiveLink:
 
     def urdf(self) -> str:
         """The robot as URDF text, planar: x, z and pitch unactuated, hinges about +y."""
-        trunk, thigh, shank = self.trunk, self.thigh, self.shank
+        thigh, shank = self.thigh, self.shank
         parts = [
             f"<robot name={quoteattr(self.name)}>",
             *(f'<material name="{n}"><color rgba="{c}"/></material>' for n, c in _COLOURS.items()),
@@ -120,7 +120,8 @@ class FiveLink:
 
     def _trunk(self) -> str:
         trunk = self.trunk
-        box = f'<geometry><box size="{0.4 * trunk.length:g} {1.5 * self.hip_width:g} {trunk.length:g}"/></geometry>'
+        size = f"{0.4 * trunk.length:g} {1.5 * self.hip_width:g} {trunk.length:g}"
+        box = f'<geometry><box size="{size}"/></geometry>'
         place = f'<origin xyz="0 0 {0.5 * trunk.length:g}"/>'
         return (
             f'<link name="trunk">{_inertial(trunk, up=True)}\n'

@@ -2,16 +2,60 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from template_control.errors import RobotError
 from template_control.robot.planar_biped import PlanarBiped
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_FILES = {"five-link": "five_link.urdf"}
 
-ROBOTS: tuple[str, ...] = tuple(_FILES)
-"""Names that :func:`load_robot` knows."""
+
+@dataclass(frozen=True)
+class _Entry:
+    """Where a robot's URDF is, and how it is loaded.
+
+    Attributes:
+        file: name of the URDF.
+        about: one line.
+        distribution: the Python package that brings the URDF; "" for ours.
+        feet, sagittal_joints, foot_radius, walk: see :meth:`PlanarBiped.from_urdf`.
+    """
+
+    file: str
+    about: str
+    distribution: str = ""
+    feet: tuple[str, str] = ("left_foot", "right_foot")
+    sagittal_joints: tuple[str, ...] = ()
+    foot_radius: float | None = None
+    walk: tuple[float, float] | None = None
+
+
+_ENTRIES = {
+    "five-link": _Entry("five_link.urdf", "light legs, as robots built for the SLIP have them"),
+    "human": _Entry(
+        "human.urdf", "Winter's fractions of 80 kg and 1.80 m", walk=(np.radians(66.0), 0.303)
+    ),
+    "rabbit": _Entry(
+        "rabbit.urdf",
+        "RABBIT of Grenoble, five links, 62 % of its mass in the legs",
+        walk=(np.radians(68.0), 0.255),
+    ),
+    "bolt": _Entry(
+        "bolt.urdf",
+        "the point-foot biped of example-robot-data, held in its sagittal plane",
+        distribution="example-robot-data",
+        feet=("FL_FOOT", "FR_FOOT"),
+        sagittal_joints=("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE"),
+        foot_radius=0.016,
+    ),
+}
+
+ROBOTS: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
+"""Names that :func:`load_robot` knows, with a line about each."""
 
 
 def robot_path(name: str) -> Path:
@@ -20,13 +64,30 @@ def robot_path(name: str) -> Path:
     Raises:
         RobotError: if there is no such robot.
     """
-    if name not in _FILES:
+    if name not in _ENTRIES:
         raise RobotError(f"there is no robot {name!r}: give one of {list(ROBOTS)} or a URDF file")
-    # A wheel carries the folder inside the package, a checkout beside it.
-    for folder in (_PACKAGE / "robots", _PACKAGE.parent / "robots"):
-        if (folder / _FILES[name]).is_file():
-            return folder / _FILES[name]
-    raise RobotError(f"{_FILES[name]} is missing from this installation: reinstall the library")
+    entry = _ENTRIES[name]
+    if entry.distribution:
+        candidates = _files(entry)
+    else:
+        # A wheel carries the folder inside the package, a checkout beside it.
+        candidates = [root / "robots" / entry.file for root in (_PACKAGE, _PACKAGE.parent)]
+    for path in candidates:
+        if path.is_file():
+            return path
+    raise RobotError(
+        f"{entry.file} is missing from this installation: reinstall"
+        f" {entry.distribution or 'the library'}"
+    )
+
+
+def _files(entry: _Entry) -> list[Path]:
+    """Places of an entry's URDF in the package that brings it."""
+    try:
+        files = importlib.metadata.files(entry.distribution) or []
+    except importlib.metadata.PackageNotFoundError:
+        return []
+    return [Path(str(f.locate())) for f in files if f.name == entry.file]
 
 
 def load_robot(name: str | Path) -> PlanarBiped:
@@ -36,8 +97,13 @@ def load_robot(name: str | Path) -> PlanarBiped:
         RobotError: if there is no such robot or file, or it is no planar biped.
     """
     text = str(name)
-    if text in _FILES:
-        return PlanarBiped.from_urdf(robot_path(text))
-    if text.endswith(".urdf") or "/" in text:
+    if text not in _ENTRIES and (text.endswith(".urdf") or "/" in text):
         return PlanarBiped.from_urdf(text)
-    return PlanarBiped.from_urdf(robot_path(text))
+    path, entry = robot_path(text), _ENTRIES[text]
+    return PlanarBiped.from_urdf(
+        path,
+        entry.feet,
+        entry.sagittal_joints,
+        foot_radius=entry.foot_radius,
+        walk=entry.walk,
+    )

@@ -7,20 +7,21 @@ joint order; all hinges are revolute, so nq = nv.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import ParameterError, RobotError
+from template_control.robot.planarise import planarise
 
 Array = NDArray[np.float64]
 
 BASE_DOF = 3
 _BASE = ("JointModelPX", "JointModelPZ", "JointModelRY")
-_HINGE = "JointModelRY"
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 
@@ -38,11 +39,14 @@ class PlanarBiped:
         gravity: gravitational acceleration [m/s^2].
         feet: names of the two foot frames, left then right.
         foot_radius: radius of the foot spheres [m].
+        walk: touchdown angle [rad] and speed at VLO over sqrt(g l0) of its default gait, or
+            None where none is better than the library's.
         joint_names: actuated joints in the order of q[3:].
         torque_limit: (nv - 3,) URDF ``effort`` [N m].
         velocity_limit: (nv - 3,) URDF ``velocity`` [rad/s].
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
         leg_length: from hip to the foot sphere's centre with a straight knee [m].
+        joint_sign: (nv - 3,) 1 where a joint turns about +y, -1 where it does about -y.
         trunk_com: height of the trunk's own CoM above the hips [m].
 
     Attributes (written by :meth:`update`; views that the next call overwrites):
@@ -65,6 +69,7 @@ class PlanarBiped:
         model: pin.Model,
         feet: tuple[str, str],
         foot_radius: float,
+        walk: tuple[float, float] | None = None,
     ) -> None:
         self.path = path
         self.urdf = urdf
@@ -72,6 +77,7 @@ class PlanarBiped:
         self.name: str = model.name
         self.feet = feet
         self.foot_radius = foot_radius
+        self.walk = walk
         self.nv: int = model.nv
         self.mass = float(pin.computeTotalMass(model))
         self.gravity = float(-model.gravity.linear[2])
@@ -88,6 +94,8 @@ class PlanarBiped:
             + _sagittal(model.frames[foot].placement)
             for leg, foot in zip(self.legs, self._foot_ids, strict=True)
         )
+        axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
+        self.joint_sign: Array = np.array(axes[BASE_DOF:])
         self.trunk_com = float(model.inertias[BASE_DOF].lever[2])
         self._data = model.createData()
         data = self._data
@@ -109,14 +117,26 @@ class PlanarBiped:
 
     @classmethod
     def from_urdf(
-        cls, path: str | Path, feet: Sequence[str] = ("left_foot", "right_foot")
+        cls,
+        path: str | Path,
+        feet: Sequence[str] = ("left_foot", "right_foot"),
+        sagittal_joints: Sequence[str] = (),
+        locked: Mapping[str, float] | None = None,
+        foot_radius: float | None = None,
+        walk: tuple[float, float] | None = None,
     ) -> PlanarBiped:
-        """Load a planar URDF: prismatic x, prismatic z, revolute y, then hinges about y.
+        """Load a planar URDF, or a 3D one that is held in its sagittal plane.
+
+        A planar one has prismatic x, prismatic z, revolute y, then hip and knee of either leg
+        about y. Of a 3D one (x forward, y left, z up) the hips and knees are named.
 
         Args:
             path: the URDF file.
-        urdf: its text, as Pinocchio and PyBullet load it.
             feet: the two foot links; each has one sphere as collision geometry.
+            sagittal_joints: of a 3D URDF, the hips and knees; its other joints are locked.
+            locked: angles [rad] of locked joints; 0 for those not named.
+            foot_radius: of spheres to be put into the feet of a 3D URDF [m].
+            walk: see the attribute.
 
         Raises:
             RobotError: if the file is missing, no URDF, not planar, or lacks a foot.
@@ -124,12 +144,11 @@ class PlanarBiped:
         path = Path(path)
         if not path.is_file():
             raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
-        try:
-            urdf = path.read_text()
-            model = pin.buildModelFromXML(urdf)
-        except (OSError, ValueError, RuntimeError) as error:
-            reason = str(error).strip().splitlines()[0] if str(error).strip() else "unreadable"
-            raise RobotError(f"{path} is no URDF that Pinocchio reads ({reason})") from None
+        urdf = _read(path)
+        if sagittal_joints:
+            tree = ElementTree.fromstring(urdf)
+            urdf = planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
+        model = pin.buildModelFromXML(urdf)
         _check_planar(path, model)
         if len(feet) != 2:
             raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
@@ -138,7 +157,7 @@ class PlanarBiped:
                 links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
                 raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
         radius = _foot_radius(path, urdf, model, feet)
-        return cls(path, urdf, model, (feet[0], feet[1]), radius)
+        return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
 
     def update(self, q: Array, v: Array) -> None:
         """Compute everything the controller needs at (q, v), each quantity once.
@@ -197,6 +216,17 @@ class PlanarBiped:
         return float(q[1])
 
 
+def _read(path: Path) -> str:
+    """Text of a URDF that Pinocchio can read."""
+    try:
+        urdf = path.read_text()
+        pin.buildModelFromXML(urdf)
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else "unreadable"
+        raise RobotError(f"{path} is no URDF that Pinocchio reads ({reason})") from None
+    return urdf
+
+
 def _sagittal(placement: pin.SE3) -> float:
     """Length of a placement's translation in the x-z plane [m]."""
     translation = placement.translation
@@ -210,14 +240,23 @@ def _check_planar(path: Path, model: pin.Model) -> None:
         first = list(zip(names, kinds, strict=True))[:BASE_DOF]
         raise RobotError(
             f"{path} is not planar: its first joints are {first},"
-            " and must be prismatic x, prismatic z, revolute y"
+            " and must be prismatic x, prismatic z, revolute y; of a 3D robot, name the hips and"
+            " knees as sagittal_joints"
         )
-    for name, kind in zip(names[BASE_DOF:], kinds[BASE_DOF:], strict=True):
-        if kind != _HINGE:
+    hinged = all(joint.nq == joint.nv == 1 for joint in model.joints[1:])
+    axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
+    for i, joint in enumerate(model.joints[1:]):
+        lateral = not hinged or abs(abs(axes[i]) - 1.0) < 1e-6
+        if i >= BASE_DOF and not (joint.nq == joint.nv == 1 and lateral):
             raise RobotError(
-                f"{path} is not planar: joint {name!r} is {kind},"
+                f"{path} is not planar: joint {names[i]!r} is {kinds[i]},"
                 " and must be revolute about y (with limits, not continuous)"
             )
+    if model.nv != BASE_DOF + 4:
+        raise RobotError(
+            f"{path}: {model.nv - BASE_DOF} hinges in its legs: a hip and a knee each is what is"
+            " controlled; name these four as sagittal_joints"
+        )
     limits = np.array(model.effortLimit[BASE_DOF:])
     for name, limit in zip(names[BASE_DOF:], limits, strict=True):
         if not 0.0 < limit < _UNLIMITED:

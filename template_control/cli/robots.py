@@ -1,0 +1,79 @@
+"""``template-control robots``: the robots that come with the library."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from template_control.embedding.scaling import default_gait
+from template_control.robot.library import ROBOTS, load_robot
+from template_control.slip.vocabulary import Slot
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command's options."""
+    parser = commands.add_parser(
+        "robots",
+        help="list the shipped robots, with the template scaled to each",
+        description="The shipped robots: mass, legs, limits, scaled template and default gait.",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the list as JSON, and nothing else, on stdout"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """List them."""
+    rows = [_describe(name) for name in ROBOTS]
+    if options.json:
+        print(json.dumps(rows))
+        return 0
+    table = Table(title="robots")
+    columns = ("robot", "mass", "leg", "hip, knee limit", "l0", "k0", "default gait")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right")
+    for row in rows:
+        hip, knee = row["torque_limit"][:2]
+        gait = row["gait"]
+        table.add_row(
+            row["robot"],
+            f"{row['mass']:.4g} kg",
+            f"{row['leg_length']:.3g} m",
+            f"{hip:g}, {knee:g} N m",
+            f"{row['template']['rest_length']:.3f} m",
+            f"{row['template']['leg_stiffness'] / 1e3:.3g} kN/m",
+            f"{gait['touchdown_angle_deg']:.0f} deg, {gait['mean_speed']:.2f} m/s",
+        )
+    console = Console()
+    console.print(table)
+    for row in rows:
+        console.print(f"- {row['robot']}: {row['about']}", highlight=False)
+    return 0
+
+
+def _describe(name: str) -> dict[str, Any]:
+    """A robot in SI units (angles where named so in degrees)."""
+    robot = load_robot(name)
+    gait = default_gait(robot)
+    p = gait.parameters
+    return {
+        "robot": name,
+        "about": ROBOTS[name],
+        "mass": robot.mass,
+        "leg_length": robot.leg_length,
+        "joints": list(robot.joint_names),
+        "torque_limit": robot.torque_limit.tolist(),
+        "velocity_limit": robot.velocity_limit.tolist(),
+        "template": {"rest_length": p.rest_length, "leg_stiffness": p.leg_stiffness},
+        "gait": {
+            "touchdown_angle_deg": float(np.degrees(gait.controls[Slot.TOUCHDOWN_ANGLE])),
+            "vlo_speed": float(gait.vlo[0]),
+            "mean_speed": gait.mean_speed,
+        },
+    }

@@ -1,0 +1,182 @@
+"""A 3D biped held in its sagittal plane: its URDF rewritten as a planar one.
+
+The rewritten text serves Pinocchio, PyBullet and the viewer alike: three base joints (x, z,
+pitch) carry the root link, all joints but the hips and knees are fixed where they are locked,
+and the feet are spheres. What the plane takes away is only what it holds: masses and inertias
+are kept, and forces out of the plane are the guide's.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from template_control.errors import RobotError
+
+Array = NDArray[np.float64]
+
+_BASE = (
+    ("base_x", "prismatic", "1 0 0"),
+    ("base_z", "prismatic", "0 0 1"),
+    ("base_pitch", "revolute", "0 1 0"),
+)
+_WORLD = ("world", "slide_x", "slide_z")
+
+
+def planarise(
+    path: Path,
+    robot: ET.Element,
+    feet: Sequence[str],
+    sagittal_joints: Sequence[str],
+    locked: Mapping[str, float],
+    foot_radius: float | None,
+) -> str:
+    """The text of the planar URDF.
+
+    Args:
+        path: of the 3D URDF, for messages and to find its meshes.
+        robot: its root element; changed.
+        feet: the two foot links.
+        sagittal_joints: hips and knees, the four hinges about the lateral axis that stay.
+        locked: angles [rad] at which other joints are held; 0 for those not named.
+        foot_radius: of spheres to put into the feet [m]; None to keep the feet's own.
+
+    Raises:
+        RobotError: if a joint is missing, or a sagittal joint's axis is not lateral.
+    """
+    joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
+    for name in (*sagittal_joints, *locked):
+        if name not in joints:
+            raise RobotError(f"{path} has no joint {name!r}: its joints are {sorted(joints)}")
+    for name, joint in joints.items():
+        if name not in sagittal_joints and joint.get("type") != "fixed":
+            _fix(joint, locked.get(name, 0.0))
+        elif joint.get("type") == "continuous":
+            _bound(joint)
+    hips = _check_axes(path, robot, sagittal_joints)
+    root = _root_link(robot)
+    _shift(robot, root, hips)
+    _spheres(robot, feet, foot_radius)
+    _find_meshes(path, robot)
+    for link in _WORLD:
+        element = ET.SubElement(robot, "link", name=link)
+        if link != "world":
+            inertial = ET.SubElement(element, "inertial")
+            ET.SubElement(inertial, "mass", value="0")
+            zero = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0")
+            ET.SubElement(inertial, "inertia", zero)
+    for (name, kind, axis), parent, child in zip(_BASE, _WORLD, (*_WORLD[1:], root), strict=True):
+        joint = ET.SubElement(robot, "joint", name=name, type=kind)
+        ET.SubElement(joint, "parent", link=parent)
+        ET.SubElement(joint, "child", link=child)
+        ET.SubElement(joint, "axis", xyz=axis)
+        ET.SubElement(joint, "limit", lower="-1e3", upper="1e3", effort="0", velocity="1e3")
+    return ET.tostring(robot, encoding="unicode")
+
+
+def _parent(joint: ET.Element) -> str:
+    parent = joint.find("parent")
+    return str(parent.get("link")) if parent is not None else ""
+
+
+def _root_link(robot: ET.Element) -> str:
+    """The link that is no joint's child."""
+    children = {child.get("link") for child in robot.findall("joint/child")}
+    roots = [str(link.get("name")) for link in robot.findall("link")]
+    return next((name for name in roots if name not in children), "")
+
+
+def _vector(text: str | None, default: str = "0 0 0") -> Array:
+    return np.array([float(x) for x in (text or default).split()])
+
+
+def _origin(element: ET.Element) -> ET.Element:
+    origin = element.find("origin")
+    return ET.SubElement(element, "origin") if origin is None else origin
+
+
+def _text(vector: Array) -> str:
+    return " ".join(f"{x:.12g}" for x in vector)
+
+
+def _fix(joint: ET.Element, angle: float) -> None:
+    """Turn a hinge into a fixed joint at ``angle`` [rad]."""
+    joint.set("type", "fixed")
+    origin, axis = _origin(joint), joint.find("axis")
+    direction = _vector(axis.get("xyz") if axis is not None else None, "1 0 0")
+    rotation = pin.rpy.rpyToMatrix(_vector(origin.get("rpy"))) @ pin.exp3(direction * angle)
+    origin.set("rpy", _text(pin.rpy.matrixToRpy(rotation)))
+    for name in ("axis", "limit", "dynamics", "mimic"):
+        for element in joint.findall(name):
+            joint.remove(element)
+
+
+def _bound(joint: ET.Element) -> None:
+    """Give a hinge without stops wide ones: an angle is then one number."""
+    joint.set("type", "revolute")
+    limit = joint.find("limit")
+    if limit is not None:
+        limit.set("lower", "-10")
+        limit.set("upper", "10")
+
+
+def _check_axes(path: Path, robot: ET.Element, sagittal: Sequence[str]) -> Array:
+    """Midpoint (3,) of the hips in the root link's frame [m], once all hinges are lateral."""
+    model = pin.buildModelFromXML(ET.tostring(robot, encoding="unicode"))
+    data = model.createData()
+    jacobians = pin.computeJointJacobians(model, data, pin.neutral(model))
+    for name in sagittal:
+        index = model.getJointId(name)
+        axis = jacobians[3:, model.joints[index].idx_v]
+        if abs(abs(axis[1]) - 1.0) > 1e-6:
+            raise RobotError(
+                f"{path}: joint {name!r} turns about {np.round(axis, 3).tolist()} and not about"
+                " the lateral axis y: name hips and knees as sagittal_joints, and lock the others"
+                " where the legs are upright"
+            )
+    hips = [
+        data.oMi[model.getJointId(name)].translation
+        for name in sagittal
+        if model.parents[model.getJointId(name)] == 0
+    ]
+    return np.mean(hips, axis=0)
+
+
+def _shift(robot: ET.Element, root: str, hips: Array) -> None:
+    """Move the root link's frame to the height of the hips, where the pitch joint is."""
+    offset = hips * [1.0, 0.0, 1.0]
+    parts = [e for link in robot.findall("link") if link.get("name") == root for e in link]
+    parts = [e for e in parts if e.tag in ("inertial", "visual", "collision")]
+    parts += [joint for joint in robot.findall("joint") if _parent(joint) == root]
+    for part in parts:
+        origin = _origin(part)
+        origin.set("xyz", _text(_vector(origin.get("xyz")) - offset))
+
+
+def _spheres(robot: ET.Element, feet: Sequence[str], radius: float | None) -> None:
+    """Leave collision shapes to the feet alone, and give them spheres."""
+    for link in robot.findall("link"):
+        foot = link.get("name") in feet
+        for collision in link.findall("collision"):
+            if not foot or radius is not None:
+                link.remove(collision)
+        if foot and radius is not None:
+            geometry = ET.SubElement(ET.SubElement(link, "collision"), "geometry")
+            ET.SubElement(geometry, "sphere", radius=f"{radius:g}")
+
+
+def _find_meshes(path: Path, robot: ET.Element) -> None:
+    """Absolute paths for meshes, so that the text can be read from anywhere."""
+    for mesh in robot.iter("mesh"):
+        name = str(mesh.get("filename"))
+        inside = name.removeprefix("package://")
+        folders = path.resolve().parents if inside != name else path.resolve().parents[:1]
+        for folder in folders:
+            if (folder / inside).is_file():
+                mesh.set("filename", str(folder / inside))
+                break

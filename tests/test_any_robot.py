@@ -1,0 +1,254 @@
+"""Robots of all kinds: shipped ones, 3D ones held in their plane, and ones never seen before."""
+
+import json
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from template_control.cli.main import main
+from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.scaling import Scale, default_gait, paper_gait, template_for
+from template_control.errors import RobotError
+from template_control.plant.simulation import SimulationOptions, simulate
+from template_control.robot.five_link import FiveLink, Link
+from template_control.robot.library import ROBOTS, load_robot, robot_path
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.parameters import SlipParameters
+
+BOLT_FEET = ("FL_FOOT", "FR_FOOT")
+BOLT_JOINTS = ("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE")
+
+
+def random_five_link(seed, mass=None, leg=None):
+    """A five-link robot of 5 to 120 kg and 0.3 to 1.1 m leg, its proportions varied too."""
+    rng = np.random.default_rng(seed)
+    mass = rng.uniform(5.0, 120.0) if mass is None else mass
+    leg = rng.uniform(0.3, 1.1) if leg is None else leg
+    thigh, share = leg * rng.uniform(0.45, 0.55), rng.uniform(0.78, 0.86)
+    trunk = 0.72 * leg * rng.uniform(0.85, 1.15)
+    trunk_mass = share * mass
+    thigh_mass = 0.5 * (mass - trunk_mass) * rng.uniform(0.6, 0.73)
+    shank_mass = 0.5 * (mass - trunk_mass) - thigh_mass
+
+    def rod(length, mass):
+        return Link(length, mass, 0.5 * length, mass * length**2 / 12.0)
+
+    limit = 350.0 * (mass / 80.0) * (leg / 0.9)
+    return FiveLink(
+        f"unseen-{seed}",
+        rod(trunk, trunk_mass),
+        rod(thigh, thigh_mass),
+        rod(leg - thigh, shank_mass),
+        torque_limit=(limit, limit),
+        hip_width=0.2 * leg,
+        foot_radius=0.011 * leg,
+    )
+
+
+def walk(robot, steps):
+    gait = default_gait(robot)
+    record = simulate(robot, LqrPlanner(gait), SimulationOptions(steps=steps, record_every=5))
+    return record, gait
+
+
+def check(record, gait, steps):
+    """Walked as long as wanted, within its limits, and on its gait in the end."""
+    assert not record.fell, record.metadata["fall_reason"]
+    assert record.steps == steps
+    for torque in record.metadata["summary"]["joint_torque"].values():
+        assert torque["peak"] <= torque["limit"] * (1 + 1e-9)
+    assert record.metadata["summary"]["qp_failures"] == 0
+    scale = Scale.of(gait.parameters)
+    error = np.abs(record.vlo_state[-5:].mean(axis=0) - gait.vlo)
+    assert np.all(error < scale.state((0.05, 0.01, 0.1)))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_shipped_robots_walk(name):
+    record, gait = walk(load_robot(name), 12)
+    check(record, gait, 12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+def test_shipped_robots_walk_fifty_steps(name):
+    record, gait = walk(load_robot(name), 50)
+    check(record, gait, 50)
+
+
+@pytest.mark.slow
+def test_bolt_needs_no_more_than_its_motors_have():
+    record, _ = walk(load_robot("bolt"), 50)
+    torques = record.metadata["summary"]["joint_torque"].values()
+    assert max(torque["peak"] for torque in torques) < 2.7  # [N m], of the real robot's motors
+
+
+CORNERS = [(1, 5.0, 0.3), (2, 120.0, 0.3), (3, 5.0, 1.1), (4, 120.0, 1.1)]
+UNSEEN = [*CORNERS, *((seed, None, None) for seed in range(5, 13))]
+
+
+def walk_unseen(tmp_path, seed, mass, leg):
+    path = tmp_path / "unseen.urdf"
+    path.write_text(random_five_link(seed, mass, leg).urdf())
+    record, gait = walk(PlanarBiped.from_urdf(path), 20)
+    check(record, gait, 20)
+
+
+@pytest.mark.parametrize(("seed", "mass", "leg"), CORNERS[:2])
+def test_a_robot_never_seen_walks(tmp_path, seed, mass, leg):
+    walk_unseen(tmp_path, seed, mass, leg)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "mass", "leg"), UNSEEN[2:])
+def test_more_robots_never_seen_walk(tmp_path, seed, mass, leg):
+    walk_unseen(tmp_path, seed, mass, leg)
+
+
+def test_similar_robots_walk_similarly(tmp_path):
+    # Mass times 1/8 and lengths times 1/2: the same robot in other units.
+    records = []
+    for mass, leg in ((80.0, 0.9), (10.0, 0.45)):
+        path = tmp_path / f"{mass:g}.urdf"
+        path.write_text(random_five_link(3, mass, leg).urdf())
+        records.append(walk(PlanarBiped.from_urdf(path), 6))
+    (large, gait), (small, small_gait) = records
+    ratio = Scale.of(small_gait.parameters).length / Scale.of(gait.parameters).length
+    assert ratio == pytest.approx(0.5)
+    scaled = small.vlo_state / [ratio**0.5, ratio, ratio**0.5]
+    # The physics step is not scaled, so not quite.
+    np.testing.assert_allclose(scaled, large.vlo_state, atol=0.03)
+
+
+def test_template_scales_with_the_robot():
+    robot = load_robot("five-link")
+    p = template_for(robot)
+    reference = SlipParameters()
+    assert p.rest_length == pytest.approx(1.0, abs=1e-9)
+    assert p.leg_stiffness == pytest.approx(reference.leg_stiffness, rel=1e-9)
+    assert paper_gait(p).energy == pytest.approx(826.0)
+    for name in ROBOTS:
+        q = template_for(load_robot(name))
+        relative = q.leg_stiffness * q.rest_length / (q.mass * q.gravity)
+        assert relative == pytest.approx(16500.0 / (80.0 * 9.81))
+
+
+def test_human_has_the_masses_and_lengths_of_the_issue():
+    robot = load_robot("human")
+    masses = [float(inertia.mass) for inertia in robot.model.inertias]
+    np.testing.assert_allclose(masses[3:], [54.24, 8.0, 4.88, 8.0, 4.88])
+    assert robot.mass == pytest.approx(80.0)
+    assert robot.leg_length == pytest.approx(0.441 + 0.513)
+
+
+def test_rabbit_has_its_published_mass():
+    robot = load_robot("rabbit")
+    assert robot.mass == pytest.approx(32.0)
+    np.testing.assert_array_equal(robot.torque_limit, 150.0)
+
+
+# -- 3D robots held in their plane --------------------------------------------------------
+
+
+def test_planar_bolt_has_the_sagittal_dynamics_of_the_3d_one():
+    planar = load_robot("bolt")
+    full = pin.buildModelFromUrdf(str(robot_path("bolt")), pin.JointModelFreeFlyer())
+    data = full.createData()
+    rng = np.random.default_rng(3)
+    hips = 0.0386  # of the planar model's origin, below the base's
+    for _ in range(10):
+        pitch, rate = rng.uniform(-0.5, 0.5), rng.normal()
+        joints, rates = rng.uniform(-1.0, 1.0, 4), rng.normal(size=4)
+        q = np.array([0.3, 0.6, pitch, *joints])
+        v = np.array([rng.normal(), rng.normal(), rate, *rates])
+        planar.update(q, v)
+        # The base moves with the planar model's origin, and about it.
+        up = np.array([np.sin(pitch), 0.0, np.cos(pitch)])
+        full_q = pin.neutral(full)
+        full_q[:3] = np.array([q[0], 0.0, q[1]]) + hips * up
+        full_q[3:7] = 0.0, np.sin(pitch / 2), 0.0, np.cos(pitch / 2)
+        full_v = np.zeros(full.nv)
+        forward = np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
+        velocity = np.array([v[0], 0.0, v[1]]) + hips * rate * forward
+        rotation = pin.Quaternion(full_q[3:7]).toRotationMatrix()
+        full_v[:3], full_v[4] = rotation.T @ velocity, rate
+        for name, angle, speed in zip(planar.joint_names, joints, rates, strict=True):
+            joint = full.joints[full.getJointId(name)]
+            full_q[joint.idx_q], full_v[joint.idx_v] = angle, speed
+        kinetic = pin.computeKineticEnergy(full, data, full_q, full_v)
+        assert 0.5 * v @ planar.mass_matrix @ v == pytest.approx(kinetic, rel=1e-9)
+        com = pin.centerOfMass(full, data, full_q)
+        np.testing.assert_allclose(planar.com, com[[0, 2]], atol=1e-12)
+        pin.framesForwardKinematics(full, data, full_q)
+        for i, foot in enumerate(BOLT_FEET):
+            place = data.oMf[full.getFrameId(foot)].translation
+            np.testing.assert_allclose(planar.foot_position[i] + [0, 0.016], place[[0, 2]])
+
+
+@pytest.mark.parametrize(
+    ("feet", "joints", "locked", "message"),
+    [
+        (BOLT_FEET, (), None, "name the hips and knees as sagittal_joints"),
+        (BOLT_FEET, (*BOLT_JOINTS[:3], "KFE"), None, "no joint 'KFE'"),
+        (BOLT_FEET, (*BOLT_JOINTS[:3], "FR_HAA"), None, "'FR_HAA' turns about"),
+        (BOLT_FEET, BOLT_JOINTS, {"FL_HAA": 0.3}, "'FL_HFE' turns about"),
+        (("FL_FOOT", "toe"), BOLT_JOINTS, None, "no foot link 'toe'"),
+        (BOLT_FEET, BOLT_JOINTS[:3], None, "a hip and a knee each"),
+    ],
+)
+def test_unusable_3d_robots_are_named(feet, joints, locked, message):
+    with pytest.raises(RobotError, match=message):
+        PlanarBiped.from_urdf(robot_path("bolt"), feet, joints, locked, foot_radius=0.016)
+
+
+def test_feet_without_spheres_are_named():
+    with pytest.raises(RobotError, match="one sphere"):
+        PlanarBiped.from_urdf(robot_path("bolt"), BOLT_FEET, BOLT_JOINTS)
+
+
+def test_a_joint_that_turns_the_other_way_walks_the_same(tmp_path):
+    # Turn one knee's axis about and with it its range: the same robot, another convention.
+    tree = ET.parse(robot_path("five-link"))
+    knee = next(j for j in tree.getroot().findall("joint") if j.get("name") == "left_knee")
+    knee.find("axis").set("xyz", "0 -1 0")
+    limit = knee.find("limit")
+    limit.set("lower", "-2.5")
+    limit.set("upper", "0")
+    path = tmp_path / "turned.urdf"
+    tree.write(path)
+    turned, _ = walk(PlanarBiped.from_urdf(path), 3)
+    usual, _ = walk(load_robot("five-link"), 3)
+    np.testing.assert_allclose(turned.vlo_state, usual.vlo_state, atol=1e-6)
+
+
+def test_links_without_mass_are_refused():
+    good, bad = Link(0.4, 1.0, 0.2, 0.01), Link(0.4, 0.0, 0.2, 0.01)
+    with pytest.raises(RobotError, match="shank mass is 0"):
+        FiveLink("x", good, good, bad, (1.0, 1.0))
+
+
+# -- commands -----------------------------------------------------------------------------
+
+
+def test_robots_command_lists_them(capsys):
+    assert main(["robots", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["robot"] for row in rows] == list(ROBOTS)
+    assert rows[0]["template"]["rest_length"] == pytest.approx(1.0)
+    assert main(["robots"]) == 0
+    assert "62 % of its mass" in capsys.readouterr().out
+
+
+def test_walk_takes_a_3d_urdf(tmp_path, capsys):
+    arguments = ["walk", "--robot", str(robot_path("bolt")), "--steps", "2", "--no-figures"]
+    arguments += ["--feet", *BOLT_FEET, "--sagittal-joints", *BOLT_JOINTS]
+    arguments += ["--foot-radius", "0.016", "--output", str(tmp_path), "--json"]
+    assert main(arguments) == 0
+    assert json.loads(capsys.readouterr().out)["robot"] == "bolt"
+
+
+def test_options_of_a_urdf_do_not_go_with_a_shipped_robot(tmp_path, capsys):
+    assert main(["walk", "--foot-radius", "0.01", "--output", str(tmp_path)]) == 2
+    assert "--foot-radius go with a URDF" in capsys.readouterr().err
