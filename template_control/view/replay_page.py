@@ -16,12 +16,15 @@ from template_control.view.figures import COM, LEFT, RIGHT, TEMPLATE
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 
-# Commands run in order; meshcat's own static page hands each to a fetch of its own, and an
-# animation that overtakes its object moves nothing.
+# The policy forbids every request: a page that works needs none. Commands run in order;
+# meshcat's own static page hands each to a fetch of its own, and an animation that overtakes
+# its object moves nothing.
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline';
+  script-src 'unsafe-inline' 'unsafe-eval'; img-src data: blob:; worker-src blob:">
 <title>$title</title>
 <style>
 body { margin: 0; }

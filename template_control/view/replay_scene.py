@@ -26,7 +26,7 @@ from template_control.view.playback import (
     spring,
     template_legs,
 )
-from template_control.view.robot_visuals import load_visuals, placements
+from template_control.view.robot_visuals import foot_sides, load_visuals, placements
 
 Array = NDArray[np.float64]
 
@@ -112,11 +112,11 @@ def scene_commands(playback: Playback) -> list[Any]:
     scene = _Scene(playback.clock)
     length = float(playback.record.metadata["template"]["rest_length"])
     _surroundings(scene, playback, length)
-    _robot(scene, playback)
+    sides = _robot(scene, playback)
     _trail(scene, playback, length)
     _template(scene, playback, length)
-    _forces(scene, playback, length)
-    _footholds(scene, playback, length)
+    _forces(scene, playback, length, sides)
+    _footholds(scene, playback, length, sides)
     return scene.finished()
 
 
@@ -189,7 +189,8 @@ def _surroundings(scene: _Scene, playback: Playback, length: float) -> None:
     scene.set("/Cameras/default/rotated/<object>", "zoom", 2.4)
 
 
-def _robot(scene: _Scene, playback: Playback) -> None:
+def _robot(scene: _Scene, playback: Playback) -> Array:
+    """The robot; returns (2,) how far to the left its feet are."""
     model, shapes, visuals = load_visuals(playback.record)
     positions, quaternions = placements(model, shapes, playback.record.q[playback.rows])
     for i, visual in enumerate(visuals):
@@ -201,6 +202,7 @@ def _robot(scene: _Scene, playback: Playback) -> None:
         scene.place(f"{path}/shape", visual.offset)
         scene.animate(path, "position", "vector3", positions[:, i])
         scene.animate(path, "quaternion", "quaternion", quaternions[:, i])
+    return foot_sides(model, playback.record.metadata["feet"])
 
 
 def _trail(scene: _Scene, playback: Playback, length: float) -> None:
@@ -233,7 +235,7 @@ def _template(scene: _Scene, playback: Playback, length: float) -> None:
         scene.show(path, loaded[rows, leg])
 
 
-def _forces(scene: _Scene, playback: Playback, length: float) -> None:
+def _forces(scene: _Scene, playback: Playback, length: float, sides: Array) -> None:
     record, rows = playback.record, playback.rows
     arrows, on = force_arrows(record), carrying(record)
     shaft, head = np.eye(4), np.eye(4)
@@ -250,7 +252,8 @@ def _forces(scene: _Scene, playback: Playback, length: float) -> None:
         ):
             scene.add(f"{path}/{part}", geometry, _overlay(color))
             scene.place(f"{path}/{part}", offset)
-        scene.animate(path, "position", "vector3", _in_space(record.foot[rows, foot]))
+        toe = _in_space(record.foot[rows, foot]) + np.array([0.0, sides[foot], 0.0])
+        scene.animate(path, "position", "vector3", toe)
         scene.animate(path, "quaternion", "quaternion", _along(arrows[rows, foot]))
         size = np.ones((len(rows), 3))
         size[:, 2] = np.linalg.norm(arrows[rows, foot], axis=1)
@@ -258,14 +261,13 @@ def _forces(scene: _Scene, playback: Playback, length: float) -> None:
         scene.show(path, on[rows, foot])
 
 
-def _footholds(scene: _Scene, playback: Playback, length: float) -> None:
+def _footholds(scene: _Scene, playback: Playback, length: float, sides: Array) -> None:
     record, rows = playback.record, playback.rows
-    plate = mg.Box([0.05 * length, 0.16 * length, 0.004 * length])
+    plate = mg.Box([0.05 * length, 0.1 * length, 0.004 * length])
     for i, foothold in enumerate(footholds(record)):
         path = f"/meshcat/footholds/{i}"
         place = np.eye(4)
-        # Feet that share the sagittal plane stand apart sideways, as the legs are drawn.
-        place[:3, 3] = foothold.x, (0.1, -0.1)[foothold.foot] * length, 0.002 * length
+        place[:3, 3] = foothold.x, sides[foothold.foot], 0.002 * length
         scene.add(path, plate, mg.MeshBasicMaterial(color=_rgb((LEFT, RIGHT)[foothold.foot])))
         scene.place(path, place)
         scene.show(path, record.time[rows] >= foothold.time)

@@ -63,9 +63,7 @@ def load_visuals(record: Record) -> tuple[pin.Model, pin.GeometryModel, list[Vis
     return model, shapes, [_visual(shape) for shape in shapes.geometryObjects]
 
 
-def placements(
-    model: pin.Model, shapes: pin.GeometryModel, q: Array
-) -> tuple[Array, NDArray[np.float64]]:
+def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[Array, Array]:
     """Where the shapes are in the configurations q (F, nv).
 
     Returns:
@@ -81,6 +79,13 @@ def placements(
             vector = pin.SE3ToXYZQUAT(placement)
             positions[i, j], quaternions[i, j] = vector[:3], vector[3:]
     return positions, quaternions
+
+
+def foot_sides(model: pin.Model, feet: list[str]) -> Array:
+    """(2,) how far to the left of the sagittal plane the foot frames are [m]."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    return np.array([data.oMf[model.getFrameId(foot)].translation[1] for foot in feet])
 
 
 def _check_meshes(text: str) -> None:
@@ -105,7 +110,8 @@ def _visual(shape: pin.GeometryObject) -> Visual:
         drawn = mg.Cylinder(float(2.0 * geometry.halfLength), float(geometry.radius))
         offset = _Y_TO_Z
     elif hasattr(geometry, "tri_indices"):
-        faces = [tuple(geometry.tri_indices(i)) for i in range(geometry.num_tris)]
+        triangles = (geometry.tri_indices(i) for i in range(geometry.num_tris))
+        faces = [(t[0], t[1], t[2]) for t in triangles]
         drawn = mg.TriangularMeshGeometry(np.array(geometry.vertices()), np.array(faces))
     else:
         raise RecordError(
