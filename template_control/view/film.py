@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
-from template_control.view.figures import COM, LEFT, RIGHT, TEMPLATE, TRUNK
 from template_control.view.playback import (
     Playback,
     carrying,
@@ -23,6 +22,7 @@ from template_control.view.playback import (
     spring,
     template_legs,
 )
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK
 
 Array = NDArray[np.float64]
 

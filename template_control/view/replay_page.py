@@ -12,7 +12,7 @@ import meshcat
 import umsgpack
 
 from template_control.errors import RecordError
-from template_control.view.figures import COM, LEFT, RIGHT, TEMPLATE
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 

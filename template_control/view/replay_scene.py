@@ -17,7 +17,6 @@ from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform
 from meshcat.path import Path as ScenePath
 from numpy.typing import NDArray
 
-from template_control.view.figures import COM, LEFT, RIGHT, TEMPLATE
 from template_control.view.playback import (
     Playback,
     carrying,
@@ -27,6 +26,7 @@ from template_control.view.playback import (
     template_legs,
 )
 from template_control.view.robot_visuals import foot_sides, load_visuals, placements
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
 Array = NDArray[np.float64]
 
