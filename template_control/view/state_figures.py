@@ -231,5 +231,5 @@ def vlo_states(record: Record) -> Figure:
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
     panels[0].set_title(f"{record.metadata['robot']}: at VLO (dx/dt from the angular momentum)")
     panels[-1].set(xlabel="step", xlim=(-0.5, len(state) - 0.5))
-    panels[-1].xaxis.get_major_locator().set_params(integer=True)
+    panels[-1].xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)
     return figure
