@@ -118,8 +118,13 @@ def test_the_scene_moves_with_the_run(record):
     frames = playback(record, fps=30.0)
     found = tracks(scene_commands(frames))
     rows = frames.rows
-    for times, _ in found.values():
-        assert np.allclose(times, frames.clock, atol=1e-5)  # or loops would drift apart
+    for (_, name), (times, values) in found.items():
+        # All alike, or loops would drift apart.
+        assert times[0] == frames.clock[0]
+        assert times[-1] == pytest.approx(frames.clock[-1])
+        if name != ".visible":
+            assert np.allclose(times, frames.clock, atol=1e-5)
+        assert len(values) % len(times) == 0
     world = found["/meshcat", ".position"][1].reshape(-1, 3)
     assert np.allclose(world[:, 0], -record.com[rows, 0], atol=1e-6)
     com = found["/meshcat/com", ".position"][1].reshape(-1, 3)
@@ -129,7 +134,9 @@ def test_the_scene_moves_with_the_run(record):
     toes, loaded = template_legs(record)
     for leg, name in enumerate(("rear_leg", "front_leg")):
         path = f"/meshcat/template/{name}"
-        assert np.array_equal(found[path, ".visible"][1], loaded[rows, leg])
+        times, shown = found[path, ".visible"]
+        held = shown[np.searchsorted(times, frames.clock.astype(np.float32), side="right") - 1]
+        assert np.array_equal(held, loaded[rows, leg])
         # Turned and stretched, the leg's (0, 0, 1) lies on the toe.
         x, y, z, w = found[path, ".quaternion"][1].reshape(-1, 4).T
         size = found[path, ".scale"][1].reshape(-1, 3)[:, 2]
@@ -160,6 +167,25 @@ def test_footholds_are_where_feet_stood(record):
         row = np.searchsorted(record.time, foothold.time)
         assert record.foot[row, foothold.foot, 1] == pytest.approx(0.0, abs=5e-3)
         assert record.foot[row, foothold.foot, 0] == pytest.approx(foothold.x, abs=0.01)
+
+
+def test_foothold_plates_appear_when_their_foot_has_landed(record):
+    frames = playback(record, fps=30.0)
+    objects = {c["path"]: c for c in (x.lower() for x in scene_commands(frames))}
+    for foot, name in enumerate(("left", "right")):
+        (geometry,) = objects[f"/meshcat/footholds/{name}"]["object"]["geometries"]
+        attributes = {
+            key: np.frombuffer(value["array"].data, np.float32)
+            for key, value in geometry["data"]["attributes"].items()
+        }
+        corners = attributes["position"].reshape(-1, 4, 3)
+        stood = [f for f in footholds(record) if f.foot == foot]
+        assert np.allclose(corners.mean(axis=1)[:, 0], [f.x for f in stood], atol=1e-6)
+        assert np.allclose(corners.mean(axis=1)[:, 1], (0.1, -0.1)[foot])  # where its leg is
+        frame = attributes["lineDistance"].reshape(-1, 4)[:, 0].astype(int)
+        landed = np.array([f.time for f in stood])
+        assert np.all(record.time[frames.rows[frame]] >= landed)
+        assert np.all(record.time[frames.rows[np.maximum(frame - 1, 0)]] <= landed)
 
 
 def test_the_spring_runs_from_end_to_end():

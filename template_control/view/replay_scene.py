@@ -34,17 +34,20 @@ _FLOAT32 = 0x17  # the viewer's MessagePack extension for a Float32Array
 _FOREVER = 1_000_000
 
 
-class _Trail(mg.TriangularMeshGeometry):
-    """A mesh that appears little by little: a dashed material draws up to its dash's length."""
+class _Gradual(mg.TriangularMeshGeometry):
+    """A mesh that appears little by little: a dashed material draws up to its dash's length.
 
-    def __init__(self, mesh: mg.TriangularMeshGeometry, progress: Array) -> None:
-        super().__init__(mesh.vertices, mesh.faces)
-        self.progress = progress
+    ``frame`` says in which frame each vertex appears.
+    """
+
+    def __init__(self, vertices: Array, faces: NDArray[np.int64], frame: Array) -> None:
+        super().__init__(vertices, faces)
+        self.frame = frame
 
     def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
         lowered = super().lower(object_data)
-        progress = mg.pack_numpy_array(self.progress.astype(np.float32))
-        lowered["data"]["attributes"]["lineDistance"] = progress
+        frame = mg.pack_numpy_array(self.frame.astype(np.float32))
+        lowered["data"]["attributes"]["lineDistance"] = frame
         return dict(lowered)
 
 
@@ -91,13 +94,26 @@ class _Scene:
         self.commands.append(SetProperty(name, value, ScenePath().append(path)))
 
     def animate(self, path: str, name: str, kind: str, values: Any) -> None:
-        clips = self._animation.clips
-        # One frame a second: the tracks carry seconds.
-        clip = clips.setdefault(ScenePath().append(path), AnimationClip(fps=1))
-        clip.tracks[name] = _Track(name, kind, self.clock, values)
+        self._track(path, _Track(name, kind, self.clock, values))
 
     def show(self, path: str, visible: NDArray[np.bool_]) -> None:
-        self.animate(path, "visible", "bool", visible.tolist())
+        """Keys only where it changes, and at both ends: a switch is not interpolated."""
+        keys = np.flatnonzero(np.diff(visible, prepend=~visible[:1]))
+        keys = np.unique(np.append(keys, len(visible) - 1))
+        self._track(path, _Track("visible", "bool", self.clock[keys], visible[keys].tolist()))
+
+    def reveal(self, path: str, mesh: _Gradual, color: str, **properties: Any) -> None:
+        """Let a mesh appear as its frames come."""
+        frames = np.arange(float(len(self.clock)))
+        dash = {"dashSize": 0.0, "gapSize": 10.0 * len(frames), "transparent": True}
+        self.add(path, mesh, _Dashed(_rgb(color), **dash, **properties))
+        self.animate(f"{path}/<object>", "material.dashSize", "number", frames)
+
+    def _track(self, path: str, track: _Track) -> None:
+        # One frame a second: the tracks carry seconds.
+        clips = self._animation.clips
+        clip = clips.setdefault(ScenePath().append(path), AnimationClip(fps=1))
+        clip.tracks[track.name] = track
 
     def finished(self) -> list[Any]:
         return [*self.commands, _LastAnimation(self._animation, True, _FOREVER)]
@@ -159,6 +175,13 @@ def _ribbon(points: Array, width: float) -> mg.TriangularMeshGeometry:
     return mg.TriangularMeshGeometry(np.concatenate(vertices), np.array(faces))
 
 
+def _plates(centres: Array, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (4 N, 3) and faces (2 N, 3) of rectangles on the ground around (N, 3) centres."""
+    corners = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*size, 0.0]
+    faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(centres))[:, None, None]
+    return (centres[:, None] + corners).reshape(-1, 3), faces.reshape(-1, 3)
+
+
 def _surroundings(scene: _Scene, playback: Playback, length: float) -> None:
     record, rows = playback.record, playback.rows
     for end in ("top_color", "bottom_color"):
@@ -174,13 +197,10 @@ def _surroundings(scene: _Scene, playback: Playback, length: float) -> None:
     scene.add("/meshcat/ground", ground, mg.MeshBasicMaterial(color=0xDDE1E6))
     scene.place("/meshcat/ground", middle)
     # A line every rest length shows that the camera travels.
-    for i, mark in enumerate(np.arange(np.ceil(low / length), high / length)):
-        position = np.eye(4)
-        position[:3, 3] = mark * length, 0.0, 0.001 * length
-        path = f"/meshcat/ground_lines/{i}"
-        line = mg.Box([0.012 * length, 3.0 * length, 0.001 * length])
-        scene.add(path, line, mg.MeshBasicMaterial(color=0xB4BAC2))
-        scene.place(path, position)
+    lines = np.arange(np.ceil(low / length), high / length)[:, None] * [length, 0.0, 0.0]
+    stripes = _plates(lines + np.array([0.0, 0.0, 0.001 * length]), (0.012 * length, 3.0 * length))
+    material = mg.MeshBasicMaterial(color=0xB4BAC2)
+    scene.add("/meshcat/ground_lines", mg.TriangularMeshGeometry(*stripes), material)
     travel = np.stack((x, 0.0 * x, np.full(len(x), 0.72 * length)), axis=-1)
     scene.animate("/meshcat", "position", "vector3", -travel)
     # From afar with a narrow view: little perspective, so that lengths can be compared.
@@ -207,11 +227,9 @@ def _robot(scene: _Scene, playback: Playback) -> Array:
 
 def _trail(scene: _Scene, playback: Playback, length: float) -> None:
     com = _in_space(playback.record.com[playback.rows])
-    frames = np.arange(float(len(com)))
-    trail = _Trail(_ribbon(com, 0.008 * length), np.tile(frames, 4))
-    endless = {"dashSize": 0.0, "gapSize": 10.0 * len(frames), "depthTest": False}
-    scene.add("/meshcat/com_trail", trail, _Dashed(_rgb(COM), transparent=True, **endless))
-    scene.animate("/meshcat/com_trail/<object>", "material.dashSize", "number", frames)
+    ribbon = _ribbon(com, 0.008 * length)
+    trail = _Gradual(ribbon.vertices, ribbon.faces, np.tile(np.arange(float(len(com))), 4))
+    scene.reveal("/meshcat/com_trail", trail, COM, depthTest=False)
     scene.add("/meshcat/com", mg.Sphere(0.025 * length), _overlay(COM))
     scene.animate("/meshcat/com", "position", "vector3", com)
 
@@ -219,7 +237,11 @@ def _trail(scene: _Scene, playback: Playback, length: float) -> None:
 def _template(scene: _Scene, playback: Playback, length: float) -> None:
     record, rows = playback.record, playback.rows
     com = record.template_com[rows]
-    scene.add("/meshcat/template/com", mg.Sphere(0.014 * length), _overlay(TEMPLATE))
+    scene.add("/meshcat/template/com/dot", mg.Sphere(0.014 * length), _overlay(TEMPLATE))
+    # Nearer to the camera than the robot's CoM, or it would be drawn below that.
+    nearer = np.eye(4)
+    nearer[1, 3] = -0.03 * length
+    scene.place("/meshcat/template/com/dot", nearer)
     scene.animate("/meshcat/template/com", "position", "vector3", _in_space(com))
     toes, loaded = template_legs(record)
     coil = _ribbon(_in_space(spring(0.03 * length)), 0.01 * length)
@@ -263,11 +285,12 @@ def _forces(scene: _Scene, playback: Playback, length: float, sides: Array) -> N
 
 def _footholds(scene: _Scene, playback: Playback, length: float, sides: Array) -> None:
     record, rows = playback.record, playback.rows
-    plate = mg.Box([0.05 * length, 0.1 * length, 0.004 * length])
-    for i, foothold in enumerate(footholds(record)):
-        path = f"/meshcat/footholds/{i}"
-        place = np.eye(4)
-        place[:3, 3] = foothold.x, sides[foothold.foot], 0.002 * length
-        scene.add(path, plate, mg.MeshBasicMaterial(color=_rgb((LEFT, RIGHT)[foothold.foot])))
-        scene.place(path, place)
-        scene.show(path, record.time[rows] >= foothold.time)
+    for foot, (name, color) in enumerate((("left", LEFT), ("right", RIGHT))):
+        stood = [f for f in footholds(record) if f.foot == foot and f.time <= record.time[rows[-1]]]
+        if not stood:
+            continue
+        centres = np.array([[f.x, sides[foot], 0.002 * length] for f in stood])
+        vertices, faces = _plates(centres, (0.05 * length, 0.1 * length))
+        frame = np.searchsorted(record.time[rows], [f.time for f in stood]).astype(float)
+        mesh = _Gradual(vertices, faces, np.repeat(frame, 4))
+        scene.reveal(f"/meshcat/footholds/{name}", mesh, color)

@@ -7,7 +7,6 @@ import io
 import os
 import time
 import webbrowser
-from types import TracebackType
 from typing import Any
 
 import umsgpack
@@ -63,10 +62,5 @@ class ReplayServer:
     def __enter__(self) -> ReplayServer:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
