@@ -47,6 +47,7 @@ from template_control.slip.step_solver import StepSolution
 from template_control.slip.stride import Stride, controls, run
 from template_control.slip.vocabulary import Event, MapKind, Outcome, Slot
 from template_control.view.figures import save_figures
+from template_control.view.replay import replay, save_film, save_html
 from template_control.view.scenario_figures import save_scenario_figures
 
 __all__ = [
@@ -101,8 +102,11 @@ __all__ = [
     "load_scenario",
     "paper_gait",
     "perturbed_start",
+    "replay",
     "run",
     "save_figures",
+    "save_film",
+    "save_html",
     "save_scenario_figures",
     "simulate",
     "simulate_scenario",

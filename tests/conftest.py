@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import template_control as tc
 from template_control.robot.library import load_robot
 from template_control.slip.gait import gait_at
 from template_control.slip.parameters import SlipParameters
@@ -37,3 +38,11 @@ def random_states():
     low = np.array([-1.0, 0.5, -0.5, -0.9, 0.2, -0.9, 0.2])
     high = np.array([1.0, 1.0, 0.5, 0.5, 1.2, 0.5, 1.2])
     return [(rng.uniform(low, high), rng.normal(0.0, 1.5, 7)) for _ in range(20)]
+
+
+@pytest.fixture(scope="session")
+def short_walk():
+    """Four steps of the five-link robot on its default gait, recorded."""
+    robot = tc.load_robot("five-link")
+    gait = tc.default_gait(robot)
+    return tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=4))

@@ -2,6 +2,8 @@
 
 import os
 import re
+import shutil
+import signal
 import subprocess
 import sys
 import zipfile
@@ -13,8 +15,12 @@ ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+REPLAY = (ROOT / "docs" / "replay.md").read_text()
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+def blocks(language, text=README):
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
 def test_python_snippets_run_as_printed(tmp_path):
@@ -46,6 +52,15 @@ def test_the_two_commands_are_there():
     assert "README.md" in (ROOT / ".ci" / "run").read_text()
 
 
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory):
+    """What the first command leaves, after fewer steps."""
+    folder = tmp_path_factory.mktemp("walked")
+    line = [sys.executable, "-m", "template_control.cli.main", "walk", "--steps", "4"]
+    subprocess.run([*line, "--no-figures", "--output", folder], check=True, env=ENVIRONMENT)
+    return folder
+
+
 LONG = ("reproduce fig8", "reproduce fig9")
 OTHERS = [c for c in commands() if "venv -" not in c and "venv ." not in c]
 
@@ -54,9 +69,11 @@ OTHERS = [c for c in commands() if "venv -" not in c and "venv ." not in c]
     "line",
     [pytest.param(c, marks=[pytest.mark.slow] * any(long in c for long in LONG)) for c in OTHERS],
 )
-def test_other_commands_run_as_printed(line, tmp_path):
+def test_other_commands_run_as_printed(line, tmp_path, walked):
     words = [str(ROOT / w) if w.startswith("examples/") else w for w in line.split()]
     assert words[0] in ("template-control", "python")
+    if "runs/walk/run.npz" in words:
+        shutil.copytree(walked, tmp_path / "runs" / "walk")
     if words[0] == "template-control":
         words = [sys.executable, "-m", "template_control.cli.main", *words[1:]]
     else:
@@ -72,9 +89,40 @@ def test_other_commands_run_as_printed(line, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
+def test_the_replay_page_runs_as_printed(tmp_path):
+    lines = [line for block in blocks("sh", REPLAY) for line in block.strip().splitlines()]
+    assert lines[0].startswith("template-control walk")
+    for line in lines:
+        if "--video" in line and shutil.which("ffmpeg") is None:
+            continue
+        words = [sys.executable, "-m", "template_control.cli.main", *line.split()[1:]]
+        served = "replay" in words and not {"--html", "--gif", "--video"} & set(words)
+        process = subprocess.Popen(
+            words,
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=ENVIRONMENT,
+        )
+        if served:
+            assert "http://" in process.stdout.readline()
+            process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=300)
+        assert process.returncode == 0, f"{line}: {errors}"
+    for snippet in blocks("python", REPLAY):
+        done = subprocess.run(
+            [sys.executable, "-c", snippet], cwd=tmp_path, capture_output=True, env=ENVIRONMENT
+        )
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "slow.html").is_file()
+    assert (tmp_path / "figures" / "energies.png").is_file()
+
+
 def test_pictures_are_there():
-    for picture in re.findall(r"!\[.*?\]\((.*?)\)", README):
-        assert (ROOT / picture).is_file()
+    for folder, text in ((ROOT, README), (ROOT / "docs", REPLAY)):
+        for picture in re.findall(r"!\[.*?\]\((.*?)\)", text):
+            assert (folder / picture).is_file()
 
 
 @pytest.mark.slow

@@ -6,10 +6,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from template_control.cli import automaton, gaits, reproduce, robots, slip, walk
+from template_control.cli import automaton, gaits, plots, replay, reproduce, robots, slip, walk
 from template_control.errors import TemplateControlError
 
-_COMMANDS = (walk, robots, slip, gaits, automaton, reproduce)
+_COMMANDS = (walk, robots, replay, plots, slip, gaits, automaton, reproduce)
 _USER_ERROR = 2
 
 

@@ -1,4 +1,4 @@
-"""Figures of a recorded walk: stick diagram, CoM, joint torques, ground forces."""
+"""Figures of a recorded walk: stick diagram, CoM, joint torques, ground forces, and all others."""
 
 from __future__ import annotations
 
@@ -13,37 +13,26 @@ from numpy.typing import NDArray
 
 from template_control.errors import RecordError
 from template_control.plant.record import Record
+from template_control.view.state_figures import (
+    energies,
+    phase_portrait,
+    tracking_errors,
+    vlo_states,
+)
+from template_control.view.style import (
+    COM,
+    LEFT,
+    RIGHT,
+    TEMPLATE,
+    TRUNK,
+    WINDOW,
+    shade,
+    window,
+)
 
 Array = NDArray[np.float64]
 
-LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
 _LEGS = (LEFT, RIGHT)
-_WINDOW = 2.2  # [s], about four steps
-
-
-def _window(record: Record, seconds: float = _WINDOW) -> slice:
-    """Samples of the last ``seconds`` of the run."""
-    return slice(int(np.searchsorted(record.time, record.time[-1] - seconds)), None)
-
-
-def _single_stance(record: Record) -> NDArray[np.bool_]:
-    single = np.array([name.startswith("SS") for name in record.metadata["nodes"]])
-    return np.asarray(single[record.node])
-
-
-def _shade(axes: Axes, record: Record, w: slice) -> None:
-    """Grey over single stance, as in Fig. 13."""
-    axes.fill_between(
-        record.time[w],
-        0.0,
-        1.0,
-        where=_single_stance(record)[w].tolist(),
-        transform=axes.get_xaxis_transform(),
-        color="0.92",
-        linewidth=0,
-        zorder=0,
-    )
-    axes.margins(x=0)
 
 
 def _ground(axes: Axes, record: Record) -> None:
@@ -58,9 +47,9 @@ def _ground(axes: Axes, record: Record) -> None:
     axes.set_xlim(low, high)
 
 
-def stick_diagram(record: Record, seconds: float = _WINDOW, interval: float = 0.06) -> Figure:
+def stick_diagram(record: Record, seconds: float = WINDOW, interval: float = 0.06) -> Figure:
     """The robot every ``interval`` seconds with its CoM and the template's path (Fig. 12)."""
-    w = _window(record, seconds)
+    w = window(record, seconds)
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     axes = figure.subplots()
     time = record.time[w]
@@ -86,9 +75,9 @@ def stick_diagram(record: Record, seconds: float = _WINDOW, interval: float = 0.
     return figure
 
 
-def com_tracking(record: Record, seconds: float = _WINDOW) -> Figure:
+def com_tracking(record: Record, seconds: float = WINDOW) -> Figure:
     """CoM x and y against the template, and the errors, single stance shaded (Fig. 13a)."""
-    w = _window(record, seconds)
+    w = window(record, seconds)
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True)
     for axes, axis, name in ((upper, 0, "x"), (middle, 1, "y")):
@@ -107,15 +96,15 @@ def com_tracking(record: Record, seconds: float = _WINDOW) -> Figure:
     lower.plot(record.time[w], error[:, 1], color=RIGHT, label="y")
     lower.set(xlabel="time [s]", ylabel="template - robot [mm]")
     for axes in (upper, middle, lower):
-        _shade(axes, record, w)
+        shade(axes, record, w)
         axes.legend(loc="upper right")
     upper.set_title(f"{record.metadata['robot']}: centre of mass (single stance shaded)")
     return figure
 
 
-def joint_torques(record: Record, seconds: float = _WINDOW) -> Figure:
+def joint_torques(record: Record, seconds: float = WINDOW) -> Figure:
     """Joint torques with their limits, single stance shaded (Fig. 13b)."""
-    w = _window(record, seconds)
+    w = window(record, seconds)
     names, limits = record.metadata["joints"], record.metadata["torque_limit"]
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     panels = figure.subplots(len(record.metadata["legs"]), 1, sharex=True, squeeze=False)[:, 0]
@@ -124,7 +113,7 @@ def joint_torques(record: Record, seconds: float = _WINDOW) -> Figure:
             axes.plot(record.time[w], record.torque[w, joint], color=color, label=names[joint])
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * limits[joint], color=color, linestyle=":", linewidth=0.9)
-        _shade(axes, record, w)
+        shade(axes, record, w)
         axes.set_ylabel("torque [N m]")
         axes.legend(loc="upper right")
     panels[0].set_title(f"{record.metadata['robot']}: joint torques, limits dotted")
@@ -132,9 +121,9 @@ def joint_torques(record: Record, seconds: float = _WINDOW) -> Figure:
     return figure
 
 
-def ground_forces(record: Record, seconds: float = _WINDOW) -> Figure:
+def ground_forces(record: Record, seconds: float = WINDOW) -> Figure:
     """Ground reaction forces of either foot with the template's leg forces."""
-    w = _window(record, seconds)
+    w = window(record, seconds)
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
     rear = record.rear[w]
@@ -155,7 +144,7 @@ def ground_forces(record: Record, seconds: float = _WINDOW) -> Figure:
         # A landing foot's first sample is its impulse over one physics step; keep the scale.
         span = 1.25 * np.abs(template).max() + 1.0
         axes.set_ylim(-0.05 * span if axis == 1 else -span, span)
-        _shade(axes, record, w)
+        shade(axes, record, w)
         axes.set_ylabel(f"{name} force [N]")
         axes.legend(loc="upper right")
     panels[0].set_title(f"{record.metadata['robot']}: ground reaction forces")
@@ -168,6 +157,10 @@ FIGURES: dict[str, Callable[[Record], Figure]] = {
     "com": com_tracking,
     "torques": joint_torques,
     "forces": ground_forces,
+    "phase_portrait": phase_portrait,
+    "tracking": tracking_errors,
+    "energies": energies,
+    "vlo": vlo_states,
 }
 """Every figure of a walk, by file name."""
 

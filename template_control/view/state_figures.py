@@ -1,0 +1,235 @@
+"""Figures of a walk's state: phase portrait, tracking errors, energies, VLO states."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from template_control.plant.record import Record
+from template_control.slip.automaton import AUTOMATON
+from template_control.slip.gait import vlo_energy
+from template_control.slip.parameters import SlipParameters
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, shade, window
+
+Array = NDArray[np.float64]
+
+_MOST_POINTS = 20_000  # of a line that shows a whole run
+
+
+def _parameters(record: Record) -> SlipParameters:
+    return SlipParameters(**record.metadata["template"])
+
+
+def _whole(record: Record) -> slice:
+    """The whole run, thinned to what a picture can show."""
+    return slice(None, None, 1 + len(record.time) // _MOST_POINTS)
+
+
+def _broken(values: Array, rear: NDArray[np.int64]) -> Array:
+    """NaN where the stance foot changes, so that no line joins the two steps."""
+    out = values.copy()
+    out[1:][np.diff(rear) != 0] = np.nan
+    return out
+
+
+def phase_portrait(record: Record) -> Figure:
+    """y against dy/dt, and x from the rear stance foot against dx/dt, with every VLO.
+
+    The whole run is pale, its last 2.2 s are strong. The planner's VLO state has its dx/dt from
+    the angular momentum about the stance foot.
+    """
+    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
+    upright, forward = figure.subplots(1, 2)
+    samples = np.arange(len(record.time))
+    toe = record.foot[samples, record.rear, 0]
+    target = record.metadata["gait_vlo"]
+    rows = np.minimum(np.searchsorted(record.time, record.vlo_time), len(record.time) - 1)
+    panels: tuple[tuple[Axes, int, Array, tuple[float, float]], ...] = (
+        (upright, 1, np.zeros(len(toe)), (target[1], target[2])),
+        (forward, 0, toe, (0.0, target[0])),
+    )
+    for axes, axis, origin, wanted in panels:
+        for position, velocity, color, style, name in (
+            (record.com, record.com_velocity, COM, "-", "robot"),
+            (record.template_com, record.template_velocity, TEMPLATE, "--", "template"),
+        ):
+            across, up = position[:, axis] - origin, velocity[:, axis]
+            for w, look in (
+                (_whole(record), {"linewidth": 0.6, "alpha": 0.15}),
+                (window(record), {"linewidth": 1.2, "linestyle": style, "label": name}),
+            ):
+                axes.plot(_broken(across[w], record.rear[w]), up[w], color=color, **look)
+        across = record.com[rows, axis] - origin[rows]
+        axes.plot(
+            across, record.com_velocity[rows, axis], "o", color=RIGHT, markersize=3, zorder=4,
+            label="robot at VLO",
+        )  # fmt: skip
+        seen = record.vlo_state[:, 1 if axis else 0], record.vlo_state[:, 2]
+        planned = seen if axis else (np.zeros(len(rows)), seen[0])
+        axes.plot(
+            *planned, "o", color=RIGHT, fillstyle="none", markersize=4, zorder=4,
+            label="VLO state of the planner",
+        )  # fmt: skip
+        axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label="VLO of the gait")
+    upright.set(xlabel="y [m]", ylabel="dy/dt [m/s]")
+    forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
+    upright.set_title(f"{record.metadata['robot']}: phase portrait", loc="left")
+    handles, labels = upright.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
+    return figure
+
+
+def tracking_errors(record: Record) -> Figure:
+    """CoM errors in x and y and the trunk's pitch over the whole run."""
+    figure = Figure(figsize=(9.0, 5.6), layout="constrained")
+    panels = figure.subplots(3, 1, sharex=True)
+    w = _whole(record)
+    error = 1e3 * record.com_error
+    pitch = np.degrees(record.q[:, 2])
+    wanted = np.degrees(record.metadata["options"]["embedding"]["trunk_pitch"])
+    for axes, values, reference, name, unit, color in (
+        (panels[0], error[:, 0], 0.0, "x error", "mm", LEFT),
+        (panels[1], error[:, 1], 0.0, "y error", "mm", RIGHT),
+        (panels[2], pitch, wanted, "trunk pitch", "deg", TRUNK),
+    ):
+        axes.axhline(reference, color="0.6", linewidth=0.8)
+        axes.plot(record.time[w], values[w], color=color, linewidth=0.8)
+        rms = np.sqrt(np.mean((values - reference) ** 2))
+        axes.set_title(f"RMS error {rms:.3g} {unit}", loc="right", fontsize=8)
+        axes.set_ylabel(f"{name} [{unit}]")
+        axes.margins(x=0)
+        if np.any(record.push):
+            axes.fill_between(
+                record.time, 0.0, 1.0, where=(record.push != 0.0).tolist(),
+                transform=axes.get_xaxis_transform(), color=RIGHT, alpha=0.25, linewidth=0,
+            )  # fmt: skip
+    title = f"{record.metadata['robot']}: template less robot, and trunk"
+    if np.any(record.push):
+        title += " (pushes shaded)"
+    panels[0].set_title(title)
+    panels[-1].set_xlabel("time [s]")
+    return figure
+
+
+def template_energies(record: Record) -> dict[str, Array]:
+    """The template's energies along the run, each (T,) [J].
+
+    A leg's spring energy is F^2 / (2 k) of its recorded force, with the stiffness that the
+    automaton gives to the leg in the node and that the planner chose for the step.
+
+    Returns:
+        kinetic, gravity, spring, total.
+    """
+    p = _parameters(record)
+    step = np.maximum(np.searchsorted(record.vlo_time, record.time, side="right") - 1, 0)
+    stiffness = np.zeros((len(record.time), 2))
+    for index in np.unique(record.node):
+        node = AUTOMATON.node(record.metadata["nodes"][index])
+        on = record.node == index
+        for leg, slot in enumerate((node.rear, node.front)):
+            # A template that touches down before the robot's foot does has both legs loaded
+            # in the robot's single stance.
+            used = node.rear if slot is None else slot
+            if used is not None:
+                stiffness[on, leg] = record.vlo_controls[step[on], used]
+    force_squared = np.sum(record.template_force**2, axis=2)
+    stored = np.divide(
+        force_squared, 2.0 * stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0
+    )
+    kinetic = 0.5 * p.mass * np.sum(record.template_velocity**2, axis=1)
+    gravity = p.mass * p.gravity * record.template_com[:, 1]
+    spring = stored.sum(axis=1)
+    return {
+        "kinetic": kinetic,
+        "gravity": gravity,
+        "spring": spring,
+        "total": kinetic + gravity + spring,
+    }
+
+
+def energies(record: Record) -> Figure:
+    """Energies of the robot's CoM and of the template, single stance shaded."""
+    w = window(record)
+    p = _parameters(record)
+    template = template_energies(record)
+    kinetic = 0.5 * p.mass * np.sum(record.com_velocity**2, axis=1)
+    gravity = p.mass * p.gravity * record.com[:, 1]
+    figure = Figure(figsize=(9.0, 6.4), layout="constrained")
+    panels = figure.subplots(3, 1, sharex=True)
+    time = record.time[w]
+    for axes, robot, name, label in (
+        (panels[0], kinetic, "kinetic", "kinetic [J]"),
+        (panels[1], gravity, "gravity", "gravitational [J]"),
+    ):
+        axes.plot(time, robot[w], color=COM)
+        axes.plot(time, template[name][w], "--", color=TEMPLATE, linewidth=1.0)
+        axes.set_ylabel(label)
+    lower = panels[2]
+    lower.plot(time, (kinetic + gravity)[w], color=COM, label="robot's CoM")
+    lower.plot(
+        time, (template["total"] - template["spring"])[w], "--", color=TEMPLATE, linewidth=1.0,
+        label="template",
+    )  # fmt: skip
+    lower.plot(time, template["total"][w], color=TEMPLATE, label="template with its springs")
+    target = vlo_energy(p, np.array(record.metadata["gait_vlo"]))
+    lower.axhline(target, color=LEFT, linewidth=1.2, linestyle=":", label="gait at VLO")
+    lower.set(xlabel="time [s]", ylabel="sum [J]")
+    for axes in panels:
+        shade(axes, record, w)
+    handles, labels = lower.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    panels[0].set_title(f"{record.metadata['robot']}: energies (single stance shaded)")
+    return figure
+
+
+def vlo_states(record: Record) -> Figure:
+    """State and energy at each VLO against the gait's and what the planner expected.
+
+    The energy is E = m v^2 / 2 + m g y + k0 (l0 - y)^2 / 2, as in Section IV-D.
+    """
+    p = _parameters(record)
+    state, expected = record.vlo_state, record.vlo_predicted[:-1]
+    target = np.array(record.metadata["gait_vlo"])
+    steps = np.arange(len(state))
+    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    panels = figure.subplots(4, 1, sharex=True)
+    common: dict[str, Any] = {"linewidth": 0.9, "markersize": 3.5}
+    for axes, values, predicted, wanted, least, name in (
+        (panels[0], state[:, 0], expected[:, 0], target[0], 0.005, "dx/dt [m/s]"),
+        (panels[1], state[:, 1], expected[:, 1], target[1], 0.001, "y [m]"),
+        (panels[2], state[:, 2], expected[:, 2], target[2], 0.005, "dy/dt [m/s]"),
+        (
+            panels[3],
+            np.array([vlo_energy(p, z) for z in state]),
+            np.array([vlo_energy(p, z) for z in expected]),
+            vlo_energy(p, target),
+            1.0,
+            "energy [J]",
+        ),
+    ):
+        axes.axhline(wanted, color=LEFT, linewidth=1.0, linestyle=":", label="gait")
+        axes.plot(
+            steps[1:], predicted, "x", color="0.55", markersize=4, label="expected by the planner"
+        )
+        axes.plot(steps, values, "o-", color=COM, label="reached", **common)
+        axes.set_ylabel(name)
+        # A first step on its target is no reason to magnify rounding errors.
+        axes.update_datalim([(0.0, wanted - least), (0.0, wanted + least)])
+        axes.autoscale_view()
+        axes.ticklabel_format(axis="y", useOffset=False)
+    far = np.flatnonzero(~record.vlo_reached)
+    if len(far):
+        panels[0].plot(
+            far, state[far, 0], "s", color=RIGHT, fillstyle="none", markersize=7,
+            label="best reachable step taken",
+        )  # fmt: skip
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    panels[0].set_title(f"{record.metadata['robot']}: at VLO (dx/dt from the angular momentum)")
+    panels[-1].set(xlabel="step", xlim=(-0.5, len(state) - 0.5))
+    panels[-1].xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)
+    return figure

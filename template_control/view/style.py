@@ -1,0 +1,38 @@
+"""What the figures of a run share: colours, the part they show, the shading of single stance."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from template_control.plant.record import Record
+
+LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
+WINDOW = 2.2  # [s], about four steps
+
+
+def window(record: Record, seconds: float = WINDOW) -> slice:
+    """Samples of the last ``seconds`` of the run."""
+    return slice(int(np.searchsorted(record.time, record.time[-1] - seconds)), None)
+
+
+def single_stance(record: Record) -> NDArray[np.bool_]:
+    """(T,) whether the robot's controller was in single stance."""
+    single = np.array([name.startswith("SS") for name in record.metadata["nodes"]])
+    return np.asarray(single[record.node])
+
+
+def shade(axes: Axes, record: Record, w: slice) -> None:
+    """Grey over single stance, as in Fig. 13."""
+    axes.fill_between(
+        record.time[w],
+        0.0,
+        1.0,
+        where=single_stance(record)[w].tolist(),
+        transform=axes.get_xaxis_transform(),
+        color="0.92",
+        linewidth=0,
+        zorder=0,
+    )
+    axes.margins(x=0)

@@ -1,0 +1,129 @@
+"""Figures of any run: whole, fallen, interrupted, without a completed step."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+import template_control as tc
+from template_control.cli.main import main
+from template_control.slip.gait import vlo_energy
+from template_control.view.figures import FIGURES
+from template_control.view.state_figures import phase_portrait, template_energies, vlo_states
+
+
+@pytest.fixture(scope="module")
+def gait():
+    return tc.default_gait(tc.load_robot("five-link"))
+
+
+def walk(gait, steps, **options):
+    robot = tc.load_robot("five-link")
+    return tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=steps, **options))
+
+
+@pytest.fixture(scope="module")
+def record(gait):
+    return walk(gait, 4, pushes=(tc.Push(impulse=5.0, step=2),))
+
+
+def cut(record, samples):
+    """The run as it would be, had it been interrupted after so many samples."""
+    vlos = int(np.sum(record.vlo_time <= record.time[samples - 1]))
+    held = {}
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if field.name.startswith("vlo_") or field.name == "plan_seconds":
+            held[field.name] = value[:vlos]
+        elif field.name != "metadata":
+            held[field.name] = value[:samples]
+    return replace(record, **held)
+
+
+@pytest.mark.parametrize("kind", ["whole", "fallen", "two samples", "no step"])
+def test_every_run_has_every_figure(record, gait, kind, tmp_path):
+    if kind == "fallen":
+        weak = tc.EmbeddingOptions(torque_scale=0.2)
+        record = walk(gait, 4, embedding=weak)
+        assert record.fell
+    elif kind != "whole":
+        record = cut(record, 2 if kind == "two samples" else 150)
+        assert record.steps == 0
+    paths = tc.save_figures(record, tmp_path)
+    assert [path.stem for path in paths] == list(FIGURES)
+    for path in paths:
+        picture = imread(path)[..., :3]
+        assert np.mean(picture.min(axis=2) < 0.8) > 0.005, f"{path} is empty"
+
+
+def test_the_command_draws_beside_the_run_or_elsewhere(record, tmp_path, capfd):
+    run = record.save(tmp_path / "run.npz")
+    assert main(["plots", str(run)]) == 0
+    beside = [tmp_path / f"{name}.png" for name in FIGURES]
+    assert capfd.readouterr().out.split() == [str(path) for path in beside]
+    assert all(path.is_file() for path in beside)
+    assert main(["plots", str(run), "--output", str(tmp_path / "new" / "folder")]) == 0
+    assert len(list((tmp_path / "new" / "folder").glob("*.png"))) == len(FIGURES)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "culprit"),
+    [
+        (["missing.npz"], "missing.npz"),
+        (["junk.npz"], "junk.npz"),
+        (["run.npz", "--output", "/proc/none"], "/proc/none"),
+        (["short.npz"], "fewer than two samples"),
+    ],
+)
+def test_bad_input_is_one_line(record, arguments, culprit, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    record.save("run.npz")
+    cut(record, 1).save("short.npz")
+    (tmp_path / "junk.npz").write_text("junk")
+    assert main(["plots", *arguments]) == 2
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    assert culprit in captured.err
+    assert len(captured.err.strip().splitlines()) == 1
+
+
+def test_template_conserves_its_energy_within_a_phase(record, gait):
+    total = template_energies(record)["total"]
+    target = vlo_energy(gait.parameters, gait.vlo)
+    first = record.time < 0.1
+    assert np.allclose(total[first], target, atol=0.01)
+    # After the rear liftoff until VLO nothing changes the template.
+    last = record.metadata["nodes"].index("SS_bv^w")
+    for begin, end in zip(record.vlo_time, record.vlo_time[1:], strict=False):
+        on = (record.node == last) & (record.time > begin) & (record.time < end)
+        assert np.ptp(total[on]) < 0.02
+
+
+def test_energies_add_up(record):
+    parts = template_energies(record)
+    assert np.all(parts["spring"] >= 0.0)
+    assert np.allclose(parts["total"], parts["kinetic"] + parts["gravity"] + parts["spring"])
+
+
+def test_vlo_figure_shows_the_recorded_states(record, gait):
+    figure = vlo_states(record)
+    speed, height, vertical, energy = figure.axes
+    for axes, column in ((speed, 0), (height, 1), (vertical, 2)):
+        shown = {line.get_label(): line.get_ydata() for line in axes.lines}
+        assert np.array_equal(shown["reached"], record.vlo_state[:, column])
+        assert np.array_equal(shown["expected by the planner"], record.vlo_predicted[:-1, column])
+        assert np.allclose(shown["gait"], gait.vlo[column])
+    reached = next(line for line in energy.lines if line.get_label() == "reached").get_ydata()
+    assert reached[-1] == pytest.approx(vlo_energy(gait.parameters, record.vlo_state[-1]))
+
+
+def test_portrait_is_broken_where_the_stance_foot_changes(record):
+    figure = phase_portrait(record)
+    forward = figure.axes[1]
+    robot = next(line for line in forward.lines if line.get_label() == "robot")
+    steps = np.diff(robot.get_xdata())
+    assert np.nanmax(np.abs(steps)) < 0.05
+    assert np.isnan(robot.get_xdata()).sum() >= 3
+    vlo = next(line for line in forward.lines if line.get_label() == "robot at VLO")
+    assert np.allclose(vlo.get_xdata(), 0.0, atol=0.01)
