@@ -100,6 +100,7 @@ class EmbeddingController:
         rear, front: indices of the feet; in single stance the rear one carries.
         planning: the step's decision and the path that follows it.
         reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
+        ground: height of the template's ground: of the foot that landed last [m].
         lead: of the point whose direction is the phase over the CoM [m].
         template_forces: (2, 2) leg forces of the template at this phase [N], rear and front.
         swing: reference of the swing foot.
@@ -123,6 +124,8 @@ class EmbeddingController:
         self.template_forces = np.zeros((2, 2))
         self.phase_time = 0.0
         self.lead = 0.0
+        self.ground = 0.0
+        self._rear_shift = 0.0
         self.time = 0.0
         self._sensed = Sensed(np.zeros(4), np.zeros(2))
         self._rows = {
@@ -139,6 +142,12 @@ class EmbeddingController:
     def steps(self) -> list[StepReport]:
         """One report a VLO, the start's included."""
         return self.planning.steps
+
+    @property
+    def template_com(self) -> tuple[float, float]:
+        """The template's CoM at the robot's phase, in the world [m]."""
+        x, y = self.reference[:2]
+        return float(self._sensed.toes[0] + x), float(self.ground + y)
 
     def start(self, rear: int) -> None:
         """Begin at a VLO over foot ``rear``; the robot's model must be up to date.
@@ -170,12 +179,13 @@ class EmbeddingController:
         self._sensed.swing_time += dt
         self._sense(contact)
         self._advance()
-        if self.planning.surprised(
-            self._sensed.state[2] - self.reference[2], self.phase_time, self.time
-        ):
-            self.planning.reconsider(self.node, self._sensed, self.time)
-            self._on_new_path()
         s = self._sensed
+        if self.planning.overdue(self.node, self.phase_time):
+            self.planning.reach_on(self.node, s, self.time)
+            self._on_new_path()
+        elif self.planning.surprised(s.state[2] - self.reference[2], self.phase_time, self.time):
+            self.planning.reconsider(self.node, s, self.time)
+            self._on_new_path()
         x, y = s.state[0] + self.lead - s.toes[0], s.state[1]
         path, toe = self.planning.path, self.planning.toe
         self.phase_time, row = at_phase(
@@ -203,9 +213,11 @@ class EmbeddingController:
 
     def _sense(self, contact: NDArray[np.bool_]) -> None:
         r, s = self.robot, self._sensed
-        ground = r.foot_position[self.rear, 1]
-        height = r.com[1] - ground
-        s.toes[0], s.toes[1] = r.foot_position[self.rear, 0], r.foot_position[self.front, 0]
+        landed = self.front if self.node.phase is Phase.DS else self.rear
+        self.ground = float(r.foot_position[landed, 1])
+        height = r.com[1] - self.ground
+        s.toes[0] = r.foot_position[self.rear, 0] + self._rear_shift
+        s.toes[1] = r.foot_position[self.front, 0]
         s.state[0], s.state[1] = r.com[0], height
         # The swing leg's angular momentum makes dx/dt of the CoM swing within a step while
         # the momentum about the foot, which is what the template predicts, does not.
@@ -232,18 +244,33 @@ class EmbeddingController:
             if edge.reset is Reset.SHIFT:
                 self._lift_off()
             elif edge.reset is Reset.PLACE_FRONT:
-                self.planning.follow(self.node, self._sensed, self.time)
-                self._on_new_path()
+                self._touch_down()
             if edge.section:
                 self._decide()
             return
 
+    def _touch_down(self) -> None:
+        """The template's ground is now the front foot's.
+
+        Where that is higher or lower than the rear foot's, the template's rear toe is moved so
+        that the leg keeps its length, and with it its force.
+        """
+        s = self._sensed
+        ground = float(self.robot.foot_position[self.front, 1])
+        back, height = s.state[0] - s.toes[0], s.state[1] + self.ground - ground
+        self._rear_shift = float(back - np.sqrt(max(back**2 + s.state[1] ** 2 - height**2, 0.0)))
+        s.toes[0] += self._rear_shift
+        self.ground, s.state[1] = ground, height
+        self.planning.follow(self.node, s, self.time)
+        self._on_new_path()
+
     def _lift_off(self) -> None:
         """The front foot becomes the rear one; the plan goes on from its toe."""
+        self._rear_shift = 0.0
         self.planning.toe = self.planning.path.front_toe
         self.rear, self.front = self.front, self.rear
         r, s = self.robot, self._sensed
-        s.toes[0], s.toes[1] = s.toes[1], s.toes[0]
+        s.toes[0], s.toes[1] = s.toes[1], r.foot_position[self.front, 0]
         s.swing_time = 0.0
         self.swing.start(r.foot_position[self.front], r.foot_velocity[self.front])
 
@@ -290,7 +317,10 @@ class EmbeddingController:
             gait = self.planner.gait
             foothold = self._sensed.toes[0] + gait.step_length
             due = gait.step_duration - self._sensed.swing_time
-        swing.advance(foothold, due, dt)
+        if self.planning.reaching:
+            swing.reach_down(dt)
+        else:
+            swing.advance(foothold, due, dt, self.ground)
         position, velocity = r.foot_position[self.front], r.foot_velocity[self.front]
         kp, kd = o.gains.swing
         forward = swing.within_reach(q[:2], v[0], r.leg_length)

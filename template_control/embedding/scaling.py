@@ -79,11 +79,17 @@ class Scale:
             landing_speed=options.landing_speed * self.speed,
             horizon=options.horizon * self.time,
             lead=options.lead * self.time,
+            reach_acceleration=options.reach_acceleration * self.speed / self.time,
         )
 
     def replan(self, options: ReplanOptions) -> ReplanOptions:
         """When to plan anew."""
-        return ReplanOptions(options.speed * self.speed, options.interval * self.time)
+        return replace(
+            options,
+            speed=options.speed * self.speed,
+            interval=options.interval * self.time,
+            patience=options.patience * self.time,
+        )
 
 
 def default_gait(robot: PlanarBiped) -> WalkingGait:

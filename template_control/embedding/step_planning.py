@@ -19,7 +19,7 @@ from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.hybrid import Node
 from template_control.slip.kernel import new_scratch
 from template_control.slip.stride import run
-from template_control.slip.vocabulary import Slot
+from template_control.slip.vocabulary import Event, Slot
 
 Array = NDArray[np.float64]
 
@@ -33,10 +33,14 @@ class ReplanOptions:
     Attributes:
         speed: deviation of the (momentum-based) forward speed from the plan's [m/s].
         interval: shortest time between such plans [s].
+        patience: a touchdown that is later than this [s] is not waited for on the same path.
+        reach: the touchdown angle is then taken to be lower by this [rad].
     """
 
     speed: float = 0.05
     interval: float = 0.02
+    patience: float = 0.01
+    reach: float = 0.15
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,7 @@ class StepPlanning:
         steps: one report a VLO, the start's included.
         path: the template's, from the last plan on.
         toe: x of the rear toe the path's phase is measured from [m].
+        reaching: the swing foot is overdue, and the path goes on without it.
     """
 
     def __init__(self, planner: Planner, options: ReplanOptions) -> None:
@@ -80,6 +85,7 @@ class StepPlanning:
         self.steps: list[StepReport] = []
         self.path: Plan
         self.toe = 0.0
+        self.reaching = False
         self._planned_at = 0.0
         self._scratch = new_scratch()
 
@@ -101,10 +107,17 @@ class StepPlanning:
         self.steps.append(StepReport(now, z, decision, self.planner.offset.copy(), load, seconds))
         self.follow(node, sensed, now)
 
-    def follow(self, node: Node, sensed: Sensed, now: float) -> None:
-        """Template path from here to the touchdown after the next VLO."""
+    def follow(self, node: Node, sensed: Sensed, now: float, reach: float = 0.0) -> None:
+        """Template path from here to the touchdown after the next VLO.
+
+        Args:
+            node, sensed, now: see :meth:`decide`.
+            reach: how much lower the touchdown angle is than decided [rad].
+        """
         toes = (float(sensed.toes[0]), float(sensed.toes[1]))
-        u = self.steps[-1].decision.controls
+        u = self.steps[-1].decision.controls.copy()
+        u[Slot.TOUCHDOWN_ANGLE] -= reach
+        self.reaching = reach > 0.0
         first = run(self.parameters, node.name, sensed.state, u, toes, scratch=self._scratch)
         strides = [first]
         if first.completed:
@@ -124,6 +137,21 @@ class StepPlanning:
         self.toe = toes[0]
         self._planned_at = now
 
+    def overdue(self, node: Node, phase_time: float) -> bool:
+        """Whether the swing foot should have found the ground by now.
+
+        Args:
+            node: of the automaton, the robot's.
+            phase_time: time along the path [s].
+        """
+        awaited = any(edge.event is Event.TOUCHDOWN for edge in node.edges)
+        late = phase_time > self.path.touchdown + self.options.patience
+        return awaited and late and not self.reaching
+
+    def reach_on(self, node: Node, sensed: Sensed, now: float) -> None:
+        """The ground is lower than was thought: the template stays in single stance."""
+        self.follow(node, sensed, now, self.options.reach)
+
     def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
         """Whether a disturbance has carried the robot away from its path.
 
@@ -134,7 +162,8 @@ class StepPlanning:
         """
         o = self.options
         return (
-            abs(deviation) > o.speed
+            not self.reaching
+            and abs(deviation) > o.speed
             and phase_time > o.interval
             and now - self._planned_at > o.interval
         )

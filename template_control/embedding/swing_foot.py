@@ -28,6 +28,7 @@ class SwingOptions:
         horizon: below this time to go [s] the path is no longer re-aimed.
         lead: the foot is above its foothold this long before touchdown [s], so that it
             comes down at rest relative to the ground.
+        reach_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
         reach: the foot is kept within this share of the leg's length from the hip; a knee
             that goes straight hits its stop with tens of kilonewtons.
     """
@@ -36,6 +37,7 @@ class SwingOptions:
     landing_speed: float = 0.2
     horizon: float = 0.02
     lead: float = 0.03
+    reach_acceleration: float = 10.0
     reach: float = 0.97
 
 
@@ -81,8 +83,15 @@ class SwingFoot:
         self.y[:] = position[1], velocity[1], 0.0
         self._elapsed = elapsed
 
-    def advance(self, foothold: float, time_to_go: float, dt: float) -> None:
-        """Move the reference by ``dt`` towards ``foothold``, due in ``time_to_go`` [s]."""
+    def advance(self, foothold: float, time_to_go: float, dt: float, ground: float) -> None:
+        """Move the reference by ``dt`` towards its foothold.
+
+        Args:
+            foothold: x [m].
+            time_to_go: until it is due [s].
+            dt: [s].
+            ground: height of the foothold [m].
+        """
         o = self.options
         if time_to_go <= o.horizon or not np.isfinite(foothold):
             self._coast(dt)
@@ -91,10 +100,17 @@ class SwingFoot:
             # Rising while less than half of the swing is over.
             rising = 0.5 * (time_to_go - self._elapsed)
             if rising > o.horizon:
-                quintic_step(self.y, o.clearance, 0.0, rising, dt)
+                quintic_step(self.y, ground + o.clearance, 0.0, rising, dt)
             else:
-                quintic_step(self.y, 0.0, -o.landing_speed, time_to_go, dt)
+                quintic_step(self.y, ground, -o.landing_speed, time_to_go, dt)
         self._elapsed += dt
+
+    def reach_down(self, dt: float) -> None:
+        """Overdue: the ground is lower than was thought; fall to it."""
+        self.x[1], self.x[2] = 0.0, 0.0
+        self.y[2] = -self.options.reach_acceleration
+        self.y[0] += (self.y[1] + 0.5 * self.y[2] * dt) * dt
+        self.y[1] += self.y[2] * dt
 
     def within_reach(self, hip: Array, hip_speed: float, leg_length: float) -> Array:
         """The horizontal reference (3,), held where the leg can follow.
@@ -111,7 +127,7 @@ class SwingFoot:
         return np.array([hip[0] + span, hip_speed, 0.0])
 
     def _coast(self, dt: float) -> None:
-        """Overdue or nearly there: hold the horizontal position, keep coming down."""
+        """Nearly there: hold the horizontal position, keep coming down."""
         for axis, speed in ((self.x, 0.0), (self.y, -self.options.landing_speed)):
             axis[1], axis[2] = speed, 0.0
             axis[0] += speed * dt

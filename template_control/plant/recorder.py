@@ -87,8 +87,7 @@ class Recorder:
         self._torque_square += torque * torque
         self.saturated += bool(np.any(size >= 0.999 * c.qp.torque_limit))
         self.failures += not solution.solved
-        toe = r.foot_position[c.rear]
-        template_x, template_y = c.reference[0] + toe[0], c.reference[1] + toe[1]
+        template_x, template_y = c.template_com
         for axis, error in enumerate((template_x - r.com[0], template_y - r.com[1])):
             self._error_square[axis] += error * error
             self.error_max[axis] = max(self.error_max[axis], abs(error))
