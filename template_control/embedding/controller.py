@@ -42,6 +42,9 @@ from template_control.whole_body.tasks import (
 
 Array = NDArray[np.float64]
 
+import os
+_G = float(os.environ.get("RG","1e4"))
+_REACH_GAINS = (_G, 2 * _G**0.5)
 _NO_CAP = np.full(1, np.inf)
 
 
@@ -184,7 +187,7 @@ class EmbeddingController:
             self.planning.reach_on(self.node, s, self.time)
             self._on_new_path()
         elif self.planning.surprised(s.state[2] - self.reference[2], self.phase_time, self.time):
-            self.planning.reconsider(self.node, s, self.time)
+            self.planning.reconsider(self.node, s, self.phase_time, self.time)
             self._on_new_path()
         x, y = s.state[0] + self.lead - s.toes[0], s.state[1]
         path, toe = self.planning.path, self.planning.toe
@@ -323,9 +326,11 @@ class EmbeddingController:
             swing.advance(foothold, due, dt, self.ground)
         position, velocity = r.foot_position[self.front], r.foot_velocity[self.front]
         kp, kd = o.gains.swing
-        forward = swing.within_reach(q[:2], v[0], r.leg_length)
-        for row, axis, i in ((Row.SWING_X, forward, 0), (Row.SWING_Y, swing.y, 1)):
+        for row, axis, i in ((Row.SWING_X, swing.x, 0), (Row.SWING_Y, swing.y, 1)):
             d[row] = pd(axis[2], axis[0], axis[1], position[i], velocity[i], kp, kd)
+        limit = swing.furthest(q[:2], r.leg_length)
+        held = pd(0.0, limit, v[0], position[0], velocity[0], *_REACH_GAINS)
+        d[Row.SWING_X] = min(d[Row.SWING_X], held)
         return self.qp.solve(
             self.tasks,
             o.single_stance,

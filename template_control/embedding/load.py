@@ -13,12 +13,15 @@ class LoadOptions:
         gain: share of a step's mean feedback that enters the estimate.
         dead_zone: mean feedback over g that counts as none; a step of the nominal robot
             has up to this much, from the swing leg, and must not be learnt.
+        leak: share of the estimate forgotten in a step whose feedback is in the dead zone; what
+            a disturbance taught must not stay.
         step_bound: largest change of the factor in one step; a push is no load.
         bounds: of the factor.
     """
 
     gain: float = 0.7
     dead_zone: float = 0.02
+    leak: float = 0.1
     step_bound: float = 0.05
     bounds: tuple[float, float] = (0.7, 1.4)
 
@@ -54,5 +57,7 @@ class LoadEstimate:
         mean = self._sum / self._time / self._gravity
         change = min(o.gain * max(abs(mean) - o.dead_zone, 0.0), o.step_bound)
         factor = self.factor + (change if mean > 0.0 else -change)
+        if change == 0.0:
+            factor -= o.leak * (factor - 1.0)
         self.factor = min(max(factor, o.bounds[0]), o.bounds[1])
         self._sum = self._time = 0.0

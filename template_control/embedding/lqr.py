@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from template_control.embedding.planner import Decision
+from template_control.embedding.planner import ANY_ANGLE, Decision
 from template_control.embedding.scaling import Scale
 from template_control.embedding.step_search import FALL_PRICE, Law, linear, price, search
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
@@ -23,11 +23,12 @@ from template_control.slip.kernel import new_scratch
 from template_control.slip.return_map import ReturnMap
 from template_control.slip.stride import kernel_model
 from template_control.slip.tables import TABLES
-from template_control.slip.vocabulary import Slot
+from template_control.slip.vocabulary import MapKind, Slot
 
 Array = NDArray[np.float64]
 
 _SLOTS = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
+_EXACT = int(MapKind.EXACT)
 _NODE = AUTOMATON.index[STRIDE_START["w"]]
 
 
@@ -53,6 +54,9 @@ class LqrOptions:
             foot would touch down at once.
         trusted_price: the linear law's step is taken without a search below this price.
         spread: half-widths of the search in alpha [rad] and kappa_2 / k0.
+        brakes: second steps that the search reckons with beside the law's own: alpha relative
+            to the gait's [rad], kappa_1 and kappa_2 over k0. A leg that is stiffer before its
+            virtual bottom than after takes energy out.
     """
 
     state_cost: tuple[float, float, float] = (10.0, 100.0, 10.0)
@@ -66,6 +70,12 @@ class LqrOptions:
     top_margin: float = 0.01
     trusted_price: float = 2.0
     spread: tuple[float, float] = (0.16, 0.25)
+    brakes: tuple[tuple[float, float, float], ...] = (
+        (0.0, 1.5, 1.0),
+        (-0.058, 1.0, 0.75),
+        (0.025, 1.5, 1.0),
+        (-0.058, 1.25, 0.75),
+    )
 
     def scaled(self, scale: Scale) -> LqrOptions:
         """The same tuning for a template of another size."""
@@ -122,17 +132,24 @@ class LqrPlanner:
             offset=self.offset,
             lower=np.array([nominal[0] + o.angle_range[0], *[o.stiffness_range[0]] * 2]),
             upper=np.array([nominal[0] + o.angle_range[1], *[o.stiffness_range[1]] * 2]),
+            brakes=np.add(np.array(o.brakes).reshape(-1, 3), (nominal[0], 0.0, 0.0)),
+            enough=o.trusted_price,
             top_margin=o.top_margin,
             stiffness=p.leg_stiffness,
             model=kernel_model(p),
         )
 
-    def decide(self, z: Array) -> Decision:
+    def decide(self, z: Array, angles: tuple[float, float] = ANY_ANGLE) -> Decision:
         """Controls for a step from VLO state ``z`` (3,); see :class:`Planner`."""
         law, s = self._law, self._scratch
+        if angles != ANY_ANGLE:
+            lower, upper = law.lower.copy(), law.upper.copy()
+            lower[0] = min(max(lower[0], angles[0]), upper[0])
+            upper[0] = max(min(upper[0], angles[1]), lower[0])
+            law = law._replace(lower=lower, upper=upper)
         u, first = np.empty(3), np.empty(3)
         linear(law, z, u)
-        cost = price(TABLES, _NODE, law, s, z, u, first)
+        cost = price(TABLES, _NODE, _EXACT, law, s, z, u, np.inf, first)
         trusted = cost < self.options.trusted_price
         if not trusted:
             cost = search(TABLES, _NODE, law, s, z, self._spread, u, first)

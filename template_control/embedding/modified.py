@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planner import Decision
+from template_control.embedding.planner import ANY_ANGLE, Decision
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import WalkingGait
 from template_control.slip.kernel import new_scratch
@@ -60,14 +60,14 @@ class ModifiedPlanner:
         k0 = gait.parameters.leg_stiffness
         self._stiffness = np.array(self.options.stiffness_range) * k0
 
-    def decide(self, z: Array) -> Decision:
+    def decide(self, z: Array, angles: tuple[float, float] = ANY_ANGLE) -> Decision:
         """Controls for a step from VLO state ``z`` (3,); see :class:`Planner`."""
         p, o = self.gait.parameters, self.options
         predicted = np.empty(3)
         nominal = float(self.gait.controls[Slot.TOUCHDOWN_ANGLE])
         top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
-        high = min(nominal + o.angle_range[1], top)
-        angles = np.array([min(nominal + o.angle_range[0], high), high])
+        high = min(nominal + o.angle_range[1], top, max(angles[1], nominal + o.angle_range[0]))
+        low = min(max(nominal + o.angle_range[0], angles[0]), high)
         outcome, alpha, kappa_2, residual = search_angle(
             TABLES,
             self._model,
@@ -75,8 +75,8 @@ class ModifiedPlanner:
             _NODE,
             z,
             self.gait.vlo,
-            min(nominal, high),
-            angles,
+            min(max(nominal, low), high),
+            np.array([low, high]),
             p.leg_stiffness,
             self._stiffness,
             self._scratch,

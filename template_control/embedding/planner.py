@@ -13,6 +13,10 @@ from template_control.slip.gait import WalkingGait
 Array = NDArray[np.float64]
 
 
+ANY_ANGLE = (-np.inf, np.inf)
+"""Of a step whose touchdown angle is free."""
+
+
 @dataclass(frozen=True)
 class Decision:
     """Controls for the step that begins at a VLO.
@@ -42,8 +46,13 @@ class Planner(Protocol):
     def offset(self) -> Array:
         """(3,) estimate of the robot's VLO state less the template's after one step."""
 
-    def decide(self, z: Array) -> Decision:
-        """Controls for a step from VLO state ``z`` (3,) dx/dt, y, dy/dt."""
+    def decide(self, z: Array, angles: tuple[float, float] = ANY_ANGLE) -> Decision:
+        """Controls for a step from VLO state ``z`` (3,) dx/dt, y, dy/dt.
+
+        Args:
+            z: the state.
+            angles: touchdown angles [rad] the swing foot can still reach.
+        """
 
     def observe(self, decision: Decision, z: Array) -> None:
         """Learn that the step planned by ``decision`` ended in VLO state ``z``."""

@@ -89,6 +89,7 @@ class Scale:
             speed=options.speed * self.speed,
             interval=options.interval * self.time,
             patience=options.patience * self.time,
+            agility=options.agility / self.time**2,
         )
 
 

@@ -35,12 +35,15 @@ class ReplanOptions:
         interval: shortest time between such plans [s].
         patience: a touchdown that is later than this [s] is not waited for on the same path.
         reach: the touchdown angle is then taken to be lower by this [rad].
+        agility: a touchdown in t seconds can still be planned anew with an angle that differs
+            from the old one by this times t^2 [rad/s^2]; the swing foot cannot do more.
     """
 
     speed: float = 0.05
     interval: float = 0.02
     patience: float = 0.01
     reach: float = 0.15
+    agility: float = 8.0
 
 
 @dataclass(frozen=True)
@@ -168,12 +171,16 @@ class StepPlanning:
             and now - self._planned_at > o.interval
         )
 
-    def reconsider(self, node: Node, sensed: Sensed, now: float) -> None:
+    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> None:
         """Plan again from here; before touchdown the step's controls are still free."""
         if node.name == STRIDE_START["w"]:
             z = self._back_to_vlo(sensed)
             if z is not None:
-                self.steps[-1] = replace(self.steps[-1], decision=self.planner.decide(z))
+                left = max(self.path.touchdown - phase_time, 0.0)
+                change = self.options.agility * min(left, 1.0) ** 2
+                angle = float(self.steps[-1].decision.controls[Slot.TOUCHDOWN_ANGLE])
+                decision = self.planner.decide(z, (angle - change, angle + change))
+                self.steps[-1] = replace(self.steps[-1], decision=decision)
         self.follow(node, sensed, now)
 
     def _back_to_vlo(self, sensed: Sensed) -> Array | None:

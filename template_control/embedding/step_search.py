@@ -1,7 +1,9 @@
 """Compiled look-ahead on the exact VLO return map: what an LQR step is worth, and a better one.
 
-A step is judged two steps ahead: it is taken on the exact map, the step after it by the
-(bounded) LQR law, and the state then reached is priced with the LQR's cost-to-go.
+A step is judged two steps ahead: after it comes the best of the (bounded) LQR law's step and a
+few that brake hard, and the state then reached is priced with the LQR's cost-to-go. The search
+runs on the improved closed-form map, whose error is far below the robot's; what it finds is
+priced on the exact one.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from template_control.slip.vocabulary import MapKind
 
 Array = NDArray[np.float64]
 
-_EXACT = int(MapKind.EXACT)
+_EXACT, _FAST = int(MapKind.EXACT), int(MapKind.IMPROVED)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
 
@@ -34,6 +36,8 @@ class Law(NamedTuple):
         cost: (3, 3) cost-to-go about ``target``.
         offset: (3,) what the robot adds to the template's next VLO state.
         lower, upper: (3,) bounds of u.
+        brakes: (n, 3) other controls than u_s - K (z - z_s) for the second step.
+        enough: a cost below which no other second step is tried.
         top_margin: alpha stays this far [rad] below asin(y / l0).
         stiffness: k0 [N/m].
         model: the template.
@@ -46,6 +50,8 @@ class Law(NamedTuple):
     offset: Array
     lower: Array
     upper: Array
+    brakes: Array
+    enough: float
     top_margin: float
     stiffness: float
     model: Model
@@ -71,13 +77,15 @@ def linear(law: Law, z: Array, u: Array) -> None:
 
 
 @njit(cache=True)
-def step(tables: Tables, node: int, law: Law, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
+def step(
+    tables: Tables, node: int, kind: int, law: Law, s: Scratch, z: Array, u: Array, z_next: Array
+) -> int:
     """One step from ``z`` with controls ``u``, the robot's offset included; the Outcome."""
     controls = np.zeros(5)
     controls[0] = u[0]
     controls[1], controls[2] = u[1] * law.stiffness, u[2] * law.stiffness
     result = np.empty(RESULTS)
-    outcome = section_map(tables, law.model, _EXACT, node, z, controls, s, result)
+    outcome = section_map(tables, law.model, kind, node, z, controls, s, result)
     for i in range(3):
         z_next[i] = result[i] + law.offset[i]
     return outcome
@@ -94,17 +102,42 @@ def _cost_to_go(law: Law, z: Array) -> float:
 
 @njit(cache=True)
 def price(
-    tables: Tables, node: int, law: Law, s: Scratch, z: Array, u: Array, first: Array
+    tables: Tables,
+    node: int,
+    kind: int,
+    law: Law,
+    s: Scratch,
+    z: Array,
+    u: Array,
+    limit: float,
+    first: Array,
 ) -> float:
-    """Cost of taking ``u`` at ``z``; the state after one step into ``first`` (3,)."""
+    """Cost of taking ``u`` at ``z``; the state after one step into ``first`` (3,).
+
+    Args:
+        kind: the MapKind.
+        limit: a cost known to be too much; the second step is not looked at beyond it.
+    """
     second = np.empty(3)
     u2 = np.empty(3)
-    if step(tables, node, law, s, z, u, first) != 0:
+    if step(tables, node, kind, law, s, z, u, first) != 0:
         return 2.0 * FALL_PRICE
+    here = _cost_to_go(law, first)
+    if 0.3 * here >= limit:
+        return 0.3 * here
     linear(law, first, u2)
-    if step(tables, node, law, s, first, u2, second) != 0:
-        return FALL_PRICE + _cost_to_go(law, first)
-    return _cost_to_go(law, second) + 0.3 * _cost_to_go(law, first)
+    best = FALL_PRICE + here
+    if step(tables, node, kind, law, s, first, u2, second) == 0:
+        best = _cost_to_go(law, second) + 0.3 * here
+    for i in range(law.brakes.shape[0]):
+        # The law's own step is good enough near the gait.
+        if best < law.enough:
+            break
+        u2[:] = law.brakes[i]
+        bounded(law, first, u2)
+        if step(tables, node, kind, law, s, first, u2, second) == 0:
+            best = min(best, _cost_to_go(law, second) + 0.3 * here)
+    return best
 
 
 @njit(cache=True)
@@ -122,7 +155,7 @@ def _try(
 ) -> float:
     """Price ``u`` once within bounds; if it is cheaper, it is the new best."""
     bounded(law, z, u)
-    cost = price(tables, node, law, s, z, u, end)
+    cost = price(tables, node, _FAST, law, s, z, u, cheapest, end)
     if cost >= cheapest:
         return cheapest
     best[:] = u
@@ -155,7 +188,7 @@ def search(
         The price of ``best``.
     """
     u, end = np.empty(3), np.empty(3)
-    cheapest = price(tables, node, law, s, z, best, first)
+    cheapest = price(tables, node, _FAST, law, s, z, best, np.inf, first)
     for i in range(45):
         u[0] = (i // 9 + 0.5) / 5.0
         u[1] = (i // 3 % 3 + 0.5) / 3.0
@@ -177,4 +210,4 @@ def search(
             cheapest = _try(tables, node, law, s, z, u, cheapest, best, first, end)
         width_alpha *= 0.4
         width_kappa *= 0.4
-    return cheapest
+    return price(tables, node, _EXACT, law, s, z, best, np.inf, first)

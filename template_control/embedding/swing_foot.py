@@ -112,19 +112,16 @@ class SwingFoot:
         self.y[0] += (self.y[1] + 0.5 * self.y[2] * dt) * dt
         self.y[1] += self.y[2] * dt
 
-    def within_reach(self, hip: Array, hip_speed: float, leg_length: float) -> Array:
-        """The horizontal reference (3,), held where the leg can follow.
+    def furthest(self, hip: Array, leg_length: float) -> float:
+        """The furthest x that the leg reaches at the reference's height [m].
 
         Args:
             hip: (2,) position of the hip [m].
-            hip_speed: its forward speed [m/s].
             leg_length: of the straight leg [m].
         """
         height = hip[1] - self.y[0]
-        span = np.sqrt(max((self.options.reach * leg_length) ** 2 - height**2, 0.0))
-        if self.x[0] <= hip[0] + span:
-            return self.x
-        return np.array([hip[0] + span, hip_speed, 0.0])
+        reach = self.options.reach * leg_length
+        return float(hip[0] + np.sqrt(max(reach**2 - height**2, 0.0)))
 
     def _coast(self, dt: float) -> None:
         """Nearly there: hold the horizontal position, keep coming down."""
