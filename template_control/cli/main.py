@@ -6,10 +6,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from template_control.cli import automaton, gaits, reproduce, slip, walk
+from template_control.cli import automaton, gaits, reproduce, robustness, slip, walk
 from template_control.errors import TemplateControlError
 
-_COMMANDS = (walk, slip, gaits, automaton, reproduce)
+_COMMANDS = (walk, robustness, slip, gaits, automaton, reproduce)
 _USER_ERROR = 2
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from template_control.cli.options import add_robot
 from template_control.cli.output import progress_bar, writable
 from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
@@ -23,7 +24,7 @@ from template_control.plant.quiet import stdout_to_stderr
 from template_control.plant.record import Record
 from template_control.plant.simulation import SimulationOptions, perturbed_start, simulate
 from template_control.plant.summary import summarise
-from template_control.robot.library import ROBOTS, load_robot
+from template_control.robot.library import load_robot
 from template_control.slip.gait import WalkingGait, gait_for_speed
 from template_control.slip.parameters import SlipParameters
 from template_control.view.figures import save_figures
@@ -50,12 +51,7 @@ def add_parser(commands: Any) -> None:
         ),
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
-    parser.add_argument(
-        "--robot",
-        default="five-link",
-        metavar="NAME|URDF",
-        help=f"a shipped robot ({', '.join(ROBOTS)}) or the path of a planar URDF",
-    )
+    add_robot(parser)
     parser.add_argument("--steps", type=int, default=50, help="steps to walk, VLO to VLO")
     parser.add_argument(
         "--gait",
