@@ -43,7 +43,6 @@ def test_levels_are_those_of_a_walk_of_the_same_dimensionless_robot():
     for name, factor in (
         ("push-forward", 5.0 / 80.0 * time),
         ("step-down", 0.25),
-        ("delay", time),
         ("friction", 1.0),
         ("heavier", 1.0),
         ("noise", 1.0),
@@ -51,6 +50,11 @@ def test_levels_are_those_of_a_walk_of_the_same_dimensionless_robot():
         d = BY_NAME[name]
         assert d.levels_for(SlipParameters()) == pytest.approx(d.levels)
         assert d.levels_for(small) == pytest.approx(factor * np.array(d.levels))
+    # Whole physics steps: 1.4, 2.8, 4.2, ... ms.
+    long = SlipParameters(rest_length=0.49, leg_stiffness=16500.0 / 0.49)
+    assert BY_NAME["delay"].levels_for(long)[:4] == pytest.approx([1e-3, 3e-3, 4e-3, 6e-3])
+    tiny = SlipParameters(rest_length=0.01, leg_stiffness=1.65e6)
+    assert BY_NAME["delay"].levels_for(tiny) == pytest.approx([1e-3, 2e-3, 3e-3, 4e-3, 5e-3])
 
 
 def test_levels_are_round_and_grow_more_severe():

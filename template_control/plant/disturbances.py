@@ -89,6 +89,7 @@ class Disturbance:
             the start and the walk must only go on.
         size: of a template's level over the reference's.
         options: of the run at a level [SI] and a trial's index.
+        grain: levels are whole multiples of it, at least one; 0 for any levels [SI].
     """
 
     name: str
@@ -100,11 +101,15 @@ class Disturbance:
     passing: bool
     size: Callable[[SlipParameters], float]
     options: Callable[[Situation, float, int], SimulationOptions]
+    grain: float = 0.0
 
     def levels_for(self, parameters: SlipParameters) -> list[float]:
         """The levels for a template [SI]."""
-        size = self.size(parameters)
-        return [size * level for level in self.levels]
+        levels = [self.size(parameters) * level for level in self.levels]
+        if self.grain:
+            grains = (max(1, round(level / self.grain)) for level in levels)
+            levels = [self.grain * n for n in dict.fromkeys(grains)]
+        return levels
 
     def shown(self, level: float) -> str:
         """A level with its unit."""
@@ -185,8 +190,7 @@ def _noisy(where: Situation, level: float, trial: int) -> SimulationOptions:
 
 
 def _late(where: Situation, level: float, trial: int) -> SimulationOptions:
-    ticks = max(1, round(level / _TIME_STEP))
-    return _lasting(where, trial, delay=ticks * _TIME_STEP)
+    return _lasting(where, trial, delay=level)
 
 
 def _ladder(step: float, count: int, start: float = 0.0) -> tuple[float, ...]:
@@ -197,6 +201,7 @@ def _ladder(step: float, count: int, start: float = 0.0) -> tuple[float, ...]:
 _PUSHES = _ladder(5.0, 30)
 _HEIGHTS = (0.005, *_ladder(0.01, 8))
 
+# Name, title, unit, its factor, levels, trials, passing, size, options.
 DISTURBANCES: tuple[Disturbance, ...] = (
     Disturbance(
         "push-forward", "push forward", "N s", 1.0, _PUSHES, _PHASES, True, _impulse, _pushed
@@ -248,7 +253,16 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         "noise", "sensor noise", "mrad", 1e3, _ladder(5e-4, 20), _STARTS, False, _plain, _noisy
     ),
     Disturbance(
-        "delay", "control delay", "ms", 1e3, _ladder(2e-3, 25), _STARTS, False, _time, _late
+        "delay",
+        "control delay",
+        "ms",
+        1e3,
+        _ladder(2e-3, 25),
+        _STARTS,
+        False,
+        _time,
+        _late,
+        grain=_TIME_STEP,
     ),
 )
 """All that are measured, in the order they are shown in."""

@@ -185,8 +185,8 @@ def measure(
     levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
     stem = _fingerprint(model, chosen)
     found = {d.name: Finding(d) for d in chosen}
-    for index in range(max(len(d.levels) for d in chosen)):
-        going = [d for d in chosen if index < len(d.levels) and not found[d.name].broken]
+    for index in range(max(len(of) for of in levels.values())):
+        going = [d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken]
         items: list[Item] = [
             {
                 "robot": robot,
