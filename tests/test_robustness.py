@@ -156,6 +156,16 @@ def finding(*rates, name="delay"):
 def test_breaking_points(rates, breaking, half, broken):
     found = finding(*rates)
     assert (found.breaking_point, found.half_point, found.broken) == (breaking, half, broken)
+    assert found.standing_point == breaking  # all that fail have fallen
+
+
+def test_a_walk_off_its_gait_fails_but_does_not_break():
+    delay = BY_NAME["delay"]
+    levels = (Level(1.0, 4, 0, 0), Level(2.0, 0, 0, 4), Level(3.0, 0, 0, 4), Level(4.0, 0, 1, 3))
+    found = Finding(delay, levels)
+    assert (found.breaking_point, found.half_point, found.standing_point) == (1.0, 1.0, 3.0)
+    assert not found.broken
+    assert Finding(delay, (*levels, Level(5.0, 0, 4, 0))).broken
 
 
 def made_up(robot, disturbance, level, number):
@@ -245,9 +255,9 @@ def test_figure_shows_every_disturbance(cheap):
 def test_markdown_says_where_it_breaks(cheap):
     text = command.markdown(cheap(["heavier", "lighter", "step-up"]))
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ")]
-    assert rows[2] == ["| step up", "5", "2 cm", "8 cm or more", "3 cm: 2 off its gait |"]
-    assert rows[3] == ["| heavier", "5", "20 %", "20 %", "30 %: 5 fell |"]
-    assert rows[4] == ["| lighter", "5", "90 % or more", "90 % or more", " |"]
+    assert rows[2] == ["| step up", "5", "2 cm", *["8 cm or more"] * 2, "3 cm: 2 off its gait |"]
+    assert rows[3] == ["| heavier", "5", *["20 %"] * 3, "30 %: 5 fell |"]
+    assert rows[4] == ["| lighter", "5", *["90 % or more"] * 3, " |"]
 
 
 # -- the command -----------------------------------------------------------------------

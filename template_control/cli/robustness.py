@@ -30,6 +30,7 @@ _COLUMNS = (
     "trials a level",
     "all succeed up to",
     "half succeed up to",
+    "none falls up to",
     "first failures",
 )
 _MOST_WORKERS = 1000
@@ -130,8 +131,8 @@ def data(found: Robustness) -> dict[str, Any]:
 
     Returns:
         robot, gait (mean_speed, vlo_height), undisturbed (speed_error, height_error),
-        disturbances: by name trials, breaking_point, half_point (null where the mildest
-        level is beyond it) and levels (level, success_rate, fell, astray).
+        disturbances: by name trials, breaking_point, half_point, standing_point (null where
+        the mildest level is beyond it) and levels (level, success_rate, fell, astray).
     """
     return {
         "robot": found.robot,
@@ -142,6 +143,7 @@ def data(found: Robustness) -> dict[str, Any]:
                 "trials": f.disturbance.trials,
                 "breaking_point": f.breaking_point,
                 "half_point": f.half_point,
+                "standing_point": f.standing_point,
                 "levels": [
                     {
                         "level": level.level,
@@ -167,8 +169,8 @@ def _row(finding: Finding) -> tuple[str, ...]:
 
     after = next((x for x in finding.levels if x.rate < 1.0), None)
     beyond = "" if after is None else f"{d.shown(after.level)}: {_told(after.fell, after.astray)}"
-    trials = str(d.trials)
-    return d.title, trials, point(finding.breaking_point), point(finding.half_point), beyond
+    points = (finding.breaking_point, finding.half_point, finding.standing_point)
+    return d.title, str(d.trials), *map(point, points), beyond
 
 
 def _told(fell: int, astray: int) -> str:

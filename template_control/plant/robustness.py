@@ -1,8 +1,8 @@
 """How much a robot's walk takes: every disturbance raised until the walk breaks.
 
 All disturbances are raised together, one level after the other, each level a sweep whose
-trials are on disk as they finish. A disturbance is left out from the level on where no trial
-succeeded, or fewer than half of them twice running.
+trials are on disk as they finish. A disturbance is left out from the level on where all trials
+fall, or more than half of them twice running; so it goes past the level where none succeeds.
 """
 
 from __future__ import annotations
@@ -62,6 +62,11 @@ class Level:
         """Share of the trials that succeeded."""
         return self.succeeded / (self.succeeded + self.fell + self.astray)
 
+    @property
+    def standing(self) -> float:
+        """Share of the trials without a fall."""
+        return 1.0 - self.fell / (self.succeeded + self.fell + self.astray)
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -78,27 +83,30 @@ class Finding:
     @property
     def breaking_point(self) -> float | None:
         """The severest level up to which all trials of all levels succeed; None: not one."""
-        return self._up_to(1.0)
+        return _last(self.levels, [level.rate >= 1.0 for level in self.levels])
 
     @property
     def half_point(self) -> float | None:
         """The severest level up to which half of the trials of each level succeed, or more."""
-        return self._up_to(_HALF)
+        return _last(self.levels, [level.rate >= _HALF for level in self.levels])
 
-    def _up_to(self, rate: float) -> float | None:
-        best = None
-        for level in self.levels:
-            if level.rate < rate:
-                break
-            best = level.level
-        return best
+    @property
+    def standing_point(self) -> float | None:
+        """The severest level up to which no trial falls."""
+        return _last(self.levels, [level.fell == 0 for level in self.levels])
 
     @property
     def broken(self) -> bool:
-        """Whether it need not be raised further: no success, or twice fewer than half."""
-        rates = [level.rate for level in self.levels]
+        """Whether it need not be raised further: all fall, or twice more than half."""
+        rates = [level.standing for level in self.levels]
         twice = len(rates) > 1 and max(rates[-2:]) < _HALF
         return bool(rates) and (rates[-1] == 0.0 or twice)
+
+
+def _last(levels: Sequence[Level], good: Sequence[bool]) -> float | None:
+    """The level before the first that is not good; None where that is the first."""
+    count = next((i for i, fine in enumerate(good) if not fine), len(good))
+    return levels[count - 1].level if count else None
 
 
 @dataclass(frozen=True)
