@@ -14,7 +14,7 @@ from template_control.cli import robustness as command
 from template_control.cli.main import build_parser, main
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.scaling import default_gait
-from template_control.errors import RobotError, SweepError
+from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.plant import robustness
 from template_control.plant.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
 from template_control.plant.robustness import Finding, Level, measure, off_gait, trial
@@ -242,6 +242,11 @@ def test_a_trial_that_fails_otherwise_is_no_fall(cheap, monkeypatch):
         cheap(["heavier"], quick=True)
 
 
+def test_unknown_disturbances_are_named():
+    with pytest.raises(ParameterError, match=r"wind.*push-forward"):
+        measure("five-link", ["wind"])
+
+
 def test_figure_shows_every_disturbance(cheap):
     found = cheap(quick=True)
     panels = robustness_figure(found).axes
@@ -339,6 +344,15 @@ def test_commands_of_the_documentation_are_understood(line):
     words = shlex.split(line)
     assert words[0] == "template-control"
     assert build_parser().parse_args(words[1:]).command == "robustness"
+
+
+def test_the_documentation_has_its_pictures_and_a_snippet_that_runs(capfd):
+    text = (DOCS / "robustness.md").read_text()
+    (picture,) = re.findall(r"!\[.*?\]\((.*?)\)", text)
+    assert (DOCS / picture).is_file()
+    (snippet,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    exec(snippet, {})
+    assert "fell: False" in capfd.readouterr().out
 
 
 @pytest.mark.slow

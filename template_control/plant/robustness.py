@@ -18,7 +18,7 @@ import numpy as np
 
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.scaling import default_gait, template_for
-from template_control.errors import RobotError, SweepError
+from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.plant.disturbances import (
     AFTER,
     BEGIN,
@@ -182,13 +182,16 @@ def measure(
         progress: show a bar a level on stderr.
 
     Raises:
+        ParameterError: if there is no such disturbance.
         RobotError: if there is no such robot or it falls without a disturbance.
         SweepError: if a trial fails for another reason than a fall, or files do not fit.
     """
+    wanted = set(_BY_NAME if names is None else names)
+    if not wanted or not wanted <= set(_BY_NAME):
+        raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(_BY_NAME)}")
     model = load_robot(robot)
     gait = default_gait(template_for(model))
     undisturbed = _undisturbed(robot, model, gait)
-    wanted = set(_BY_NAME if names is None else names)
     chosen = [_shortened(d, quick) for d in DISTURBANCES if d.name in wanted]
     levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
     stem = _fingerprint(model, chosen)
@@ -213,7 +216,7 @@ def measure(
             None if folder is None else folder / f"trials-{stem}-{index + 1:02d}.jsonl",
             executor,
             progress=progress,
-            label=f"level {index + 1}, {len(going)} disturbances",
+            label=f"level {index + 1}",
             retry_failed=True,
         )
         for i, reason in done.failures.items():
