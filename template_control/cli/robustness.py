@@ -27,7 +27,7 @@ from template_control.view.robustness_figure import robustness_figure
 _NAMES = tuple(d.name for d in DISTURBANCES)
 _COLUMNS = (
     "disturbance",
-    "trials a level",
+    "trials",
     "all succeed up to",
     "half succeed up to",
     "none falls up to",
@@ -195,7 +195,7 @@ def markdown(found: Robustness) -> str:
 def _print_table(found: Robustness, figure: Path) -> None:
     table = Table(title=_title(found))
     for column in _COLUMNS:
-        table.add_column(column)
+        table.add_column(column, no_wrap=column == _COLUMNS[0])
     for finding in found.findings:
         table.add_row(*_row(finding))
     console = Console()
