@@ -162,11 +162,20 @@ def _workers(executor: Executor | None) -> Iterator[Executor]:
     if executor is not None:
         yield executor
         return
-    own = ProcessPoolExecutor(os.cpu_count(), initializer=_obey_parent_only)
+    own = worker_processes(os.cpu_count())
     try:
         yield own
     finally:
         own.shutdown(cancel_futures=True)
+
+
+def worker_processes(count: int | None) -> ProcessPoolExecutor:
+    """Processes of this machine that leave Ctrl-C to the sweep and end with its process.
+
+    Args:
+        count: how many; None for one a core.
+    """
+    return ProcessPoolExecutor(count, initializer=_obey_parent_only)
 
 
 def _obey_parent_only() -> None:

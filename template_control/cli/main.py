@@ -6,10 +6,20 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from template_control.cli import automaton, gaits, plots, replay, reproduce, robots, slip, walk
+from template_control.cli import (
+    automaton,
+    gaits,
+    plots,
+    replay,
+    reproduce,
+    robots,
+    robustness,
+    slip,
+    walk,
+)
 from template_control.errors import TemplateControlError
 
-_COMMANDS = (walk, robots, replay, plots, slip, gaits, automaton, reproduce)
+_COMMANDS = (walk, robots, replay, plots, robustness, slip, gaits, automaton, reproduce)
 _USER_ERROR = 2
 
 

@@ -9,14 +9,19 @@ from template_control.robot.library import ROBOTS, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 
 
-def add_robot_options(parser: argparse.ArgumentParser) -> None:
-    """Add ``--robot`` and what a URDF of one's own may need."""
+def add_robot(parser: argparse.ArgumentParser) -> None:
+    """Add ``--robot``."""
     parser.add_argument(
         "--robot",
         default="five-link",
         metavar="NAME|URDF",
-        help=f"a shipped robot ({', '.join(ROBOTS)}) or the path of a URDF",
+        help=f"a shipped robot ({', '.join(ROBOTS)}) or the path of a planar URDF",
     )
+
+
+def add_robot_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--robot`` and what a URDF of one's own may need."""
+    add_robot(parser)
     own = parser.add_argument_group("a URDF of your own")
     own.add_argument(
         "--feet",

@@ -43,7 +43,8 @@ from template_control.whole_body.tasks import (
 Array = NDArray[np.float64]
 
 import os
-_G = float(os.environ.get("RG","1e4"))
+
+_G = float(os.environ.get("RG", "1e4"))
 _REACH_GAINS = (_G, 2 * _G**0.5)
 _NO_CAP = np.full(1, np.inf)
 

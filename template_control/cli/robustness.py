@@ -1,0 +1,203 @@
+"""``template-control robustness``: how much a robot's walk takes until it breaks."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from rich.console import Console
+from rich.table import Table
+
+from template_control.cli.robot_options import add_robot
+from template_control.cli.output import writable
+from template_control.cli.walk import INTERRUPTED
+from template_control.errors import ParameterError, RecordError
+from template_control.plant.disturbances import AFTER, DISTURBANCES
+from template_control.plant.quiet import stdout_to_stderr
+from template_control.plant.robustness import SETTLED, Finding, Robustness, measure
+from template_control.robot.library import load_robot
+from template_control.sweep_executor import worker_processes
+from template_control.view.robustness_figure import robustness_figure
+
+_NAMES = tuple(d.name for d in DISTURBANCES)
+_COLUMNS = (
+    "disturbance",
+    "trials",
+    "all succeed up to",
+    "half succeed up to",
+    "none falls up to",
+    "first failures",
+)
+_MOST_WORKERS = 1000
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command's options."""
+    parser = commands.add_parser(
+        "robustness",
+        help="raise disturbances until a robot's walk breaks, and tell how much it takes",
+        description=(
+            "Raise pushes, unseen steps of the ground, friction, mass and torque errors, sensor"
+            " noise and delay level by level, with several trials each, until the walk breaks."
+            f" A trial succeeds if the robot does not fall within {AFTER} more steps and, after"
+            " a push or a step, its mean speed and VLO height over the last 5 of them are"
+            f" within {100 * SETTLED:g} %% of its gait's. Ends with a table and a figure. Ctrl-C"
+            " and the same command again go on where it was. Exit status: 0, 2 for bad input"
+            " or a robot that falls undisturbed, 130 after Ctrl-C."
+        ),
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    add_robot(parser)
+    parser.add_argument(
+        "--disturbance",
+        action="append",
+        choices=_NAMES,
+        metavar="NAME",
+        help=f"only this one; may be given several times. One of {', '.join(_NAMES)}",
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="two levels of two trials each, to see that it works"
+    )
+    parser.add_argument(
+        "--workers",
+        type=int,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="processes that run trials",
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        help="folder for the trials and the figure; by default runs/robustness/ROBOT",
+    )
+    printed = parser.add_mutually_exclusive_group()
+    printed.add_argument(
+        "--json", action="store_true", help="print JSON, and nothing else, on stdout"
+    )
+    printed.add_argument(
+        "--markdown", action="store_true", help="print the table as Markdown on stdout"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure as told; returns 0, or 130 after Ctrl-C."""
+    if not 1 <= options.workers <= _MOST_WORKERS:
+        raise ParameterError(
+            f"--workers is {options.workers}: give a number from 1 to {_MOST_WORKERS}"
+        )
+    load_robot(options.robot)  # before a folder is made for it
+    folder = writable(options.output or Path("runs/robustness") / Path(options.robot).stem)
+    pool = worker_processes(options.workers)
+    try:
+        with stdout_to_stderr():
+            found = measure(options.robot, options.disturbance, folder, pool, options.quick)
+    except KeyboardInterrupt:
+        print(
+            f"template-control: interrupted; finished trials are in {folder}, the same command"
+            " goes on from there",
+            file=sys.stderr,
+        )
+        return INTERRUPTED
+    finally:
+        pool.shutdown(cancel_futures=True)
+    figure = _draw(found, folder)
+    if options.json:
+        print(json.dumps({**data(found), "figure": str(figure)}))
+    elif options.markdown:
+        print(markdown(found))
+    else:
+        _print_table(found, figure)
+    return 0
+
+
+def _draw(found: Robustness, folder: Path) -> Path:
+    path = folder / "robustness.png"
+    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        try:
+            robustness_figure(found).savefig(path, dpi=110)
+        except OSError as error:
+            raise RecordError(f"cannot write {path}: {error.strerror}") from None
+    return path
+
+
+def data(found: Robustness) -> dict[str, Any]:
+    """The findings as plain data; levels and breaking points in SI units.
+
+    Returns:
+        robot, gait (mean_speed, vlo_height), undisturbed (speed_error, height_error),
+        disturbances: by name trials, breaking_point, half_point, standing_point (null where
+        the mildest level is beyond it) and levels (level, success_rate, fell, astray).
+    """
+    return {
+        "robot": found.robot,
+        "gait": {"mean_speed": found.gait.mean_speed, "vlo_height": float(found.gait.vlo[1])},
+        "undisturbed": {"speed_error": found.speed_error, "height_error": found.height_error},
+        "disturbances": {
+            f.disturbance.name: {
+                "trials": f.disturbance.trials,
+                "breaking_point": f.breaking_point,
+                "half_point": f.half_point,
+                "standing_point": f.standing_point,
+                "levels": [
+                    {
+                        "level": level.level,
+                        "success_rate": level.rate,
+                        "fell": level.fell,
+                        "astray": level.astray,
+                    }
+                    for level in f.levels
+                ],
+            }
+            for f in found.findings
+        },
+    }
+
+
+def _row(finding: Finding) -> tuple[str, ...]:
+    d, last = finding.disturbance, finding.levels[-1]
+
+    def point(level: float | None) -> str:
+        if level is None:
+            return f"not {d.shown(finding.levels[0].level)}"
+        return d.shown(level) + (" or more" if level == last.level else "")
+
+    after = next((x for x in finding.levels if x.rate < 1.0), None)
+    beyond = "" if after is None else f"{d.shown(after.level)}: {_told(after.fell, after.astray)}"
+    points = (finding.breaking_point, finding.half_point, finding.standing_point)
+    return d.title, str(d.trials), *map(point, points), beyond
+
+
+def _told(fell: int, astray: int) -> str:
+    parts = [f"{n} {what}" for n, what in ((fell, "fell"), (astray, "off its gait")) if n]
+    return ", ".join(parts)
+
+
+def _title(found: Robustness) -> str:
+    return (
+        f"{found.robot} at {found.gait.mean_speed:.3f} m/s; undisturbed it is"
+        f" {100 * found.speed_error:+.2f} % in speed and {100 * found.height_error:+.2f} % in"
+        " height from its gait"
+    )
+
+
+def markdown(found: Robustness) -> str:
+    """The table as Markdown."""
+    rows = [_COLUMNS, tuple("---" for _ in _COLUMNS), *map(_row, found.findings)]
+    return "\n".join([_title(found) + ":", "", *("| " + " | ".join(r) + " |" for r in rows)])
+
+
+def _print_table(found: Robustness, figure: Path) -> None:
+    table = Table(title=_title(found))
+    for column in _COLUMNS:
+        table.add_column(column, no_wrap=column == _COLUMNS[0])
+    for finding in found.findings:
+        table.add_row(*_row(finding))
+    console = Console()
+    console.print(table)
+    console.print(f"figure: {figure}", highlight=False)

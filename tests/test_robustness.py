@@ -1,0 +1,365 @@
+"""Raising disturbances until a walk breaks, and ``template-control robustness``."""
+
+import json
+import re
+import shlex
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from template_control.cli import robustness as command
+from template_control.cli.main import build_parser, main
+from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.scaling import default_gait
+from template_control.errors import ParameterError, RobotError, SweepError
+from template_control.plant import robustness
+from template_control.plant.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
+from template_control.plant.robustness import Finding, Level, measure, off_gait, trial
+from template_control.plant.simulation import SimulationOptions, simulate
+from template_control.robot.library import load_robot, robot_path
+from template_control.slip.parameters import SlipParameters
+from template_control.view.robustness_figure import robustness_figure
+
+DOCS = Path(__file__).parents[1] / "docs"
+BY_NAME = {d.name: d for d in DISTURBANCES}
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    robot = load_robot("five-link")
+    gait = default_gait(load_robot("five-link"))
+    return simulate(robot, LqrPlanner(gait), SimulationOptions(steps=BEGIN + 1 + AFTER))
+
+
+# -- what a disturbance is -------------------------------------------------------------
+
+
+def test_levels_are_those_of_a_walk_of_the_same_dimensionless_robot():
+    small = SlipParameters(mass=5.0, rest_length=0.25, leg_stiffness=16500.0 * 5 / 80 / 0.25)
+    time = 0.5  # sqrt(l0 / g), and so the speeds
+    for name, factor in (
+        ("push-forward", 5.0 / 80.0 * time),
+        ("step-down", 0.25),
+        ("friction", 1.0),
+        ("heavier", 1.0),
+        ("noise", 1.0),
+    ):
+        d = BY_NAME[name]
+        assert d.levels_for(SlipParameters()) == pytest.approx(d.levels)
+        assert d.levels_for(small) == pytest.approx(factor * np.array(d.levels))
+    # Whole physics steps: 1.4, 2.8, 4.2, ... ms.
+    long = SlipParameters(rest_length=0.49, leg_stiffness=16500.0 / 0.49)
+    assert BY_NAME["delay"].levels_for(long)[:4] == pytest.approx([1e-3, 3e-3, 4e-3, 6e-3])
+    tiny = SlipParameters(rest_length=0.01, leg_stiffness=1.65e6)
+    assert BY_NAME["delay"].levels_for(tiny) == pytest.approx([1e-3, 2e-3, 3e-3, 4e-3, 5e-3])
+
+
+def test_levels_are_round_and_grow_more_severe():
+    for d in DISTURBANCES:
+        assert len(set(np.sign(np.diff(d.levels)))) == 1
+    assert BY_NAME["push-forward"].levels[:3] == (5.0, 10.0, 15.0)
+    assert BY_NAME["step-up"].levels[1:4] == (0.01, 0.02, 0.03)
+    assert BY_NAME["lighter"].shown(-0.2) == "20 %"
+    assert BY_NAME["friction"].shown(0.55) == "0.55"
+
+
+def test_options_hold_the_level(robot, gait):
+    where = Situation(robot, gait)
+
+    def of(name, level, number=2):
+        return BY_NAME[name].options(where, level, number)
+
+    (push,) = of("push-forward", 15.0).pushes
+    assert (push.impulse, push.step, push.phase, push.duration) == (15.0, BEGIN, 0.2, 0.1)
+    assert of("push-backward", 15.0).pushes[0].impulse == -15.0
+    assert of("push-backward", 15.0).steps == BEGIN + 1 + AFTER
+    assert of("step-up", 0.03).plant.ground_step.height == 0.03
+    assert of("step-down", 0.03).plant.ground_step.height == -0.03
+    assert of("friction", 0.4).plant.friction == 0.4
+    assert of("heavier", 0.2).plant.mass_scale == pytest.approx(1.2)
+    assert of("lighter", -0.2).plant.mass_scale == pytest.approx(0.8)
+    assert of("torque", 0.7).embedding.torque_scale == 0.7
+    noise = of("noise", 1e-3, 4).sensors
+    assert (noise.position_noise, noise.velocity_noise, noise.seed) == (1e-3, 0.02, 4)
+    assert of("delay", 4e-3).delay_ticks == 4
+    starts = {of("delay", 4e-3, i).start for i in range(5)}
+    assert len(starts) == 5
+    assert of("delay", 4e-3).steps == AFTER
+
+
+@pytest.mark.parametrize("number", [0, 4])
+def test_the_edge_of_a_step_lies_between_two_footholds(robot, gait, number):
+    options = BY_NAME["step-up"].options(Situation(robot, gait), 0.001, number)
+    edge = options.plant.ground_step.x
+    record = simulate(robot, LqrPlanner(gait), replace(options, steps=8))
+    at = np.searchsorted(record.time, record.vlo_time)
+    foothold = record.foot[at, record.rear[at]]
+    beyond = int(np.argmax(foothold[:, 0] > edge))
+    assert beyond == 5
+    share = (edge - foothold[4, 0]) / (foothold[5, 0] - foothold[4, 0])
+    assert share == pytest.approx(0.3 + 0.1 * number, abs=0.02)
+    np.testing.assert_allclose(foothold[[4, 5], 1], [0.0, 0.001], atol=1e-4)
+
+
+# -- what a trial is -------------------------------------------------------------------
+
+
+def test_the_error_of_a_walk_is_that_of_its_last_five_steps(undisturbed):
+    gait = default_gait(load_robot("five-link"))
+    errors = off_gait(undisturbed, gait)
+    assert np.all(np.abs(errors) < 0.01)
+    last = undisturbed.time >= undisturbed.vlo_time[-6]
+    speed = undisturbed.com_velocity[last, 0].mean()
+    assert errors[0] == pytest.approx(speed / gait.mean_speed - 1.0, abs=1e-3)
+    slower = replace(gait, step_length=0.9 * gait.step_length)
+    assert off_gait(undisturbed, slower)[0] == pytest.approx((1.0 + errors[0]) / 0.9 - 1.0)
+
+
+def test_trials_succeed_or_fall():
+    good = trial("five-link", "push-backward", 5.0, 3)
+    assert not good["fell"]
+    assert good["steps"] == BEGIN + 1 + AFTER
+    assert abs(good["speed_error"]) < 0.02
+    bad = trial("five-link", "friction", 0.05, 0)
+    assert bad["fell"]
+    assert bad["reason"]
+    assert bad["speed_error"] is None
+    assert trial("five-link", "friction", 0.05, 0) == bad
+
+
+# -- where it breaks -------------------------------------------------------------------
+
+
+def finding(*rates, name="delay"):
+    """Levels 1, 2, ... with these numbers of successes in four trials."""
+    levels = (Level(float(i + 1), n, 4 - n, 0) for i, n in enumerate(rates))
+    return Finding(BY_NAME[name], tuple(levels))
+
+
+@pytest.mark.parametrize(
+    ("rates", "breaking", "half", "broken"),
+    [
+        ((), None, None, False),
+        ((4, 4), 2.0, 2.0, False),
+        ((4, 3, 4), 1.0, 3.0, False),  # a better level later does not count
+        ((4, 3, 1), 1.0, 2.0, False),
+        ((4, 1, 3, 1), 1.0, 1.0, False),
+        ((4, 1, 1), 1.0, 1.0, True),
+        ((4, 2, 0), 1.0, 2.0, True),
+        ((0,), None, None, True),
+        ((2, 1), None, 1.0, False),
+    ],
+)
+def test_breaking_points(rates, breaking, half, broken):
+    found = finding(*rates)
+    assert (found.breaking_point, found.half_point, found.broken) == (breaking, half, broken)
+    assert found.standing_point == breaking  # all that fail have fallen
+
+
+def test_a_walk_off_its_gait_fails_but_does_not_break():
+    delay = BY_NAME["delay"]
+    levels = (Level(1.0, 4, 0, 0), Level(2.0, 0, 0, 4), Level(3.0, 0, 0, 4), Level(4.0, 0, 1, 3))
+    found = Finding(delay, levels)
+    assert (found.breaking_point, found.half_point, found.standing_point) == (1.0, 1.0, 3.0)
+    assert not found.broken
+    assert Finding(delay, (*levels, Level(5.0, 0, 4, 0))).broken
+
+
+def made_up(robot, disturbance, level, number):
+    """Falls from 10 % mass on, is off its gait from a step of 3 cm on in two trials of five."""
+    fell = disturbance == "heavier" and level > 0.25
+    error = 0.03 if number < 2 and level > 0.025 else -0.01
+    error = None if fell else error
+    return {"fell": fell, "reason": "", "steps": 3, "speed_error": error, "height_error": error}
+
+
+def not_to_be_called(robot, disturbance, level, number):
+    raise AssertionError("this trial was finished before")
+
+
+@pytest.fixture
+def cheap(monkeypatch, undisturbed):
+    """``measure`` with made-up trials in threads of this process."""
+    monkeypatch.setattr(robustness, "_undisturbed", lambda *_: undisturbed)
+    monkeypatch.setattr(robustness, "trial", made_up)
+
+    def run(*arguments, **options):
+        with ThreadPoolExecutor(1) as pool:
+            return measure("five-link", *arguments, executor=pool, progress=False, **options)
+
+    return run
+
+
+def test_levels_rise_until_the_walk_breaks(cheap, tmp_path, monkeypatch):
+    found = cheap(["heavier", "step-down"], tmp_path)
+    down, heavier = found.findings
+    assert [d.disturbance.name for d in found.findings] == ["step-down", "heavier"]
+    assert heavier.breaking_point == pytest.approx(0.2)
+    assert heavier.half_point == pytest.approx(0.2)
+    assert [level.rate for level in heavier.levels] == [1.0, 1.0, 0.0]
+    assert heavier.levels[-1].fell == 5
+    # Never fewer than half: raised to the last level.
+    assert [level.level for level in down.levels] == pytest.approx(BY_NAME["step-down"].levels)
+    assert down.breaking_point == pytest.approx(0.02)
+    assert down.half_point == pytest.approx(0.08)
+    assert (down.levels[-1].fell, down.levels[-1].astray) == (0, 2)
+    # The same again takes everything from the files.
+    monkeypatch.setattr(not_to_be_called, "__module__", made_up.__module__)
+    monkeypatch.setattr(not_to_be_called, "__qualname__", made_up.__qualname__)
+    monkeypatch.setattr(robustness, "trial", not_to_be_called)
+    assert cheap(["heavier", "step-down"], tmp_path).findings == found.findings
+
+
+def test_lasting_disturbances_need_not_end_on_the_gait(cheap):
+    (heavier,) = cheap(["heavier"], quick=True).findings
+    assert [level.rate for level in heavier.levels] == [1.0, 1.0]
+    assert heavier.disturbance.trials == 2
+
+
+def test_files_are_of_this_robot_and_these_trials(cheap, tmp_path, monkeypatch):
+    cheap(["heavier"], tmp_path, quick=True)
+    first = set(tmp_path.glob("*.jsonl"))
+    cheap(["lighter"], tmp_path, quick=True)
+    second = set(tmp_path.glob("*.jsonl")) - first
+    stiff = load_robot("five-link")
+    stiff.urdf += "<!-- another -->"
+    monkeypatch.setattr(robustness, "load_robot", lambda _: stiff)
+    cheap(["heavier"], tmp_path, quick=True)
+    third = set(tmp_path.glob("*.jsonl")) - first - second
+    assert len(first) == len(second) == len(third) == 2
+
+
+def broken(robot, disturbance, level, number):
+    raise RobotError("no such leg")
+
+
+def test_a_trial_that_fails_otherwise_is_no_fall(cheap, monkeypatch):
+    monkeypatch.setattr(robustness, "trial", broken)
+    with pytest.raises(SweepError, match=r"heavier.*no such leg"):
+        cheap(["heavier"], quick=True)
+
+
+def test_unknown_disturbances_are_named():
+    with pytest.raises(ParameterError, match=r"wind.*push-forward"):
+        measure("five-link", ["wind"])
+
+
+def test_figure_shows_every_disturbance(cheap):
+    found = cheap(quick=True)
+    panels = robustness_figure(found).axes
+    assert [axes.get_title() for axes in panels] == [d.title for d in DISTURBANCES]
+    inverted = {axes.get_title() for axes in panels if axes.xaxis_inverted()}
+    assert inverted == {"friction", "torque limits"}
+    heavier = next(axes for axes in panels if axes.get_title() == "heavier")
+    np.testing.assert_allclose(heavier.lines[0].get_xydata(), [[10.0, 100.0], [20.0, 100.0]])
+
+
+def test_markdown_says_where_it_breaks(cheap):
+    text = command.markdown(cheap(["heavier", "lighter", "step-up"]))
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    assert rows[2] == ["| step up", "5", "2 cm", *["8 cm or more"] * 2, "3 cm: 2 off its gait |"]
+    assert rows[3] == ["| heavier", "5", *["20 %"] * 3, "30 %: 5 fell |"]
+    assert rows[4] == ["| lighter", "5", *["90 % or more"] * 3, " |"]
+
+
+# -- the command -----------------------------------------------------------------------
+
+
+def test_json_figure_and_resumption(tmp_path, capfd):
+    arguments = ["robustness", "--quick", "--disturbance", "delay", "--workers", "2", "--json"]
+    arguments += ["--output", str(tmp_path)]
+    assert main(arguments) == 0
+    captured = capfd.readouterr()
+    figures = json.loads(captured.out)
+    assert "level 2" in captured.err
+    delay = figures["disturbances"]["delay"]
+    assert [level["level"] for level in delay["levels"]] == [0.002, 0.004]
+    assert abs(figures["undisturbed"]["speed_error"]) < 0.02
+    assert Path(figures["figure"]).is_file()
+    before = {path: path.read_bytes() for path in tmp_path.glob("*.jsonl")}
+    assert len(before) == 2
+    assert main(arguments) == 0
+    assert json.loads(capfd.readouterr().out) == figures
+    assert {path: path.read_bytes() for path in tmp_path.glob("*.jsonl")} == before
+
+
+def test_a_robot_that_cannot_walk_is_one_line(tmp_path, capfd):
+    weak = tmp_path / "weak.urdf"
+    text = robot_path("five-link").read_text()
+    weak.write_text(re.sub(r'effort="350[^"]*"', 'effort="40"', text))
+    assert weak.read_text() != text
+    assert main(["robustness", "--robot", str(weak), "--output", str(tmp_path / "out")]) == 2
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.strip().splitlines()
+    assert "falls without a disturbance" in line
+    assert str(weak) in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "culprit"),
+    [
+        (["--robot", "hexapod"], "hexapod"),
+        (["--workers", "0"], "--workers is 0"),
+        (["--output", "/proc/none"], "/proc/none"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["robustness", *arguments]) == 2
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.strip().splitlines()
+    assert culprit in line
+    assert not (tmp_path / "runs" / "robustness" / "hexapod").exists()
+
+
+def test_an_unknown_disturbance_is_refused(capfd):
+    with pytest.raises(SystemExit) as stop:
+        main(["robustness", "--disturbance", "wind"])
+    assert stop.value.code == 2
+    assert "push-forward" in capfd.readouterr().err
+
+
+def test_ctrl_c_tells_how_to_go_on(tmp_path, monkeypatch, capfd):
+    def impatient(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "measure", impatient)
+    assert main(["robustness", "--output", str(tmp_path)]) == 130
+    assert "goes on from there" in capfd.readouterr().err
+
+
+def commands():
+    text = (DOCS / "robustness.md").read_text()
+    blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    return [line for block in blocks for line in block.strip().splitlines()]
+
+
+@pytest.mark.parametrize("line", commands())
+def test_commands_of_the_documentation_are_understood(line):
+    words = shlex.split(line)
+    assert words[0] == "template-control"
+    assert build_parser().parse_args(words[1:]).command == "robustness"
+
+
+def test_the_documentation_has_its_pictures_and_a_snippet_that_runs(capfd):
+    text = (DOCS / "robustness.md").read_text()
+    (picture,) = re.findall(r"!\[.*?\]\((.*?)\)", text)
+    assert (DOCS / picture).is_file()
+    (snippet,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    exec(snippet, {})
+    assert "fell: False" in capfd.readouterr().out
+
+
+@pytest.mark.slow
+def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
+    (line,) = (line for line in commands() if "--quick" in line)
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(line)[1:]) == 0
+    assert (tmp_path / "runs" / "robustness" / "five-link" / "robustness.png").is_file()
+    out = capfd.readouterr().out
+    assert all(d.title in out for d in DISTURBANCES)
