@@ -22,6 +22,7 @@ from template_control.errors import (
     TemplateControlError,
 )
 from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
 from template_control.plant.record import Record
 from template_control.plant.simulation import Push, SimulationOptions, perturbed_start, simulate
 from template_control.plant.summary import summarise
@@ -58,6 +59,7 @@ __all__ = [
     "EmbeddingOptions",
     "Event",
     "GaitError",
+    "IdealOptions",
     "LqrOptions",
     "LqrPlanner",
     "MapKind",

@@ -228,9 +228,7 @@ class IdealPlant:
             self._anchor[i] = r.foot_position[i, 0] - self._rolled(i, self._q)
         touching = tuple(sorted((*self.contacts, *landing)))
         momentum, zero = r.mass_matrix @ self._v, np.zeros((2, 2))
-        held, v, impulse, clean = pressing(
-            r.mass_matrix, momentum, r.foot_jacobian, zero, touching
-        )
+        held, v, impulse, clean = pressing(r.mass_matrix, momentum, r.foot_jacobian, zero, touching)
         self.pulls += not clean
         if all(r.foot_jacobian[i, 1] @ v < _REST for i in touching):
             held = touching

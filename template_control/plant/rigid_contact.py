@@ -44,13 +44,15 @@ def solve(
     nv, m = len(right), 2 * len(pressed)
     force = np.zeros((2, 2))
     if not pressed:
-        return np.linalg.solve(mass_matrix, right), force
+        return np.asarray(np.linalg.solve(mass_matrix, right), dtype=np.float64), force
     held = list(pressed)
     kkt = np.zeros((nv + m, nv + m))
     kkt[:nv, :nv] = mass_matrix
     kkt[nv:, :nv] = jacobian[held].reshape(m, nv)
     kkt[:nv, nv:] = -kkt[nv:, :nv].T
-    found = np.linalg.solve(kkt, np.concatenate((right, -gamma[held].ravel())))
+    found: Array = np.linalg.solve(kkt, np.concatenate((right, -gamma[held].ravel()))).astype(
+        np.float64, copy=False
+    )
     force[held] = found[nv:].reshape(-1, 2)
     return found[:nv], force
 

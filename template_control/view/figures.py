@@ -31,7 +31,7 @@ def _single_stance(record: Record) -> NDArray[np.bool_]:
     return np.asarray(single[record.node])
 
 
-def _shade(axes: Axes, record: Record, w: slice) -> None:
+def shade(axes: Axes, record: Record, w: slice) -> None:
     """Grey over single stance, as in Fig. 13."""
     axes.fill_between(
         record.time[w],
@@ -95,7 +95,7 @@ def com_tracking(record: Record, seconds: float = _WINDOW) -> Figure:
     lower.plot(record.time[w], error[:, 1], color=RIGHT, label="y")
     lower.set(xlabel="time [s]", ylabel="template - robot [mm]")
     for axes in (upper, middle, lower):
-        _shade(axes, record, w)
+        shade(axes, record, w)
         axes.legend(loc="upper right")
     upper.set_title(f"{record.metadata['robot']}: centre of mass (single stance shaded)")
     return figure
@@ -112,7 +112,7 @@ def joint_torques(record: Record, seconds: float = _WINDOW) -> Figure:
             axes.plot(record.time[w], record.torque[w, joint], color=color, label=names[joint])
             for sign in (-1.0, 1.0):
                 axes.axhline(sign * limits[joint], color=color, linestyle=":", linewidth=0.9)
-        _shade(axes, record, w)
+        shade(axes, record, w)
         axes.set_ylabel("torque [N m]")
         axes.legend(loc="upper right")
     panels[0].set_title(f"{record.metadata['robot']}: joint torques, limits dotted")
@@ -143,7 +143,7 @@ def ground_forces(record: Record, seconds: float = _WINDOW) -> Figure:
         # A landing foot's first sample is its impulse over one physics step; keep the scale.
         span = 1.25 * np.abs(template).max() + 1.0
         axes.set_ylim(-0.05 * span if axis == 1 else -span, span)
-        _shade(axes, record, w)
+        shade(axes, record, w)
         axes.set_ylabel(f"{name} force [N]")
         axes.legend(loc="upper right")
     panels[0].set_title(f"{record.metadata['robot']}: ground reaction forces")
