@@ -43,8 +43,8 @@ def add_parser(commands: Any) -> None:
         description=(
             "Walk a robot in PyBullet or on an ideal plant: a planner on the SLIP template chooses"
             " each step, a whole-body QP makes the robot follow it. Ends with a table, and a folder"
-            " with the run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input, 130"
-            " after Ctrl-C (what was walked by then is saved)."
+            " with the run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input,"
+            " 130 after Ctrl-C (what was walked by then is saved)."
         ),
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )

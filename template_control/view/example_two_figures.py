@@ -95,17 +95,19 @@ def states_figure(
     figure = Figure(figsize=(9.5, 1.7 * len(plants) + 0.6), layout="constrained")
     panels = figure.subplots(len(plants), 3, sharex=True, sharey="col", squeeze=False)
     unit = np.array([1.0, 180.0 / np.pi, 1.0])
-    spans = ((0.96, 1.005), (-9.0, 6.0), (819.0, 832.0))
+    spans = np.array(((0.96, 1.005), (-12.0, 6.0), (819.0, 832.0)))
     for row, plant in zip(panels, plants, strict=True):
         for j, axes in enumerate(row):
             axes.axhline(target[j] * unit[j], color="0.75", linewidth=2.5, zorder=0)
             for planner, color in zip(planners, _COLORS, strict=True):
-                z = states[planner, plant][:, j] * unit[j]
-                axes.plot(z, color=color, linewidth=1.0, label=planner)
-                if len(z) < max(len(s) for s in states.values()):
-                    last = np.flatnonzero((z > spans[j][0]) & (z < spans[j][1]))[-1]
-                    axes.plot(last, z[last], "x", color=color, markersize=6)
-            axes.set_ylim(spans[j])
+                z = states[planner, plant] * unit
+                # A fall is drawn as far as it is on the picture.
+                off = np.flatnonzero(np.any((z < spans[:, 0]) | (z > spans[:, 1]), axis=1))
+                end = int(off[0]) if off.size else len(z)
+                axes.plot(z[:end, j], color=color, linewidth=1.0, label=planner)
+                if off.size:
+                    axes.plot(end - 1, z[end - 1, j], "x", color=color, markersize=6)
+            axes.set_ylim(*spans[j])
         row[0].set_ylabel(f"{plant}\n")
     for axes, name in zip(panels[0], ("y [m]", "phi [deg], downward", "E [J]"), strict=True):
         axes.set_title(name, fontsize=10)

@@ -165,6 +165,8 @@ def fig12() -> Reproduction:
     with ProcessPoolExecutor() as pool:
         walks = dict(zip(cases, pool.map(_walk, cases), strict=True))
     _, record = robot_walk("LQR", "PyBullet", steps=6)
+    sticks = stick_diagram(beginning(record, 2.2))
+    sticks.axes[0].set_title("five-link from z_0: LQR, PyBullet")
     gait = _gait()
     target = sections(gait, gait.vlo[None])[0]
     return Reproduction(
@@ -186,15 +188,16 @@ def fig12() -> Reproduction:
             " (dx/dt from the angular momentum about the foot, E with the stance spring); phi_v"
             " is positive downward. The paper gives no numbers for its robot, only that it"
             " stabilizes the same equilibrium.",
-            "Template alone: exact SLIP, so what is missing there is the planner's map. Ideal:"
-            " rigid sticking contacts, so what is missing there is that the robot is no SLIP."
-            " PyBullet adds its contacts.",
-            "Full grip: the controller's friction cone is opened too. In the paper's planner's"
-            " steps the template is light near VLO (200 N) while the swing leg needs 260 N of"
-            " horizontal force; a cone of 0.63 lifts the robot off its path there.",
+            "Template alone is the exact SLIP: its error is the planner's map. On the ideal plant"
+            " (rigid contacts that stick) the error of a robot that is no SLIP is added, in"
+            " PyBullet that of its contacts.",
+            "Full grip: the controller's friction cone (0.63 otherwise) never binds. Near VLO the"
+            " template is light on its foot, down to 200 N, while the swing leg needs 260 N along"
+            " the ground: within its cone the robot presses harder than the template, rises above"
+            " its path and reaches the next VLO too fast upward.",
         ),
         figures={
-            "fig12": stick_diagram(beginning(record, 2.4)),
+            "fig12": sticks,
             "fig12_states": states_figure(
                 {key: walk.states for key, walk in walks.items()}, tuple(PLANNERS), plants, target
             ),
