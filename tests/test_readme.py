@@ -46,7 +46,7 @@ def test_the_two_commands_are_there():
     assert "README.md" in (ROOT / ".ci" / "run").read_text()
 
 
-LONG = ("reproduce fig8", "reproduce fig9")
+LONG = ("reproduce fig8", "reproduce fig9", "reproduce fig12", "reproduce fig13")
 OTHERS = [c for c in commands() if "venv -" not in c and "venv ." not in c]
 
 

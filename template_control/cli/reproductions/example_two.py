@@ -191,10 +191,10 @@ def fig12() -> Reproduction:
             "Template alone is the exact SLIP: its error is the planner's map. On the ideal plant"
             " (rigid contacts that stick) the error of a robot that is no SLIP is added, in"
             " PyBullet that of its contacts.",
-            "Full grip: the controller's friction cone (0.63 otherwise) never binds. Near VLO the"
-            " template is light on its foot, down to 200 N, while the swing leg needs 260 N along"
-            " the ground: within its cone the robot presses harder than the template, rises above"
-            " its path and reaches the next VLO too fast upward.",
+            f"Full grip: the controller's friction cone ({EmbeddingOptions().friction:g} otherwise)"
+            " never binds. Near VLO the template is light on its foot while the swing leg needs a"
+            " force along the ground: within its cone the robot presses harder than the template,"
+            " rises above its path and reaches the next VLO too fast upward.",
         ),
         figures={
             "fig12": sticks,
