@@ -8,9 +8,6 @@ from template_control.cli.reproductions.example_two import (
     PLANNERS,
     PLANTS,
     START,
-    TEMPLATE,
-    fig12,
-    fig13,
     robot_walk,
     sections,
     start_state,
@@ -115,25 +112,3 @@ def test_the_robot_settles_on_the_equilibrium_from_z0():
         assert error[1] < np.radians(2.0), plant
         assert error[2] < 1.0, plant
         assert spread[0] < 0.0015, plant
-
-
-@pytest.mark.slow
-def test_fig12_reports_every_walk():
-    result = fig12()
-    assert len(result.rows) == 1 + len(PLANNERS) * (1 + len(PLANTS))
-    walks = result.data["walks"]
-    assert set(walks["LQR"]) == {TEMPLATE, *PLANTS}
-    for by_plant in walks.values():
-        for walk in by_plant.values():
-            assert (walk["mean"] is None) == bool(walk["fall"])
-            assert (walk["steps"] == 60) == (walk["fall"] is None)
-    assert walks["modified, paper map"]["ideal, full grip"]["fall"] is None
-    assert walks["modified, paper map"]["PyBullet"]["fall"]
-
-
-@pytest.mark.slow
-def test_fig13_reports_every_liftoff():
-    cases = fig13().data["cases"]
-    jumps = {(c["plant"], c["liftoff"]): max(c["jump"]) for c in cases}
-    for plant in ("PyBullet", "ideal"):
-        assert jumps[plant, "earlier"] > 5.0 * jumps[plant, "template's"]
