@@ -274,6 +274,14 @@ def test_a_fall_ends_the_run(robot, gait):
     assert record.fell
 
 
+def test_a_state_that_is_not_finite_is_named(robot):
+    q, v = at_vlo(robot)
+    plant = IdealPlant(robot, IdealOptions())
+    plant.reset(q, v)
+    with pytest.raises(ParameterError, match="not finite"):
+        plant.step(np.full(4, np.nan))
+
+
 def test_a_saved_run_names_its_plant(record, tmp_path):
     assert Record.load(record.save(tmp_path / "run.npz")).metadata["plant"] == "ideal"
     assert plant_name(PlantOptions()) == "pybullet"

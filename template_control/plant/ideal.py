@@ -131,12 +131,22 @@ class IdealPlant:
             push: horizontal disturbance on the trunk's centre of mass [N].
 
         Raises:
-            ParameterError: if the state is not finite any more.
+            ParameterError: if the state is not finite any more, or the legs lie so that the
+                contacts' forces are not determined.
         """
         self._drive[BASE_DOF:] = torque
         self._push = push
         self._impulse[:] = 0.0
-        left = self.options.time_step
+        try:
+            self._advance(self.options.time_step)
+        except np.linalg.LinAlgError:
+            raise ParameterError(
+                f"{self.robot.name}: the contacts' forces are not determined at q ="
+                f" {self._q.tolist()}"
+            ) from None
+
+    def _advance(self, left: float) -> None:
+        """Go on for ``left`` seconds, from event to event."""
         for _ in range(_EVENTS):
             left -= self._to_event(left)
             if left <= 0.0:

@@ -163,7 +163,10 @@ def _loop(
             done = len(controller.steps) - 1
             if progress is not None:
                 progress(done)
-        plant.step(solution.torque, push)
+        try:
+            plant.step(solution.torque, push)
+        except ParameterError as error:
+            return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
     return ""
 
