@@ -23,6 +23,7 @@ from template_control.errors import (
 )
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
+from template_control.plant.ideal import IdealOptions
 from template_control.plant.record import Record
 from template_control.plant.sensing import SensorOptions
 from template_control.plant.simulation import Push, SimulationOptions, perturbed_start, simulate
@@ -62,6 +63,7 @@ __all__ = [
     "Event",
     "GaitError",
     "GroundStep",
+    "IdealOptions",
     "LqrOptions",
     "LqrPlanner",
     "MapKind",

@@ -61,7 +61,7 @@ def walked(tmp_path_factory):
     return folder
 
 
-LONG = ("reproduce fig8", "reproduce fig9")
+LONG = ("reproduce fig8", "reproduce fig9", "reproduce fig12", "reproduce fig13")
 OTHERS = [c for c in commands() if "venv -" not in c and "venv ." not in c]
 
 

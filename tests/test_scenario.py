@@ -149,7 +149,7 @@ def test_slip_command(tmp_path, capfd):
     assert "cannot read" in capfd.readouterr().err
 
 
-LONG = ("fig8", "fig9")
+LONG = ("fig8", "fig9", "fig12", "fig13")
 
 
 @pytest.mark.parametrize(
@@ -170,6 +170,16 @@ def test_reproduce_command(name, tmp_path, capfd):
         assert data["states"] >= 200_000
     if name == "fig9":
         assert data["paper map"]["failing"] > 100 > data["improved map"]["failing"]
+    if name == "fig12":
+        walks = data["walks"]
+        for walk in (walk for by_plant in walks.values() for walk in by_plant.values()):
+            assert (walk["mean"] is None) == bool(walk["fall"]) == (walk["steps"] < 60)
+        assert walks["modified, paper map"]["ideal, full grip"]["fall"] is None
+        assert walks["modified, paper map"]["PyBullet"]["fall"]
+    if name == "fig13":
+        jumps = {(c["plant"], c["liftoff"]): max(c["jump"]) for c in data["cases"]}
+        for plant in ("PyBullet", "ideal"):
+            assert jumps[plant, "earlier"] > 5.0 * jumps[plant, "template's"]
     if name == "fig6":
         assert data["Table IV's gains"]["end"][1] == pytest.approx(0.98, abs=0.01)
 

@@ -13,8 +13,8 @@ import matplotlib as mpl
 from rich.console import Console
 from rich.table import Table
 
-from template_control.cli.robot_options import add_robot
 from template_control.cli.output import writable
+from template_control.cli.robot_options import add_robot
 from template_control.cli.walk import INTERRUPTED
 from template_control.errors import ParameterError, RecordError
 from template_control.plant.disturbances import AFTER, DISTURBANCES

@@ -1,4 +1,4 @@
-"""``template-control walk``: a robot follows the SLIP template in PyBullet."""
+"""``template-control walk``: a robot follows the SLIP template."""
 
 from __future__ import annotations
 
@@ -15,24 +15,22 @@ from template_control.cli.output import progress_bar, writable
 from template_control.cli.robot_options import add_robot_options, robot_from
 from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
-from template_control.embedding.modified import ModifiedPlanner
+from template_control.embedding.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planner import Planner
 from template_control.embedding.scaling import default_gait, paper_gait, template_for
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.plant.record import Record
 from template_control.plant.simulation import SimulationOptions, perturbed_start, simulate
 from template_control.plant.summary import summarise
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.gait import WalkingGait, gait_for_speed
+from template_control.slip.vocabulary import MapKind
 from template_control.view.figures import save_figures
 
 INTERRUPTED = 130  # exit status after Ctrl-C, as shells have it
-_PLANNERS: dict[str, type[LqrPlanner] | type[ModifiedPlanner]] = {
-    "lqr": LqrPlanner,
-    "modified": ModifiedPlanner,
-}
 _CONE_MARGIN = 0.9  # the controller trusts this share of the friction
 _LONG = 200  # steps beyond which samples are thinned
 
@@ -43,10 +41,10 @@ def add_parser(commands: Any) -> None:
         "walk",
         help="walk a robot that follows the SLIP template, headless, and report",
         description=(
-            "Walk a robot in PyBullet: a planner on the SLIP template chooses each step, a"
-            " whole-body QP makes the robot follow it. Ends with a table, and a folder with the"
-            " run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input, 130"
-            " after Ctrl-C (what was walked by then is saved)."
+            "Walk a robot in PyBullet or on an ideal plant: a planner on the SLIP template chooses"
+            " each step, a whole-body QP makes the robot follow it. Ends with a table, and a folder"
+            " with the run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input,"
+            " 130 after Ctrl-C (what was walked by then is saved)."
         ),
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
@@ -68,10 +66,23 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument(
         "--planner",
-        choices=tuple(_PLANNERS),
+        choices=("lqr", "modified"),
         default="lqr",
         help="lqr: LQR on the VLO state with an offset estimate; modified: the paper's"
         " modified walking controller, equation (38)",
+    )
+    parser.add_argument(
+        "--map",
+        choices=("paper", "improved", "exact"),
+        default="exact",
+        help="return map that the modified planner tries its steps on",
+    )
+    parser.add_argument(
+        "--plant",
+        choices=("pybullet", "ideal"),
+        default="pybullet",
+        help="ideal: rigid contacts that stick, no friction; --friction is then the"
+        " controller's cone only",
     )
     parser.add_argument(
         "--friction", type=float, default=0.7, help="Coulomb friction between feet and ground"
@@ -113,11 +124,15 @@ def run(options: argparse.Namespace) -> int:
     folder = writable(options.output)
     robot = robot_from(options)
     gait = _gait(options, robot)
-    planner: Planner = _PLANNERS[options.planner](gait)
+    planner: Planner = LqrPlanner(gait)
+    if options.planner == "modified":
+        planner = ModifiedPlanner(gait, ModifiedOptions(map_kind=MapKind[options.map.upper()]))
     every = options.record_every or (1 if options.steps <= _LONG else 5)
     simulation = SimulationOptions(
         steps=options.steps,
-        plant=PlantOptions(friction=options.friction, mass_scale=options.mass_scale),
+        plant=IdealOptions(mass_scale=options.mass_scale)
+        if options.plant == "ideal"
+        else PlantOptions(friction=options.friction, mass_scale=options.mass_scale),
         embedding=EmbeddingOptions(
             friction=_CONE_MARGIN * options.friction, torque_scale=options.torque_scale
         ),

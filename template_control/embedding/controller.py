@@ -26,6 +26,7 @@ from template_control.embedding.references import leg_forces, pd, unloading_cap
 from template_control.embedding.scaling import Scale
 from template_control.embedding.step_planning import ReplanOptions, StepPlanning, StepReport
 from template_control.embedding.swing_foot import SwingFoot, SwingOptions
+from template_control.errors import ParameterError
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.hybrid import Node
@@ -42,10 +43,8 @@ from template_control.whole_body.tasks import (
 
 Array = NDArray[np.float64]
 
-import os
 
-_G = float(os.environ.get("RG", "1e4"))
-_REACH_GAINS = (_G, 2 * _G**0.5)
+_REACH_GAINS = (1e4, 200.0)  # [1/s^2], [1/s]: of a leg that is nearly straight
 _NO_CAP = np.full(1, np.inf)
 
 
@@ -65,6 +64,10 @@ class EmbeddingOptions:
         trunk_pitch: where the trunk is held [rad].
         contact_damping: brings a foot that landed sliding to rest [1/s].
         replan: when a step is planned anew.
+        liftoff_angle: direction beta from the rear foot to the CoM [rad, from forward
+            horizontal] at which that foot lifts off. None: "at the same configuration (namely,
+            the same beta_l) as that of SLIP", Fig. 13(b); an angle: "the leg lifts off at a
+            predefined configuration", whatever the template does, Fig. 13(c).
     """
 
     gains: Gains = field(default_factory=Gains)
@@ -77,6 +80,13 @@ class EmbeddingOptions:
     trunk_pitch: float = 0.0
     contact_damping: float = 40.0
     replan: ReplanOptions = field(default_factory=ReplanOptions)
+    liftoff_angle: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.liftoff_angle is not None and not 0.0 < self.liftoff_angle < np.pi:
+            raise ParameterError(
+                f"liftoff_angle is {self.liftoff_angle!r} rad: give an angle between 0 and pi"
+            )
 
     def scaled(self, scale: Scale) -> EmbeddingOptions:
         """The same tuning for a template of another size."""
@@ -208,6 +218,9 @@ class EmbeddingController:
             self.parameters.rest_length,
             self.template_forces,
         )
+        if path.meta[row, 3] != toe:
+            # Template and robot are on either side of liftoff: to each foot its own force.
+            self.template_forces[:] = np.flipud(self.template_forces.copy())
         self.time += dt
         if self.node.phase is Phase.DS:
             return self._solve_double()
@@ -242,6 +255,7 @@ class EmbeddingController:
                 self.planning.path.liftoff,
                 p.rest_length,
                 p.gravity,
+                self.options.liftoff_angle,
             ):
                 continue
             self.node = AUTOMATON.node(edge.target)

@@ -1,7 +1,8 @@
 """When the robot fires an event of the automaton.
 
 The geometric guards are the template's own functions, evaluated at the robot's CoM and
-feet; touchdown is felt, and liftoff happens where the template lifts off (its beta_l).
+feet; touchdown is felt, and liftoff happens where the template lifts off (its beta_l) or in
+a predefined direction (both of Section V-B).
 """
 
 from __future__ import annotations
@@ -40,7 +41,13 @@ class Sensed:
 
 
 def fired(
-    event: Event, sensed: Sensed, phase_time: float, liftoff: float, rest_length: float, g: float
+    event: Event,
+    sensed: Sensed,
+    phase_time: float,
+    liftoff: float,
+    rest_length: float,
+    g: float,
+    liftoff_angle: float | None = None,
 ) -> bool:
     """Whether ``event`` has happened.
 
@@ -51,11 +58,18 @@ def fired(
         liftoff: template time of the plan's liftoff [s].
         rest_length: l0 [m].
         g: gravitational acceleration [m/s^2].
+        liftoff_angle: predefined direction from the rear foot to the CoM [rad] that takes the
+            place of the plan's liftoff; it decreases from pi to 0 as the robot walks forward.
     """
     if event is Event.TOUCHDOWN:
         settled = sensed.swing_time > _MIN_SWING * np.sqrt(rest_length / g)
         return sensed.front_contact and bool(settled)
     if event is Event.REAR_LIFTOFF:
         stretch = guard(int(event), sensed.state, sensed.toes, rest_length, 0.0)
-        return phase_time >= liftoff or stretch > _OVERSTRETCH * rest_length
+        if stretch > _OVERSTRETCH * rest_length:
+            return True
+        if liftoff_angle is None:
+            return phase_time >= liftoff
+        beta = np.arctan2(sensed.state[1], sensed.state[0] - sensed.toes[0])
+        return bool(beta <= liftoff_angle)
     return guard(int(event), sensed.state, sensed.toes, rest_length, 0.0) >= 0.0

@@ -207,8 +207,8 @@ class BulletPlant:
                 self.body,
                 self._trunk,
                 [push, 0.0, 0.0],
-                [0.0, 0.0, 0.0],
-                p.LINK_FRAME,
+                p.getLinkState(self.body, self._trunk, physicsClientId=c)[0],
+                p.WORLD_FRAME,
                 physicsClientId=c,
             )
         p.stepSimulation(physicsClientId=c)

@@ -1,4 +1,4 @@
-"""Walk a robot in PyBullet: plant, controller and recorder in one loop."""
+"""Walk a robot: plant, controller and recorder in one loop."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from template_control.embedding.controller import EmbeddingController, Embedding
 from template_control.embedding.planner import Planner
 from template_control.embedding.start import state_at_vlo
 from template_control.errors import ParameterError
-from template_control.plant.bullet import BulletPlant, PlantOptions
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
+from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.plant.record import Record
 from template_control.plant.recorder import Recorder
 from template_control.plant.sensing import SensorOptions, Sensors, TorqueDelay
@@ -55,7 +57,7 @@ class SimulationOptions:
 
     Attributes:
         steps: VLO to VLO, how many to walk.
-        plant: the world.
+        plant: the world; the type of its options says which.
         embedding: the controller's tuning.
         start: (3,) VLO state to start in; None for the gait's.
         pushes: disturbances.
@@ -67,7 +69,7 @@ class SimulationOptions:
     """
 
     steps: int = 50
-    plant: PlantOptions = field(default_factory=PlantOptions)
+    plant: PlantOptions | IdealOptions = field(default_factory=PlantOptions)
     embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
     start: tuple[float, float, float] | None = None
     pushes: tuple[Push, ...] = ()
@@ -113,7 +115,7 @@ def simulate(
     Ctrl-C ends the run too; what was walked by then is returned, marked ``interrupted``.
 
     Args:
-        robot: model of the controller, and whose URDF PyBullet loads.
+        robot: model of the controller, and whose URDF the plant loads.
         planner: chooses the steps; owns the gait.
         options: how the run goes.
         progress: called with the number of completed steps after each.
@@ -133,7 +135,7 @@ def simulate(
     controller.start(0)
     begin = time.perf_counter()
     interrupted = False
-    with BulletPlant(robot, o.plant) as plant:
+    with open_plant(robot, o.plant) as plant:
         plant.reset(q, v)
         try:
             reason = _loop(plant, controller, recorder, o, length, progress)
@@ -148,7 +150,7 @@ def simulate(
 
 
 def _loop(
-    plant: BulletPlant,
+    plant: Plant,
     controller: EmbeddingController,
     recorder: Recorder,
     o: SimulationOptions,
@@ -184,7 +186,10 @@ def _loop(
             done = len(controller.steps) - 1
             if progress is not None:
                 progress(done)
-        plant.step(delay.pass_on(solution.torque), push)
+        try:
+            plant.step(delay.pass_on(solution.torque), push)
+        except ParameterError as error:
+            return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
     return ""
 
@@ -203,7 +208,7 @@ def _push(
 
 
 def _fallen(
-    plant: BulletPlant,
+    plant: Plant,
     controller: EmbeddingController,
     q: Array,
     ground: float,
@@ -248,6 +253,7 @@ def _metadata(
         "gait_controls": gait.controls.tolist(),
         "gait_mean_speed": gait.mean_speed,
         "planner": type(controller.planner).__name__,
+        "plant": plant_name(o.plant),
         "options": asdict(o),
         "fall_reason": reason,
         "wall_seconds": seconds,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from template_control.cli.reproductions.example_one import fig10
+from template_control.cli.reproductions.example_two import fig12, fig13
 from template_control.cli.reproductions.map_errors import fig5, table3
 from template_control.cli.reproductions.reproduction import Reproduction
 from template_control.cli.reproductions.stability import fig8, fig9
@@ -19,5 +20,7 @@ REPRODUCTIONS: dict[str, Callable[[], Reproduction]] = {
     "fig8": fig8,
     "fig9": fig9,
     "fig10": fig10,
+    "fig12": fig12,
+    "fig13": fig13,
 }
 """By the name ``template-control reproduce`` knows them by."""

@@ -1,0 +1,295 @@
+"""An ideal plant: the robot on rigid ground, with nothing that a contact solver adds.
+
+Forward dynamics of the Pinocchio model with the feet's rolling contacts as rigid constraints:
+they stick (friction is not modelled, it always suffices), hold only while they press, and a
+touchdown is a plastic impact, M (v+ - v-) = J^T L, J v+ = 0. What a robot does differently in
+PyBullet is then due to contact and integration there, and what it does differently from its
+template here is due to the robot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from template_control.errors import ParameterError
+from template_control.plant.rigid_contact import pressing, solve
+from template_control.robot.planar_biped import BASE_DOF, PlanarBiped
+
+Array = NDArray[np.float64]
+
+_DEPTH = 1e-8  # [m] a foot this deep in the ground has touched down
+_HALVINGS = 24  # of a time step, to locate an event in
+_EVENTS = 16  # in one time step; beyond them it is integrated to its end as it is
+_PULL = 1e-6  # of the weight: a foot that would pull this much is released
+_REST = 1e-3  # [m/s] a foot that an impact lifts more slowly than this stays on the ground
+_DRIFT = 1e-12  # constraint error [m, m/s] that is projected away
+
+
+@dataclass(frozen=True)
+class IdealOptions:
+    """What the ideal world is like; friction is not modelled, stance feet stick.
+
+    Attributes:
+        time_step: period of the torques [s]; one step of the integrator.
+        mass_scale: every link's mass and inertia times this (the controller is not told).
+    """
+
+    time_step: float = 1e-3
+    mass_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.time_step < np.inf:
+            raise ParameterError(
+                f"ideal plant: time_step is {self.time_step!r}: give a positive number of seconds"
+            )
+        if not 0.0 < self.mass_scale < np.inf:
+            raise ParameterError(
+                f"ideal plant: mass_scale is {self.mass_scale!r}: give a positive number"
+            )
+
+    def ground_height(self, x: float) -> float:
+        """Height of the ground at ``x`` [m]: flat."""
+        return 0.0
+
+
+class IdealPlant:
+    """Rigid flat ground at height 0 and one robot, driven by joint torques.
+
+    The integrator is the classical Runge-Kutta method of order four; touchdowns and releases
+    are located within its steps by bisection. Its tiny constraint drift is taken out by
+    projection (mass-weighted, position and velocity) after every step. Joint stops are not
+    modelled.
+
+    Args:
+        robot: whose model and URDF to copy.
+        options: time step, mass error.
+
+    Attributes:
+        contacts: indices of the feet on the ground.
+        impacts: impulses (2, 2) [N s] on the feet at each touchdown so far.
+        pulls: touchdowns and stances that could stick only by pulling at the ground; a real
+            foot would have slid or bounced.
+    """
+
+    def __init__(self, robot: PlanarBiped, options: IdealOptions) -> None:
+        self.options = options
+        model = robot.model.copy()
+        for joint in range(1, model.njoints):
+            inertia = model.inertias[joint]
+            scale = options.mass_scale
+            model.inertias[joint] = pin.Inertia(
+                scale * inertia.mass, inertia.lever, scale * inertia.inertia
+            )
+        self.robot = PlanarBiped(robot.path, robot.urdf, model, robot.feet, robot.foot_radius)
+        self.contacts: tuple[int, ...] = ()
+        self.impacts: list[Array] = []
+        self.pulls = 0
+        self._q, self._v = np.zeros(robot.nv), np.zeros(robot.nv)
+        self._drive = np.zeros(robot.nv)
+        self._push = 0.0
+        self._anchor = np.zeros(2)
+        self._impulse = np.zeros((2, 2))
+        self._trunk_corners = _trunk_corners(self.robot)
+
+    def reset(self, q: Array, v: Array) -> None:
+        """Place the robot at (q, v); only for the start of a run.
+
+        A foot within 1 um of the ground that does not leave it is on it, and stops at once.
+        """
+        self._q[:], self._v[:] = q, v
+        self.contacts = ()
+        self._impulse[:] = 0.0
+        self.robot.update(self._q, self._v)
+        low = self.robot.foot_position[:, 1] < 1e-6
+        self._land(low & (self.robot.foot_velocity[:, 1] <= 1e-9))
+        self._impulse[:] = 0.0
+        self.impacts.clear()
+
+    def read(self, q: Array, v: Array) -> None:
+        """Write the configuration and velocity (nv,) into ``q`` and ``v``."""
+        q[:], v[:] = self._q, self._v
+
+    def contact_forces(self, out: Array) -> None:
+        """Write the ground's force on each foot (2, 2) [N], x and y, into ``out``.
+
+        Averages over the last time step, impacts included.
+        """
+        out[:] = self._impulse / self.options.time_step
+
+    def trunk_touches_ground(self) -> bool:
+        """True where the box around the trunk's collision shapes reaches the ground."""
+        x, z = self._trunk_corners
+        height = self._q[1] - x * np.sin(self._q[2]) + z * np.cos(self._q[2])
+        return bool(np.any(height <= 0.0))
+
+    def step(self, torque: Array, push: float = 0.0) -> None:
+        """Advance one time step.
+
+        Args:
+            torque: (nu,) joint torques [N m].
+            push: horizontal disturbance on the trunk's centre of mass [N].
+
+        Raises:
+            ParameterError: if the state is not finite any more, or the legs lie so that the
+                contacts' forces are not determined.
+        """
+        self._drive[BASE_DOF:] = torque
+        self._push = push
+        self._impulse[:] = 0.0
+        try:
+            self._advance(self.options.time_step)
+        except np.linalg.LinAlgError:
+            raise ParameterError(
+                f"{self.robot.name}: the contacts' forces are not determined at q ="
+                f" {self._q.tolist()}"
+            ) from None
+
+    def _advance(self, left: float) -> None:
+        """Go on for ``left`` seconds, from event to event."""
+        for _ in range(_EVENTS):
+            left -= self._to_event(left)
+            if left <= 0.0:
+                return
+        self._commit(*self._flow(left))
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    def __enter__(self) -> IdealPlant:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # -- dynamics ---------------------------------------------------------------------
+
+    def _right(self, q: Array) -> Array:
+        """Generalised forces less nonlinear effects at the robot's last update."""
+        right = self._drive - self.robot.nonlinear_effects
+        if self._push:
+            x, _, z = self.robot.model.inertias[BASE_DOF].lever
+            right[0] += self._push
+            right[2] += self._push * (z * np.cos(q[2]) - x * np.sin(q[2]))
+        return right
+
+    def _rates(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Acceleration (nv,) and contact forces (2, 2), all ``contacts`` held."""
+        r = self.robot
+        r.update(q, v)
+        return solve(r.mass_matrix, self._right(q), r.foot_jacobian, r.foot_bias, self.contacts)
+
+    def _flow(self, h: float) -> tuple[Array, Array, Array]:
+        """State after ``h`` seconds with the present contacts, and their impulse (2, 2)."""
+        q, v = self._q, self._v
+        a1, f1 = self._rates(q, v)
+        a2, f2 = self._rates(q + 0.5 * h * v, v2 := v + 0.5 * h * a1)
+        a3, f3 = self._rates(q + 0.5 * h * v2, v3 := v + 0.5 * h * a2)
+        a4, f4 = self._rates(q + h * v3, v4 := v + h * a3)
+        return (
+            q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4),
+            v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4),
+            h / 6.0 * (f1 + 2.0 * f2 + 2.0 * f3 + f4),
+        )
+
+    def _to_event(self, h: float) -> float:
+        """Go on until a foot touches down or is released, at most ``h``; the time gone by."""
+        r = self.robot
+        r.update(self._q, self._v)
+        right = self._right(self._q)
+        self.contacts, _, _, clean = pressing(
+            r.mass_matrix, right, r.foot_jacobian, r.foot_bias, self.contacts
+        )
+        self.pulls += not clean
+        end = self._flow(h)
+        if clean and self._margin(end) < 0.0:
+            low, high = 0.0, h
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                flown = self._flow(middle)
+                if self._margin(flown) < 0.0:
+                    high, end = middle, flown
+                else:
+                    low = middle
+            h = high
+        self._commit(*end)
+        self._land(r.foot_position[:, 1] < -_DEPTH)
+        return h
+
+    def _margin(self, end: tuple[Array, Array, Array]) -> float:
+        """Negative where, at the ``end`` of a flow, a foot is in the ground or pulls at it."""
+        q, v, _ = end
+        _, force = self._rates(q, v)
+        weight = self.robot.mass * self.robot.gravity
+        return min(
+            force[i, 1] / weight + _PULL
+            if i in self.contacts
+            else self.robot.foot_position[i, 1] + _DEPTH
+            for i in range(2)
+        )
+
+    def _land(self, feet: NDArray[np.bool_]) -> None:
+        """Plastic impact of ``feet`` (2,) with the ground; the other one may be released."""
+        landing = tuple(i for i in range(2) if feet[i] and i not in self.contacts)
+        if not landing:
+            return
+        r = self.robot
+        for i in landing:
+            self._anchor[i] = r.foot_position[i, 0] - self._rolled(i, self._q)
+        touching = tuple(sorted((*self.contacts, *landing)))
+        momentum, zero = r.mass_matrix @ self._v, np.zeros((2, 2))
+        held, v, impulse, clean = pressing(r.mass_matrix, momentum, r.foot_jacobian, zero, touching)
+        self.pulls += not clean
+        if all(r.foot_jacobian[i, 1] @ v < _REST for i in touching):
+            held = touching
+            v, impulse = solve(r.mass_matrix, momentum, r.foot_jacobian, zero, held)
+        self.contacts, self._v = held, v
+        self._impulse += impulse
+        self.impacts.append(impulse)
+        self._commit(self._q, self._v, np.zeros((2, 2)))
+
+    # -- constraints ------------------------------------------------------------------
+
+    def _rolled(self, foot: int, q: Array) -> float:
+        """Distance that the sphere of ``foot`` has rolled by its angle [m]."""
+        joints = [BASE_DOF + joint for joint in self.robot.legs[foot]]
+        return self.robot.foot_radius * float(q[2] + q[joints].sum())
+
+    def _commit(self, q: Array, v: Array, impulse: Array) -> None:
+        """Take over (q, v), projected onto the contacts; the robot's update is at it."""
+        r = self.robot
+        self._impulse += impulse
+        r.update(q, v)
+        zero = np.zeros(r.nv)
+        error = np.zeros((2, 2))
+        for i in self.contacts:
+            error[i, 0] = r.foot_position[i, 0] - self._rolled(i, q) - self._anchor[i]
+            error[i, 1] = r.foot_position[i, 1]
+        moved = np.abs(error).max() > _DRIFT
+        if moved:
+            q = q + solve(r.mass_matrix, zero, r.foot_jacobian, error, self.contacts)[0]
+            r.update(q, v)
+        slip = r.foot_velocity[list(self.contacts)]
+        if slip.size and np.abs(slip).max() > _DRIFT:
+            momentum = r.mass_matrix @ v
+            v, _ = solve(r.mass_matrix, momentum, r.foot_jacobian, np.zeros((2, 2)), self.contacts)
+            r.update(q, v)
+        self._q, self._v = q, v
+
+
+def _trunk_corners(robot: PlanarBiped) -> Array:
+    """x and z (2, n) of the corners of boxes around the trunk's shapes, in its frame [m]."""
+    geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.GeometryType.COLLISION)
+    corners = []
+    for shape in geometry.geometryObjects:
+        if shape.parentJoint != BASE_DOF:
+            continue
+        shape.geometry.computeLocalAABB()
+        box = shape.geometry.aabb_local
+        for corner in product(*zip(box.min_, box.max_, strict=True)):
+            corners.append(shape.placement.act(np.array(corner))[[0, 2]])
+    return np.array(corners).reshape(-1, 2).T

@@ -1,0 +1,114 @@
+"""Example II: start, liftoff rules, and what is reported of it."""
+
+import numpy as np
+import pytest
+
+from template_control.cli.reproductions.example_two import (
+    EARLIER,
+    PLANNERS,
+    PLANTS,
+    START,
+    robot_walk,
+    sections,
+    start_state,
+    template_walk,
+)
+from template_control.embedding.controller import EmbeddingOptions
+from template_control.embedding.guards import Sensed, fired
+from template_control.embedding.lqr import LqrPlanner
+from template_control.plant.ideal import IdealOptions
+from template_control.plant.simulation import SimulationOptions, simulate
+from template_control.robot.library import load_robot
+from template_control.slip.gait import gait_from_energy
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.vocabulary import Event
+from template_control.view.example_two_figures import beginning, liftoff
+
+GAIT = gait_from_energy(SlipParameters(), 0.9818, 826.0)
+
+
+def first_steps(beta=None, planner=LqrPlanner):
+    options = SimulationOptions(
+        steps=2, plant=IdealOptions(), embedding=EmbeddingOptions(liftoff_angle=beta)
+    )
+    return simulate(load_robot("five-link"), planner(GAIT), options)
+
+
+def test_z0_is_the_papers():
+    z = np.array(start_state(GAIT))
+    assert z[0] > 0.0 > z[2], "downward"
+    np.testing.assert_allclose(sections(GAIT, z[None])[0], START, rtol=1e-12)
+    p = GAIT.parameters
+    spring = 0.5 * p.leg_stiffness * (p.rest_length - z[1]) ** 2
+    kinetic = 0.5 * p.mass * (z[0] ** 2 + z[2] ** 2)
+    assert kinetic + p.mass * p.gravity * z[1] + spring == pytest.approx(821.55)
+
+
+def test_the_template_alone_shows_what_a_map_costs():
+    target = sections(GAIT, GAIT.vlo[None])[0]
+    settled = {name: template_walk(name).settled for name in PLANNERS}
+    for name in ("LQR", "modified, improved map", "modified, exact map"):
+        mean, spread = settled[name]
+        np.testing.assert_allclose(mean, target, atol=2e-4, rtol=2e-5)
+        assert spread[0] < 1e-4
+    mean, _ = settled["modified, paper map"]
+    assert mean[0] - target[0] > 0.005
+    assert mean[2] == pytest.approx(826.0, abs=0.05), "(38) holds on any map"
+
+
+def test_liftoff_waits_for_the_predefined_direction():
+    ahead = Sensed(np.array([0.4, 0.9, 1.0, 0.0]), np.array([0.0, 0.6]))
+    beta = np.arctan2(0.9, 0.4)
+    for angle, lifts in ((beta + 1e-6, True), (beta - 1e-6, False)):
+        # Whatever the template's time says.
+        for time in (0.0, 1.0):
+            args = (Event.REAR_LIFTOFF, ahead, time, 0.5, 1.0, 9.81)
+            assert fired(*args, liftoff_angle=angle) is lifts
+            assert bool(fired(*args)) is (time >= 0.5)
+
+
+def test_an_earlier_liftoff_is_rougher_with_smaller_amplitudes():
+    """The paper's words for Fig. 13(c)."""
+    template, predefined = liftoff(first_steps()), liftoff(first_steps(EARLIER))
+    # One tick turns beta by less than 0.1 degrees.
+    assert 0.0 <= EARLIER - predefined.beta < np.radians(0.15)
+    assert template.beta < predefined.beta
+    assert predefined.load > 300.0
+    assert template.load < 1.0
+    assert predefined.jump.max() > 100.0
+    assert template.jump.max() < 15.0
+    assert np.all(predefined.peak[[0, 2]] < 0.95 * template.peak[[0, 2]]), "hips"
+
+
+def test_each_foot_has_its_own_template_force_about_liftoff():
+    """The template's and the robot's liftoff differ by some ticks; forces go to the feet."""
+    record = first_steps()
+    nodes = np.array(record.metadata["nodes"])[record.node]
+    lifted = np.flatnonzero((nodes[1:] == "SS_bv^w") & (nodes[:-1] == "DS_sd^w"))[0] + 1
+    near = slice(lifted - 5, lifted + 5)
+    lifting = 1 - record.rear[lifted]
+    force = np.where(
+        record.rear[near] == lifting,
+        record.template_force[near, 0, 1],
+        record.template_force[near, 1, 1],
+    )
+    assert np.all(force < 100.0), "the lifting leg's fades"
+
+
+def test_beginning_cuts_the_samples():
+    record = beginning(first_steps(), 0.1)
+    assert record.time[-1] < 0.1
+    assert len(record.q) == len(record.time) == 100
+    assert len(record.vlo_time) == 3
+
+
+@pytest.mark.slow
+def test_the_robot_settles_on_the_equilibrium_from_z0():
+    target = np.array([0.9818, 0.0, 826.0])
+    for plant in PLANTS:
+        mean, spread = robot_walk("LQR", plant)[0].settled
+        error = np.abs(mean - target)
+        assert error[0] < 0.001, plant
+        assert error[1] < np.radians(2.0), plant
+        assert error[2] < 1.0, plant
+        assert spread[0] < 0.0015, plant
