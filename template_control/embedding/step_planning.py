@@ -23,6 +23,8 @@ from template_control.slip.vocabulary import Event, Slot
 
 Array = NDArray[np.float64]
 
+_LOWERED = (0.5, 0.0)  # of dy/dt, tried in turn where the template would take off
+_TOP = 0.99  # of l0: no higher may the path start then
 _VLO_STATE = [2, 1, 3]  # dx/dt, y, dy/dt of a state x, y, dx/dt, dy/dt
 
 
@@ -105,23 +107,52 @@ class StepPlanning:
         begin = time.perf_counter()
         if self.steps:
             self.planner.observe(self.steps[-1].decision, z)
-        decision = self.planner.decide(z)
+        decision, start = self._plan(z)
         seconds = time.perf_counter() - begin
         self.steps.append(StepReport(now, z, decision, self.planner.offset.copy(), load, seconds))
-        self.follow(node, sensed, now)
+        self.follow(node, sensed, now, start=start)
 
-    def follow(self, node: Node, sensed: Sensed, now: float, reach: float = 0.0) -> None:
+    def _plan(self, z: Array) -> tuple[Decision, Array]:
+        """A decision at ``z`` (3,), and the VLO state (3,) from which its path starts.
+
+        Where the template would leave the ground, whose leg ends at l0 and cannot pull, the
+        robot's still stands: the path then starts from a state that stays on the ground, and
+        the robot is let down to it.
+        """
+        decision = self.planner.decide(z)
+        if decision.feasible or z[2] <= 0.0:
+            return decision, z
+        for share in _LOWERED:
+            height = min(z[1], _TOP * self.parameters.rest_length)
+            start = np.array([z[0], height, share * z[2]])
+            lowered = self.planner.decide(start)
+            if lowered.feasible:
+                return replace(lowered, feasible=False, reached=False), start
+        return decision, z
+
+    def follow(
+        self,
+        node: Node,
+        sensed: Sensed,
+        now: float,
+        reach: float = 0.0,
+        start: Array | None = None,
+    ) -> None:
         """Template path from here to the touchdown after the next VLO.
 
         Args:
             node, sensed, now: see :meth:`decide`.
             reach: how much lower the touchdown angle is than decided [rad].
+            start: (3,) dx/dt, y, dy/dt to start from; None for the robot's.
         """
+        state = sensed.state
+        if start is not None:
+            state = np.array([state[0], start[1], start[0], start[2]])
         toes = (float(sensed.toes[0]), float(sensed.toes[1]))
         u = self.steps[-1].decision.controls.copy()
         u[Slot.TOUCHDOWN_ANGLE] -= reach
         self.reaching = reach > 0.0
-        first = run(self.parameters, node.name, sensed.state, u, toes, scratch=self._scratch)
+        first = run(self.parameters, node.name, state, u, toes, scratch=self._scratch)
         strides = [first]
         if first.completed:
             # The next foothold must be known when the swing begins, before the next VLO.
