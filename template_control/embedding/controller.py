@@ -294,7 +294,7 @@ class EmbeddingController:
 
     def _decide(self) -> None:
         if self.steps:
-            self.load.end_step()
+            self.load.end_step(self.steps[-1].decision.reached)
         self.planning.decide(self.node, self._sensed, self.time, self.load.factor)
         self._on_new_path()
 

@@ -13,8 +13,8 @@ class LoadOptions:
         gain: share of a step's mean feedback that enters the estimate.
         dead_zone: mean feedback over g that counts as none; a step of the nominal robot
             has up to this much, from the swing leg, and must not be learnt.
-        leak: share of the estimate forgotten in a step whose feedback is in the dead zone; what
-            a disturbance taught must not stay.
+        leak: share of the estimate forgotten in a step that teaches nothing; what a disturbance
+            taught must not stay.
         step_bound: largest change of the factor in one step; a push is no load.
         bounds: of the factor.
     """
@@ -49,12 +49,16 @@ class LoadEstimate:
         self._sum += feedback * dt
         self._time += dt
 
-    def end_step(self) -> None:
-        """Learn from the step that just ended."""
+    def end_step(self, trusted: bool) -> None:
+        """Learn from the step that just ended.
+
+        Args:
+            trusted: it went near the gait; from others, a push's say, nothing is learnt.
+        """
         if self._time == 0.0:
             return
         o = self.options
-        mean = self._sum / self._time / self._gravity
+        mean = self._sum / self._time / self._gravity if trusted else 0.0
         change = min(o.gain * max(abs(mean) - o.dead_zone, 0.0), o.step_bound)
         factor = self.factor + (change if mean > 0.0 else -change)
         if change == 0.0:

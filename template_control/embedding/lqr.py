@@ -54,9 +54,9 @@ class LqrOptions:
             foot would touch down at once.
         trusted_price: the linear law's step is taken without a search below this price.
         spread: half-widths of the search in alpha [rad] and kappa_2 / k0.
-        brakes: second steps that the search reckons with beside the law's own: alpha relative
+        second_steps: second steps that the search reckons with beside the law's own: alpha relative
             to the gait's [rad], kappa_1 and kappa_2 over k0. A leg that is stiffer before its
-            virtual bottom than after takes energy out.
+            virtual bottom than after takes energy out, the reverse puts some in.
     """
 
     state_cost: tuple[float, float, float] = (10.0, 100.0, 10.0)
@@ -70,11 +70,14 @@ class LqrOptions:
     top_margin: float = 0.01
     trusted_price: float = 2.0
     spread: tuple[float, float] = (0.16, 0.25)
-    brakes: tuple[tuple[float, float, float], ...] = (
+    second_steps: tuple[tuple[float, float, float], ...] = (
         (0.0, 1.5, 1.0),
         (-0.058, 1.0, 0.75),
         (0.025, 1.5, 1.0),
         (-0.058, 1.25, 0.75),
+        (-0.03, 0.75, 1.0),
+        (0.0, 1.0, 1.5),
+        (0.045, 0.5, 0.75),
     )
 
     def scaled(self, scale: Scale) -> LqrOptions:
@@ -132,7 +135,7 @@ class LqrPlanner:
             offset=self.offset,
             lower=np.array([nominal[0] + o.angle_range[0], *[o.stiffness_range[0]] * 2]),
             upper=np.array([nominal[0] + o.angle_range[1], *[o.stiffness_range[1]] * 2]),
-            brakes=np.add(np.array(o.brakes).reshape(-1, 3), (nominal[0], 0.0, 0.0)),
+            second_steps=np.add(np.array(o.second_steps).reshape(-1, 3), (nominal[0], 0.0, 0.0)),
             enough=o.trusted_price,
             top_margin=o.top_margin,
             stiffness=p.leg_stiffness,
@@ -155,7 +158,7 @@ class LqrPlanner:
             cost = search(TABLES, _NODE, law, s, z, self._spread, u, first)
         controls = self.gait.controls.copy()
         controls[_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
-        return Decision(controls, first, cost < 2.0 * FALL_PRICE, trusted)
+        return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, trusted)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """Learn from the VLO state ``z`` (3,) in which the step of ``decision`` ended."""

@@ -86,7 +86,7 @@ class ModifiedPlanner:
         controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2
         feasible = outcome == Outcome.SECTION
         reached = feasible and residual < o.tolerance**2
-        return Decision(controls, predicted, feasible, reached)
+        return Decision(controls, predicted, feasible, feasible, reached)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """The paper's planner plans every step afresh."""

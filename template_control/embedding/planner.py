@@ -25,6 +25,7 @@ class Decision:
         controls: (5,) u by Slot.
         predicted: (3,) VLO state the step should end in, offset included.
         feasible: the template completes the step with these controls.
+        lasting: and a step after it, as far as the planner looks.
         reached: the planner's first choice was feasible; otherwise ``controls`` are the best
             reachable ones.
     """
@@ -32,6 +33,7 @@ class Decision:
     controls: Array
     predicted: Array
     feasible: bool
+    lasting: bool
     reached: bool
 
 

@@ -78,6 +78,7 @@ class Scale:
             clearance=options.clearance * self.length,
             landing_speed=options.landing_speed * self.speed,
             horizon=options.horizon * self.time,
+            lead=options.lead * self.time,
             reach_acceleration=options.reach_acceleration * self.speed / self.time,
         )
 

@@ -23,7 +23,7 @@ from template_control.slip.vocabulary import Event, Slot
 
 Array = NDArray[np.float64]
 
-_LOWERED = (0.5, 0.0)  # of dy/dt, tried in turn where the template would take off
+_CALMER = (0.5, 0.0)  # of dy/dt, tried in turn
 _TOP = 0.99  # of l0: no higher may the path start then
 _VLO_STATE = [2, 1, 3]  # dx/dt, y, dy/dt of a state x, y, dx/dt, dy/dt
 
@@ -115,19 +115,19 @@ class StepPlanning:
     def _plan(self, z: Array) -> tuple[Decision, Array]:
         """A decision at ``z`` (3,), and the VLO state (3,) from which its path starts.
 
-        Where the template would leave the ground, whose leg ends at l0 and cannot pull, the
-        robot's still stands: the path then starts from a state that stays on the ground, and
-        the robot is let down to it.
+        The template's leg ends at l0, cannot pull, and pushes as its spring does; the robot's
+        need not. Where the template would leave the ground or come to no second step, the path
+        starts from a state that does, and the robot is let down or pushed up to it.
         """
         decision = self.planner.decide(z)
-        if decision.feasible or z[2] <= 0.0:
+        if decision.lasting:
             return decision, z
-        for share in _LOWERED:
+        for share in _CALMER:
             height = min(z[1], _TOP * self.parameters.rest_length)
             start = np.array([z[0], height, share * z[2]])
-            lowered = self.planner.decide(start)
-            if lowered.feasible:
-                return replace(lowered, feasible=False, reached=False), start
+            calmer = self.planner.decide(start)
+            if calmer.lasting:
+                return replace(calmer, feasible=decision.feasible, reached=False), start
         return decision, z
 
     def follow(

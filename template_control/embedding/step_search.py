@@ -1,9 +1,9 @@
 """Compiled look-ahead on the exact VLO return map: what an LQR step is worth, and a better one.
 
 A step is judged two steps ahead: after it comes the best of the (bounded) LQR law's step and a
-few that brake hard, and the state then reached is priced with the LQR's cost-to-go. The search
-runs on the improved closed-form map, whose error is far below the robot's; what it finds is
-priced on the exact one.
+few that brake or boost hard, and the state then reached is priced with the LQR's cost-to-go.
+The search runs on the improved closed-form map, whose error is far below the robot's; what it
+finds is priced on the exact one.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Law(NamedTuple):
         cost: (3, 3) cost-to-go about ``target``.
         offset: (3,) what the robot adds to the template's next VLO state.
         lower, upper: (3,) bounds of u.
-        brakes: (n, 3) other controls than u_s - K (z - z_s) for the second step.
+        second_steps: (n, 3) other controls than u_s - K (z - z_s) for the second step.
         enough: a cost below which no other second step is tried.
         top_margin: alpha stays this far [rad] below asin(y / l0).
         stiffness: k0 [N/m].
@@ -50,7 +50,7 @@ class Law(NamedTuple):
     offset: Array
     lower: Array
     upper: Array
-    brakes: Array
+    second_steps: Array
     enough: float
     top_margin: float
     stiffness: float
@@ -129,11 +129,11 @@ def price(
     best = FALL_PRICE + here
     if step(tables, node, kind, law, s, first, u2, second) == 0:
         best = _cost_to_go(law, second) + 0.3 * here
-    for i in range(law.brakes.shape[0]):
+    for i in range(law.second_steps.shape[0]):
         # The law's own step is good enough near the gait.
         if best < law.enough:
             break
-        u2[:] = law.brakes[i]
+        u2[:] = law.second_steps[i]
         bounded(law, first, u2)
         if step(tables, node, kind, law, s, first, u2, second) == 0:
             best = min(best, _cost_to_go(law, second) + 0.3 * here)

@@ -26,6 +26,8 @@ class SwingOptions:
         clearance: height of the foot at mid-swing [m].
         landing_speed: downward speed at touchdown [m/s].
         horizon: below this time to go [s] the path is no longer re-aimed.
+        lead: the foot is above its foothold this long before touchdown [s], so that it
+            comes down at rest relative to the ground.
         reach_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
         reach: the foot is kept within this share of the leg's length from the hip; a knee
             that goes straight hits its stop with tens of kilonewtons.
@@ -34,6 +36,7 @@ class SwingOptions:
     clearance: float = 0.05
     landing_speed: float = 0.2
     horizon: float = 0.02
+    lead: float = 0.02
     reach_acceleration: float = 10.0
     reach: float = 0.98
 
@@ -93,7 +96,7 @@ class SwingFoot:
         if time_to_go <= o.horizon or not np.isfinite(foothold):
             self._coast(dt)
         else:
-            quintic_step(self.x, foothold, 0.0, time_to_go, dt)
+            quintic_step(self.x, foothold, 0.0, max(time_to_go - o.lead, o.horizon), dt)
             # Rising while less than half of the swing is over.
             rising = 0.5 * (time_to_go - self._elapsed)
             if rising > o.horizon:

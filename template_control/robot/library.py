@@ -42,7 +42,7 @@ _ENTRIES = {
     "rabbit": _Entry(
         "rabbit.urdf",
         "RABBIT of Grenoble, five links, 62 % of its mass in the legs",
-        walk=(np.radians(68.0), 0.255),
+        walk=(np.radians(68.0), 0.271),
     ),
     "bolt": _Entry(
         "bolt.urdf",
