@@ -17,7 +17,7 @@ README = (ROOT / "README.md").read_text()
 
 REPLAY = (ROOT / "docs" / "replay.md").read_text()
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
-GUIDES = ("controller.md",)
+GUIDES = ("your_robot.md", "controller.md")
 
 
 def blocks(language, text=README):
