@@ -28,6 +28,7 @@ from template_control.plant.record import Record
 from template_control.plant.sensing import SensorOptions
 from template_control.plant.simulation import Push, SimulationOptions, perturbed_start, simulate
 from template_control.plant.summary import summarise
+from template_control.robot.five_link import FiveLink, Link
 from template_control.robot.library import ROBOTS, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
@@ -61,9 +62,11 @@ __all__ = [
     "EmbeddingController",
     "EmbeddingOptions",
     "Event",
+    "FiveLink",
     "GaitError",
     "GroundStep",
     "IdealOptions",
+    "Link",
     "LqrOptions",
     "LqrPlanner",
     "MapKind",

@@ -17,6 +17,7 @@ README = (ROOT / "README.md").read_text()
 
 REPLAY = (ROOT / "docs" / "replay.md").read_text()
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
+GUIDES = ("your_robot.md", "controller.md")
 
 
 def blocks(language, text=README):
@@ -117,6 +118,48 @@ def test_the_replay_page_runs_as_printed(tmp_path):
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "slow.html").is_file()
     assert (tmp_path / "figures" / "energies.png").is_file()
+
+
+@pytest.fixture(scope="module")
+def on_path(tmp_path_factory):
+    """Environment of a shell that knows ``template-control`` and ``python`` by name."""
+    folder = tmp_path_factory.mktemp("bin")
+    for name, words in (("python", ""), ("template-control", " -m template_control.cli.main")):
+        script = folder / name
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}"{words} "$@"\n')
+        script.chmod(0o755)
+    return {**ENVIRONMENT, "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}
+
+
+@pytest.mark.parametrize("page", GUIDES)
+def test_a_guide_runs_as_printed_from_top_to_bottom(page, tmp_path, on_path):
+    text = (ROOT / "docs" / page).read_text()
+    found = re.findall(r"```(python|sh)\n(.*?)```", text, flags=re.DOTALL)
+    assert found
+    for language, block in found:
+        shell = ["bash", "-euo", "pipefail", "-c", block]
+        done = subprocess.run(
+            [sys.executable, "-c", block] if language == "python" else shell,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            env=on_path,
+        )
+        assert done.returncode == 0, f"{block}: {done.stdout}{done.stderr}"
+        assert "fell: True" not in done.stdout
+
+
+@pytest.mark.parametrize("page", GUIDES)
+def test_what_a_guide_points_at_is_there(page):
+    text = (ROOT / "docs" / page).read_text()
+    for target in re.findall(r"\]\(([^)#]+)\)", text):
+        assert (ROOT / "docs" / target).exists(), target
+    for name, function in re.findall(r"`((?:[a-z_]+/)+[a-z_]+\.py)`(?::\s+`([\w.]+)`)?", text):
+        source = ROOT / "template_control" / name
+        assert source.is_file(), name
+        for part in function.split(".") if function else ():
+            assert re.search(rf"\b(def|class) {part}\b|^{part}\b", source.read_text(), re.M), part
 
 
 def test_pictures_are_there():
