@@ -8,9 +8,10 @@
 (4, False)
 """
 
-from template_control.embedding.controller import EmbeddingController, EmbeddingOptions
+from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.modified import ModifiedOptions, ModifiedPlanner
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planner import Decision, Planner
 from template_control.embedding.scaling import default_gait, paper_gait, template_for
 from template_control.errors import (

@@ -13,9 +13,9 @@ from template_control.cli.reproductions.example_two import (
     start_state,
     template_walk,
 )
-from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.guards import Sensed, fired
 from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.options import EmbeddingOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.simulation import SimulationOptions, simulate
 from template_control.robot.library import load_robot

@@ -4,8 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.start import state_at_vlo
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions

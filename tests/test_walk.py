@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.modified import ModifiedPlanner
+from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.record import Record

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from template_control.cli.output import progress_bar, writable
 from template_control.cli.robot_options import add_robot_options, robot_from
-from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.modified import ModifiedOptions, ModifiedPlanner
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planner import Planner
 from template_control.embedding.scaling import default_gait, paper_gait, template_for
 from template_control.errors import ParameterError

@@ -13,92 +13,32 @@ momentum about the CoM: it starts in the CoM at every plan, and leads or lags it
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.guards import Sensed, fired
-from template_control.embedding.load import LoadEstimate, LoadOptions
+from template_control.embedding.load import LoadEstimate
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.plan import at_phase
 from template_control.embedding.planner import Planner
 from template_control.embedding.references import leg_forces, pd, unloading_cap
 from template_control.embedding.scaling import Scale
-from template_control.embedding.step_planning import ReplanOptions, StepPlanning, StepReport
-from template_control.embedding.swing_foot import SwingFoot, SwingOptions
-from template_control.errors import ParameterError
+from template_control.embedding.step_planning import StepPlanning, StepReport
+from template_control.embedding.swing_foot import SwingFoot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.hybrid import Node
 from template_control.slip.vocabulary import Phase, Reset
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.tasks import (
-    DOUBLE_STANCE_WEIGHTS,
-    SINGLE_STANCE_WEIGHTS,
-    Gains,
     Row,
     TaskStack,
-    Weights,
 )
 
 Array = NDArray[np.float64]
 
 
-_REACH_GAINS = (1e4, 200.0)  # [1/s^2], [1/s]: of a leg that is nearly straight
 _NO_CAP = np.full(1, np.inf)
-
-
-@dataclass(frozen=True)
-class EmbeddingOptions:
-    """Tuning of the embedding for the reference template (80 kg, 1 m, 9.81 m/s^2).
-
-    The controller scales it to its gait's template by dynamic similarity.
-
-    Attributes:
-        gains: PD gains of (45).
-        single_stance, double_stance: task weights.
-        swing: shape of the swing.
-        load: tuning of the load estimate.
-        friction: coefficient the QP's cones are built with.
-        torque_scale: share of the URDF's torque limits that may be used.
-        trunk_pitch: where the trunk is held [rad].
-        contact_damping: brings a foot that landed sliding to rest [1/s].
-        replan: when a step is planned anew.
-        liftoff_angle: direction beta from the rear foot to the CoM [rad, from forward
-            horizontal] at which that foot lifts off. None: "at the same configuration (namely,
-            the same beta_l) as that of SLIP", Fig. 13(b); an angle: "the leg lifts off at a
-            predefined configuration", whatever the template does, Fig. 13(c).
-    """
-
-    gains: Gains = field(default_factory=Gains)
-    single_stance: Weights = SINGLE_STANCE_WEIGHTS
-    double_stance: Weights = DOUBLE_STANCE_WEIGHTS
-    swing: SwingOptions = field(default_factory=SwingOptions)
-    load: LoadOptions = field(default_factory=LoadOptions)
-    friction: float = 0.63
-    torque_scale: float = 1.0
-    trunk_pitch: float = 0.0
-    contact_damping: float = 40.0
-    replan: ReplanOptions = field(default_factory=ReplanOptions)
-    liftoff_angle: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.liftoff_angle is not None and not 0.0 < self.liftoff_angle < np.pi:
-            raise ParameterError(
-                f"liftoff_angle is {self.liftoff_angle!r} rad: give an angle between 0 and pi"
-            )
-
-    def scaled(self, scale: Scale) -> EmbeddingOptions:
-        """The same tuning for a template of another size."""
-        return replace(
-            self,
-            gains=scale.gains(self.gains),
-            single_stance=scale.weights(self.single_stance),
-            double_stance=scale.weights(self.double_stance),
-            swing=scale.swing(self.swing),
-            contact_damping=self.contact_damping / scale.time,
-            replan=scale.replan(self.replan),
-        )
 
 
 class EmbeddingController:
@@ -344,7 +284,7 @@ class EmbeddingController:
         for row, axis, i in ((Row.SWING_X, swing.x, 0), (Row.SWING_Y, swing.y, 1)):
             d[row] = pd(axis[2], axis[0], axis[1], position[i], velocity[i], kp, kd)
         limit = swing.furthest(q[:2], r.leg_length)
-        held = pd(0.0, limit, v[0], position[0], velocity[0], *_REACH_GAINS)
+        held = pd(0.0, limit, v[0], position[0], velocity[0], *o.gains.reach)
         d[Row.SWING_X] = min(d[Row.SWING_X], held)
         return self.qp.solve(
             self.tasks,

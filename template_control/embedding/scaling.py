@@ -62,7 +62,8 @@ class Scale:
         def scaled(pair: tuple[float, float]) -> tuple[float, float]:
             return pair[0] / self.time**2, pair[1] / self.time
 
-        return Gains(scaled(gains.com), scaled(gains.trunk), scaled(gains.swing))
+        pairs = (gains.com, gains.trunk, gains.swing, gains.reach)
+        return Gains(*(scaled(pair) for pair in pairs))
 
     def weights(self, weights: Weights) -> Weights:
         """Task weights: those of linear accelerations, and of the trunk's."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.scaling import REFERENCE, Scale
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep

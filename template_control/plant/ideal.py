@@ -256,8 +256,9 @@ class IdealPlant:
 
     def _rolled(self, foot: int, q: Array) -> float:
         """Distance that the sphere of ``foot`` has rolled by its angle [m]."""
-        joints = [BASE_DOF + joint for joint in self.robot.legs[foot]]
-        return self.robot.foot_radius * float(q[2] + q[joints].sum())
+        r, leg = self.robot, list(self.robot.legs[foot])
+        turned = r.joint_sign[leg] @ q[[BASE_DOF + joint for joint in leg]]
+        return r.foot_radius * float(q[2] + turned)
 
     def _commit(self, q: Array, v: Array, impulse: Array) -> None:
         """Take over (q, v), projected onto the contacts; the robot's update is at it."""

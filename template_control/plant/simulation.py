@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.controller import EmbeddingController, EmbeddingOptions
+from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planner import Planner
 from template_control.embedding.start import state_at_vlo
 from template_control.errors import ParameterError

@@ -156,6 +156,9 @@ class PlanarBiped:
             if not model.existFrame(foot):
                 links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
                 raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
+        hinges = [model.supports[model.frames[model.getFrameId(f)].parentJoint] for f in feet]
+        if set(hinges[0]) & set(hinges[1]) != set(range(BASE_DOF + 1)):
+            raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")
         radius = _foot_radius(path, urdf, model, feet)
         return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
 

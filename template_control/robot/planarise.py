@@ -49,6 +49,8 @@ def planarise(
     Raises:
         RobotError: if a joint is missing, or a sagittal joint's axis is not lateral.
     """
+    if foot_radius is not None and not 0.0 < foot_radius < np.inf:
+        raise RobotError(f"foot_radius is {foot_radius!r} m: give a positive number")
     joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
     for name in (*sagittal_joints, *locked):
         if name not in joints:
@@ -57,7 +59,7 @@ def planarise(
         if name not in sagittal_joints and joint.get("type") != "fixed":
             _fix(joint, locked.get(name, 0.0))
         elif joint.get("type") == "continuous":
-            _bound(joint)
+            _bound(path, joint)
     hips = _check_axes(path, robot, sagittal_joints)
     root = _root_link(robot)
     _shift(robot, root, hips)
@@ -116,13 +118,14 @@ def _fix(joint: ET.Element, angle: float) -> None:
             joint.remove(element)
 
 
-def _bound(joint: ET.Element) -> None:
+def _bound(path: Path, joint: ET.Element) -> None:
     """Give a hinge without stops wide ones: an angle is then one number."""
-    joint.set("type", "revolute")
     limit = joint.find("limit")
-    if limit is not None:
-        limit.set("lower", "-10")
-        limit.set("upper", "10")
+    if limit is None:
+        raise RobotError(f"{path}: joint {joint.get('name')!r} has no limit: give its torque limit")
+    joint.set("type", "revolute")
+    limit.set("lower", "-10")
+    limit.set("upper", "10")
 
 
 def _check_axes(path: Path, robot: ET.Element, sagittal: Sequence[str]) -> Array:

@@ -110,9 +110,11 @@ def gait_at(
     heights = np.linspace(l0 * np.sin(touchdown_angle) + 1e-5 * l0, l0 * (1 - 1e-5), _SCAN)
     roots = _symmetric_roots(parameters, lambda y: (np.array([vlo_speed, y, 0.0]), u), heights)
     if not roots:
+        unit = np.sqrt(parameters.gravity * l0)
         raise GaitError(
             f"no walking gait with touchdown angle {np.degrees(touchdown_angle):.2f} deg"
-            f" and {vlo_speed:g} m/s at VLO: try an angle of 64 to 72 deg and 0.8 to 1.2 m/s"
+            f" and {vlo_speed:g} m/s at VLO: try an angle of 64 to 72 deg and"
+            f" {0.25 * unit:.2g} to {0.38 * unit:.2g} m/s"
         )
     return _gait(name, parameters, *roots[0])
 

@@ -37,11 +37,13 @@ class Gains:
         com: (stiffness [1/s^2], damping [1/s]) of the CoM in x and y.
         trunk: of the trunk's pitch.
         swing: of the swing foot.
+        reach: that hold the swing foot back where its leg is nearly straight.
     """
 
     com: tuple[float, float] = (60.0, 16.0)
     trunk: tuple[float, float] = (100.0, 20.0)
     swing: tuple[float, float] = (600.0, 45.0)
+    reach: tuple[float, float] = (1e4, 200.0)
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.cli.reproductions.reproduction import Reproduction
-from template_control.embedding.controller import EmbeddingOptions
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.modified import ModifiedOptions, ModifiedPlanner
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planner import Planner
 from template_control.embedding.scaling import paper_gait, template_for
 from template_control.plant.bullet import PlantOptions
