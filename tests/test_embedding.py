@@ -163,7 +163,7 @@ def test_swing_clears_the_ground_and_lands_slowly():
     swing.start(np.array([-0.6, 0.0]), np.zeros(2))
     heights, accelerations = [], []
     for i in range(400):
-        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3)
+        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
         heights.append(swing.y[0])
         accelerations.append(max(abs(swing.x[2]), abs(swing.y[2])))
     assert max(heights) == pytest.approx(options.clearance, abs=2e-3)
@@ -179,7 +179,7 @@ def test_swing_without_a_foothold_comes_down():
     swing = SwingFoot(SwingOptions())
     swing.start(np.array([0.0, 0.05]), np.array([1.0, 0.0]))
     for _ in range(100):
-        swing.advance(np.nan, 0.3, 1e-3)
+        swing.advance(np.nan, 0.3, 1e-3, 0.0)
     assert swing.y[0] == pytest.approx(0.05 - 0.02)
     assert swing.x[1] == 0.0
 
@@ -187,11 +187,51 @@ def test_swing_without_a_foothold_comes_down():
 def test_swing_stays_within_reach_of_the_hip():
     swing = SwingFoot(SwingOptions(reach=0.97))
     swing.start(np.array([0.55, 0.1]), np.zeros(2))
-    hip = np.array([0.0, 0.85])
-    np.testing.assert_array_equal(swing.within_reach(hip - [0.0, 0.3], 1.2, 0.9), swing.x)
-    x, speed, acceleration = swing.within_reach(hip, 1.2, 0.9)
-    assert np.hypot(x, 0.75) == pytest.approx(0.97 * 0.9)
-    assert (speed, acceleration) == (1.2, 0.0)
+    x = swing.furthest(np.array([0.2, 0.85]), 0.9)
+    assert np.hypot(x - 0.2, 0.75) == pytest.approx(0.97 * 0.9)
+    assert swing.furthest(np.array([0.2, 1.2]), 0.9) == 0.2, "nowhere but below the hip"
+
+
+def test_swing_falls_to_ground_that_comes_late():
+    options = SwingOptions()
+    swing = SwingFoot(options)
+    swing.start(np.array([0.6, 0.0]), np.array([0.1, -0.2]))
+    for _ in range(50):
+        swing.reach_down(1e-3)
+    assert swing.y[0] == pytest.approx(-0.2 * 0.05 - 0.5 * options.reach_acceleration * 0.05**2)
+    assert swing.x[0] == 0.6
+    assert swing.x[1] == 0.0
+
+
+def test_overdue_ground_keeps_the_template_in_single_stance():
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
+    sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
+    node = AUTOMATON.node(STRIDE_START["w"])
+    planning.decide(node, sensed, 0.0, 1.0)
+    touchdown = planning.path.touchdown
+    assert not planning.overdue(node, touchdown + 0.009)
+    assert planning.overdue(node, touchdown + 0.011)
+    stride = run(P, node.name, sensed.state, planning.steps[0].decision.controls)
+    sensed.state[:] = stride.sample(touchdown - 1e-6)[0][:4]
+    planning.reach_on(node, sensed, touchdown)
+    assert planning.reaching
+    assert planning.path.touchdown > 0.03, "not at once"
+    assert not planning.overdue(node, 1.0), "once is enough"
+    assert not planning.surprised(1.0, 1.0, 10.0)
+
+
+def test_a_template_that_would_take_off_is_planned_from_the_ground():
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
+    high = np.array([1.1, 0.999, 0.4])
+    assert not planning.planner.decide(high).feasible
+    sensed = Sensed(np.array([0.0, high[1], high[0], high[2]]), np.zeros(2))
+    planning.decide(AUTOMATON.node(STRIDE_START["w"]), sensed, 0.0, 1.0)
+    report = planning.steps[0]
+    assert not report.decision.feasible, "the record keeps the truth"
+    np.testing.assert_array_equal(report.state, high)
+    assert np.isfinite(planning.path.touchdown)
 
 
 @settings(max_examples=20, deadline=None)
@@ -207,9 +247,11 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(later, f
     disturbed = run(P, node.name, [0.0, z[1], z[0], z[2]], u)
     assume(later < disturbed.time_of(Event.TOUCHDOWN))
     sensed.state[:] = disturbed.sample(later)[0][:4]
-    planning.reconsider(node, sensed, later)
-    expected = LqrPlanner(gait).decide(z).controls
+    change = ReplanOptions().agility * (planning.path.touchdown - later) ** 2
+    planning.reconsider(node, sensed, later, later)
+    expected = LqrPlanner(gait).decide(z, (u[0] - change, u[0] + change)).controls
     np.testing.assert_allclose(planning.steps[0].decision.controls, expected, rtol=1e-6)
+    assert abs(planning.steps[0].decision.controls[0] - u[0]) <= change * (1 + 1e-12)
     assert len(planning.steps) == 1
 
 
@@ -244,15 +286,22 @@ def test_guards_feel_what_the_template_sees():
 
 def test_load_learns_a_constant_and_ignores_the_gait():
     load = LoadEstimate(LoadOptions(), 9.81)
-    load.end_step()
+    load.end_step(True)
     for _ in range(10):
         load.observe(0.15, 0.5)  # within the dead zone
-        load.end_step()
+        load.end_step(True)
+        load.observe(5.0, 0.5)  # a push
+        load.end_step(False)
     assert load.factor == 1.0
     for _ in range(20):
         load.observe(9.81 * (1.1 - load.factor), 0.5)
-        load.end_step()
-    assert load.factor == pytest.approx(1.08, abs=1e-3)
+        load.end_step(True)
+    # At the edge of the dead zone, less what is forgotten of it there.
+    assert 1.07 < load.factor < 1.09
+    for _ in range(60):
+        load.observe(0.0, 0.5)
+        load.end_step(True)
+    assert load.factor == pytest.approx(1.0, abs=1e-3)
 
 
 def test_start_is_where_it_was_asked_for(robot, gait):

@@ -74,8 +74,8 @@ def test_an_earlier_liftoff_is_rougher_with_smaller_amplitudes():
     assert 0.0 <= EARLIER - predefined.beta < np.radians(0.15)
     assert template.beta < predefined.beta
     assert predefined.load > 300.0
-    assert template.load < 1.0
-    assert predefined.jump.max() > 100.0
+    assert template.load < 0.1 * predefined.load
+    assert predefined.jump.max() > 4.0 * template.jump.max()
     assert template.jump.max() < 15.0
     assert np.all(predefined.peak[[0, 2]] < 0.95 * template.peak[[0, 2]]), "hips"
 

@@ -36,7 +36,7 @@ class SwingOptions:
     clearance: float = 0.05
     landing_speed: float = 0.2
     horizon: float = 0.02
-    lead: float = 0.02
+    lead: float = 0.01
     reach_acceleration: float = 10.0
     reach: float = 0.98
 

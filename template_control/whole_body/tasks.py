@@ -64,7 +64,7 @@ class Weights:
 DOUBLE_STANCE_WEIGHTS = Weights((1.0, 3.0, 1.0, 0.0, 0.0))
 # Height before the swing foot: near VLO its pull on the ground would need more normal force
 # than the template has there.
-SINGLE_STANCE_WEIGHTS = Weights((0.01, 30.0, 1.0, 1.0, 1.0))
+SINGLE_STANCE_WEIGHTS = Weights((0.01, 10.0, 1.0, 1.0, 1.0))
 
 
 class TaskStack:
