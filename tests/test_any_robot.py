@@ -54,15 +54,16 @@ def walk(robot, steps):
 
 
 def check(record, gait, steps):
-    """Walked as long as wanted, within its limits, and on its gait in the end."""
+    """Walked as long as wanted and within its limits; after twenty steps it is on its gait."""
     assert not record.fell, record.metadata["fall_reason"]
     assert record.steps == steps
     for torque in record.metadata["summary"]["joint_torque"].values():
         assert torque["peak"] <= torque["limit"] * (1 + 1e-9)
     assert record.metadata["summary"]["qp_failures"] == 0
-    scale = Scale.of(gait.parameters)
-    error = np.abs(record.vlo_state[-5:].mean(axis=0) - gait.vlo)
-    assert np.all(error < scale.state((0.05, 0.01, 0.1)))
+    if steps >= 20:
+        scale = Scale.of(gait.parameters)
+        error = np.abs(record.vlo_state[-5:].mean(axis=0) - gait.vlo)
+        assert np.all(error < scale.state((0.03, 0.01, 0.05)))
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -62,7 +62,16 @@ def walked(tmp_path_factory):
     return folder
 
 
-LONG = ("reproduce fig8", "reproduce fig9", "reproduce fig12", "reproduce fig13")
+LONG = (
+    "reproduce fig8",
+    "reproduce fig9",
+    "reproduce fig12",
+    "reproduce fig13",
+    "pick_a_gait.py",
+    "push_recovery.py",
+    "--gif",
+    "--plant ideal",
+)
 OTHERS = [c for c in commands() if "venv -" not in c and "venv ." not in c]
 
 
@@ -90,6 +99,7 @@ def test_other_commands_run_as_printed(line, tmp_path, walked):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_replay_page_runs_as_printed(tmp_path):
     lines = [line for block in blocks("sh", REPLAY) for line in block.strip().splitlines()]
     assert lines[0].startswith("template-control walk")
@@ -131,6 +141,7 @@ def on_path(tmp_path_factory):
     return {**ENVIRONMENT, "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", GUIDES)
 def test_a_guide_runs_as_printed_from_top_to_bottom(page, tmp_path, on_path):
     text = (ROOT / "docs" / page).read_text()

@@ -268,6 +268,7 @@ def test_markdown_says_where_it_breaks(cheap):
 # -- the command -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_json_figure_and_resumption(tmp_path, capfd):
     arguments = ["robustness", "--quick", "--disturbance", "delay", "--workers", "2", "--json"]
     arguments += ["--output", str(tmp_path)]

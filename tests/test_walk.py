@@ -8,7 +8,10 @@ from template_control.embedding.modified import ModifiedPlanner
 from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
+from template_control.plant.disturbances import Situation
+from template_control.plant.ground import GroundStep
 from template_control.plant.record import Record
+from template_control.plant.robustness import off_gait
 from template_control.plant.simulation import (
     Push,
     SimulationOptions,
@@ -212,8 +215,23 @@ def test_slippery_ground():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("impulse", [-10.0, 10.0])
+@pytest.mark.parametrize("impulse", [-20.0, -10.0, 10.0, 25.0])
 @pytest.mark.parametrize("phase", np.arange(10) / 10)
 def test_pushes(impulse, phase):
     gait = gait_at(P, np.radians(66.0), 1.1)
-    assert not walk(gait, steps=50, pushes=(Push(impulse, 10, phase),)).fell
+    record = walk(gait, steps=31, pushes=(Push(impulse, 10, phase),))
+    assert not record.fell
+    assert max(map(abs, off_gait(record, gait))) < 0.02, "back within 20 steps"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("height", [-0.03, 0.03])
+@pytest.mark.parametrize("share", [0.3, 0.4, 0.5, 0.6, 0.7])
+def test_a_step_of_the_ground_that_it_does_not_see(height, share):
+    gait = gait_at(P, np.radians(66.0), 1.1)
+    where = Situation(load_robot("five-link"), gait)
+    before, beyond = where.footholds(tuple(gait.vlo), 11)[-2:]
+    edge = GroundStep(height, before + share * (beyond - before))
+    record = walk(gait, steps=31, plant=PlantOptions(ground_step=edge))
+    assert not record.fell
+    assert max(map(abs, off_gait(record, gait))) < 0.02
