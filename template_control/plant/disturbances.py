@@ -70,7 +70,8 @@ class Situation:
         record = simulate(self.robot, LqrPlanner(self.gait), options)
         if record.fell:
             return self.gait.step_length * np.arange(steps + 1.0)
-        at = np.searchsorted(record.time, record.vlo_time)
+        # The last VLO may round to just after the last sample.
+        at = np.minimum(np.searchsorted(record.time, record.vlo_time), len(record.time) - 1)
         return np.asarray(record.foot[at, record.rear[at], 0])
 
 
