@@ -108,7 +108,9 @@ def test_the_robot_settles_on_the_equilibrium_from_z0():
     for plant in PLANTS:
         mean, spread = robot_walk("LQR", plant)[0].settled
         error = np.abs(mean - target)
-        assert error[0] < 0.001, plant
-        assert error[1] < np.radians(2.0), plant
-        assert error[2] < 1.0, plant
+        # 1 cm, 0.1 m/s of vertical speed and 3 % of speed: what a walk to this equilibrium must
+        # hold; here as height, angle and energy.
+        assert error[0] < 0.01, plant
+        assert error[1] < 0.1 / GAIT.vlo[0], plant
+        assert error[2] < 80.0 * GAIT.vlo[0] ** 2 * 0.03, plant
         assert spread[0] < 0.0015, plant
