@@ -618,6 +618,7 @@ def test_a_killed_dask_worker_costs_no_result(dask, tmp_path):
     assert sorted(kept(path)) == list(range(COUNT))
 
 
+@pytest.mark.slow
 def test_an_item_that_kills_dask_workers_is_a_failure(dask, tmp_path):
     run = partial(quietly, fatal, grid(x=range(4)), tmp_path / "s", dask.get_executor())
     failures = run().failures
