@@ -192,9 +192,8 @@ def fig12() -> Reproduction:
             " (rigid contacts that stick) the error of a robot that is no SLIP is added, in"
             " PyBullet that of its contacts.",
             f"Full grip: the controller's friction cone ({EmbeddingOptions().friction:g} otherwise)"
-            " never binds. Near VLO the template is light on its foot while the swing leg needs a"
-            " force along the ground: within its cone the robot presses harder than the template,"
-            " rises above its path and reaches the next VLO too fast upward.",
+            " never binds. It makes no difference to speak of: where the template is light on its"
+            " foot near VLO, the swing foot gives way and not the CoM's height.",
         ),
         figures={
             "fig12": sticks,
