@@ -12,7 +12,8 @@ import numpy as np
 
 import template_control as tc
 from template_control.slip.basin import margin, steps_to_fall, vlo_state
-from template_control.slip.gait_branch import BranchPoint, Family
+from template_control.slip.branch import BranchPoint
+from template_control.slip.gait_branch import Family
 from template_control.slip.stability import Kind
 from template_control.view.stability_figures import basin_figure
 
@@ -30,7 +31,7 @@ def main(folder: Path) -> None:
     margins: list[tuple[float, BranchPoint]] = []
     for point in branch:
         if point.kind is Kind.STABLE:
-            radius = margin(parameters, point.controls(), (HEIGHT, 0.0), point.energy)
+            radius = margin(parameters, point.controls, (HEIGHT, 0.0), point.energy)
             margins.append((radius, point))
             print(
                 f"{point.energy:8.2f} J  {np.degrees(point.angle):6.2f} deg"
@@ -40,7 +41,7 @@ def main(folder: Path) -> None:
     print(f"most forgiving: {best.energy:.2f} J, {np.degrees(best.angle):.2f} deg")
     y, phi = np.meshgrid(HEIGHTS, np.radians(ANGLES))
     z = vlo_state(parameters, y.ravel(), phi.ravel(), best.energy)
-    basin = steps_to_fall(parameters, z, best.controls(), np.array([HEIGHT, 0.0]))
+    basin = steps_to_fall(parameters, z, best.controls, np.array([HEIGHT, 0.0]))
     shape = (1, *y.shape)
     figure = basin_figure(
         np.array([best.energy]),

@@ -13,8 +13,6 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
-
-
 REPLAY = (ROOT / "docs" / "replay.md").read_text()
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 GUIDES = ("your_robot.md", "controller.md")
@@ -39,8 +37,8 @@ def test_python_snippets_run_as_printed(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
-def commands():
-    return [line for block in blocks("sh") for line in block.strip().splitlines()]
+def commands(text=README):
+    return [line for block in blocks("sh", text) for line in block.strip().splitlines()]
 
 
 def test_the_two_commands_are_there():
@@ -72,12 +70,16 @@ LONG = (
     "--gif",
     "--plant ideal",
 )
-OTHERS = [c for c in commands() if "venv -" not in c and "venv ." not in c]
+SHORT = [c for c in commands() if "venv" not in c and not any(long in c for long in LONG)]
+# Of the pages whose commands are short, those that the README does not have.
+PAGES = [
+    commands((ROOT / "docs" / page).read_text()) for page in ("stability.md", "example_two.md")
+]
+ALL = dict.fromkeys([*(c for c in commands() if "venv" not in c), *(c for p in PAGES for c in p)])
 
 
 @pytest.mark.parametrize(
-    "line",
-    [pytest.param(c, marks=[pytest.mark.slow] * any(long in c for long in LONG)) for c in OTHERS],
+    "line", [pytest.param(c, marks=[pytest.mark.slow] * (c not in SHORT)) for c in ALL]
 )
 def test_other_commands_run_as_printed(line, tmp_path, walked):
     words = [str(ROOT / w) if w.startswith("examples/") else w for w in line.split()]

@@ -200,6 +200,33 @@ def test_reasons_for_failure_are_values(z, u, expected):
     assert ReturnMap(P, "w", MapKind.IMPROVED)(z, u).outcome != Outcome.SECTION
 
 
+@pytest.mark.parametrize("kind", list(MapKind))
+@pytest.mark.parametrize("stride", STRIDE_START)
+def test_no_state_and_no_controls_raise(stride, kind):
+    """Failed strides are values to the derivatives as to the map, even on legs without spring."""
+    rng = np.random.default_rng(7)
+    step = ReturnMap(P, stride, kind)
+    n = step.dimensions[0]
+    for _ in range(150):
+        z = np.array([rng.normal(1.0, 2.0), rng.uniform(0.5, 1.2), rng.normal()])[:n]
+        stiffness = rng.choice([0.0, K0, 1e5], 4) * rng.uniform(0.3, 2.0, 4)
+        u = controls(rng.uniform(0.3, 1.57), *stiffness)
+        mapped, linear = step(z, u), step.linearise(z, u)
+        # A closed form may carry the CoM into its own foot, and out at any speed.
+        if mapped.outcome == linear.outcome == Outcome.SECTION and mapped.state[0] < 1e3:
+            assert np.all(np.isfinite(linear.state_jacobian))
+            np.testing.assert_allclose(linear.state, mapped.state, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", list(MapKind))
+def test_a_phase_may_end_as_it_begins(kind):
+    """Backward from the start: the stance phase is over at touchdown, after no time."""
+    step, u = ReturnMap(P, "r", kind), controls(0.907571211, 11550.0, 11550.0)
+    z = [-0.01476402, 0.91469749]
+    assert step(z, u).outcome == Outcome.BACKWARD
+    assert step.linearise(z, u).outcome is Outcome.BACKWARD
+
+
 def test_nan_and_wrong_shapes_do_not_enter():
     step = ReturnMap(P)
     u = STRIDES["w"][1]

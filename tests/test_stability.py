@@ -11,20 +11,22 @@ from template_control.cli.reproductions.stability import branch, lower_limit
 from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton import STRIDE_START
 from template_control.slip.basin import margin, steps_to_fall, velocity_angle, vlo_state
+from template_control.slip.branch import Special
+from template_control.slip.controlled_branch import ControlledFamily, controlled_fixed_point
 from template_control.slip.controllers import ActiveRunning, ModifiedWalking
 from template_control.slip.deadbeat import backward_set, controlled_end, inside_share, settles
 from template_control.slip.gait import gait_from_energy, vlo_energy
-from template_control.slip.gait_branch import Family, Special
+from template_control.slip.gait_branch import Family
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.return_map import ReturnMap
+from template_control.slip.section_target import section_target, targeted
 from template_control.slip.stability import (
     Kind,
     classify,
     closed_loop_eigenvalues,
-    controlled_fixed_point,
 )
-from template_control.slip.stride import run
-from template_control.slip.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
+from template_control.slip.stride import controls, run
+from template_control.slip.vocabulary import NUM_SLOTS, Event, MapKind, Outcome, Slot
 
 P = SlipParameters()
 K0 = P.leg_stiffness
@@ -43,7 +45,7 @@ def paper_gait():
 def test_every_point_is_a_gait(points):
     step = ReturnMap(P)
     for point in points:
-        mapped = step(point.state, point.controls())
+        mapped = step(point.state, point.controls)
         np.testing.assert_allclose(mapped.state, point.state, atol=1e-8)
         assert point.state[1] == pytest.approx(0.9818, abs=1e-8)
         assert point.energy == pytest.approx(vlo_energy(P, point.state), rel=1e-12)
@@ -64,8 +66,7 @@ def test_the_branch_passes_the_fold_the_paper_stops_at(points):
 
 def test_stability_ends_where_the_eigenvalues_say(points):
     (lost,) = [p for p in points if p.special is Special.SADDLE_NODE]
-    # Another branch crosses there; Newton stalls a little before.
-    assert np.max(np.abs(lost.eigenvalues)) == pytest.approx(1.0, abs=1e-3)
+    assert np.max(np.abs(lost.eigenvalues)) == pytest.approx(1.0, abs=1e-6)
     assert lost.energy == pytest.approx(822.06, abs=0.3)
     for point in points:
         if point.special is Special.FLIP:
@@ -77,7 +78,7 @@ def test_stability_ends_where_the_eigenvalues_say(points):
 
 def test_shell_eigenvalues_are_the_full_ones_without_energys(points):
     point = points[len(points) // 2]
-    full = np.linalg.eigvals(ReturnMap(P).linearise(point.state, point.controls()).state_jacobian)
+    full = np.linalg.eigvals(ReturnMap(P).linearise(point.state, point.controls).state_jacobian)
     trivial = np.argmin(np.abs(full - 1.0))
     assert full[trivial] == pytest.approx(1.0, abs=1e-7)
     others = np.sort_complex(np.delete(full, trivial))
@@ -95,7 +96,7 @@ def test_running_branch_is_passed_through_its_fold():
         specials[Special.SADDLE_NODE].energy, abs=1e-6
     )
     for point in found:
-        mapped = ReturnMap(P, "r")(point.state, point.controls())
+        mapped = ReturnMap(P, "r")(point.state, point.controls)
         np.testing.assert_allclose(mapped.state, point.state, atol=1e-8)
 
 
@@ -165,6 +166,92 @@ def test_papers_map_settles_walking_beside_its_target():
     assert np.max(np.abs(eigenvalues)) < 1.02
     again, _ = ReturnMap(P).step(z, policy(z))
     np.testing.assert_allclose(again, z, atol=1e-7)
+
+
+@pytest.fixture(scope="module")
+def modified_branch():
+    """Modified walking on the exact map, its target moved along 0.9818 m."""
+    guess, held = controls(np.radians(70.0), K0, K0), {"height": 0.9818}
+    policy = targeted(ModifiedWalking(P), P, Event.VLO, held, "energy", guess)
+    family = ControlledFamily(ReturnMap(P), policy, "energy")
+    start = section_target(P, Event.VLO, {"height": 0.9818, "energy": 826.0})
+    return policy, family.trace(np.append(start, 826.0), "target", (815.0, 830.0), step=0.004)
+
+
+def test_controlled_walking_settles_on_its_target_up_to_the_fold(modified_branch, points):
+    policy, found = modified_branch
+    fold = next(p for p in points if p.special is Special.FOLD)
+    for point in found:
+        again, outcome = ReturnMap(P).step(point.state, policy(point.state, point.target))
+        assert outcome is Outcome.SECTION
+        np.testing.assert_allclose(again, point.state, atol=1e-8)
+        assert point.quantity("target") == pytest.approx(point.energy, abs=1e-3)
+        off = abs(point.state[1] - 0.9818)
+        if point.target < fold.energy:
+            assert off < 1e-5
+            assert point.kind is Kind.STABLE or abs(point.target - 821.87) < 1.0
+        else:
+            # There is no gait of that height; the nearest ones are folds of their energy.
+            assert off > 1e-4
+            assert point.kind is Kind.NEUTRAL
+    # Passive walking is unstable there.
+    assert min(p.target for p in found) < 816.0
+    assert not any(p.special for p in found)
+
+
+def test_controlled_eigenvalue_is_the_rate_at_which_a_walk_comes_back(modified_branch):
+    policy, found = modified_branch
+    point = min(found, key=lambda p: abs(p.target - 826.0))
+    expected = np.max(np.abs(point.eigenvalues))
+    z, size = point.state + [0.0, 1e-5, 1e-5], []
+    for _ in range(40):
+        z, _ = ReturnMap(P).step(z, policy(z, point.target))
+        size.append(np.linalg.norm(z - point.state))
+    assert (size[-1] / size[9]) ** (1.0 / 30.0) == pytest.approx(expected, abs=2e-3)
+
+
+def test_controlled_running_has_no_memory_at_any_speed():
+    guess, held = controls(np.radians(70.0), K0, K0), {"height": 0.98}
+    policy = targeted(ActiveRunning(P), P, Event.APEX, held, "speed", guess)
+    family = ControlledFamily(ReturnMap(P, "r"), policy, "speed")
+    found = family.trace(np.array([4.0, 0.98, 4.0]), "target", (2.0, 6.0), step=0.2)
+    assert len(found) > 5
+    for point in found:
+        np.testing.assert_allclose(point.state, [point.target, 0.98], atol=1e-6)
+        assert np.max(np.abs(point.eigenvalues)) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("section", "quantities"),
+    [
+        (Event.VLO, {"energy": 826.0, "height": 0.9818}),
+        (Event.VLO, {"speed": 1.1, "height": 0.98}),
+        (Event.VLO, {"energy": 826.0, "speed": 1.1}),
+        (Event.APEX, {"energy": 1500.0, "height": 0.98}),
+        (Event.APEX, {"energy": 1500.0, "speed": 4.0}),
+    ],
+)
+def test_targets_have_the_quantities_asked_for(section, quantities):
+    z = section_target(P, section, quantities)
+    spring = 0.5 * K0 * (1.0 - z[1]) ** 2 if section is Event.VLO else 0.0
+    energy = 0.5 * P.mass * z[0] ** 2 + P.mass * P.gravity * z[1] + spring
+    found = {"energy": energy, "height": z[1], "speed": z[0]}
+    assert {name: found[name] for name in quantities} == pytest.approx(quantities)
+    assert len(z) == (3 if section is Event.VLO else 2)
+
+
+def test_impossible_targets_and_families_are_named():
+    with pytest.raises(ParameterError, match="no VLO state has energy 500"):
+        section_target(P, Event.VLO, {"energy": 500.0, "height": 0.98})
+    with pytest.raises(ParameterError, match="give two of"):
+        section_target(P, Event.VLO, {"energy": 500.0})
+    with pytest.raises(ParameterError, match="cannot vary the target's 'angle'"):
+        ControlledFamily(ReturnMap(P), lambda z, _: z, "angle")
+    with pytest.raises(ParameterError, match="stride is 'wr'"):
+        ControlledFamily(ReturnMap(P, "wr"), lambda z, _: z, "energy")
+    family = ControlledFamily(ReturnMap(P), lambda z, _: controls(1.2, K0, K0), "energy")
+    with pytest.raises(ParameterError, match="cannot draw over 'energy'"):
+        family.trace(np.array([1.1, 0.98, 0.0, 826.0]), "energy", (820.0, 830.0))
 
 
 def test_vlo_states_and_energies_belong_together():
@@ -242,6 +329,21 @@ def test_gaits_command(tmp_path, capfd):
         assert text in out
 
 
+def test_gaits_command_follows_controlled_ones(tmp_path, capfd):
+    arguments = ["gaits", "--controlled", "improved", "--limits", "825", "827"]
+    assert main([*arguments, "--output", str(tmp_path), "--json"]) == 0
+    data = json.loads(capfd.readouterr().out)
+    assert (tmp_path / "branch.png").is_file()
+    assert all(p["energy"] == pytest.approx(p["target"], abs=1e-3) for p in data["points"])
+    # The improved map's error, 1 mm.
+    assert all(1e-4 < abs(p["height"] - 0.9818) < 2e-3 for p in data["points"])
+    run_arguments = ["--gait", "run", "--over", "speed", "--limits", "3", "5", "--step", "0.2"]
+    assert main(["gaits", "--controlled", "paper", *run_arguments, "--no-figures"]) == 0
+    out = capfd.readouterr().out
+    for text in ("branch of run gaits", "target", "|eig.|", "stable"):
+        assert text in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
@@ -252,6 +354,9 @@ def test_gaits_command(tmp_path, capfd):
         (["--over", "speed"], "needs --limits"),
         (["--step", "-1"], "--step is -1"),
         (["--start", "speed=9"], "no periodic gait near"),
+        (["--controlled", "exact", "--fix", "angle=70"], "--fix one of"),
+        (["--controlled", "exact", "--over", "height", "--limits", "0.97", "0.98"], "--fix one of"),
+        (["--controlled", "exact", "--limits", "500", "600"], "no VLO state has"),
     ],
 )
 def test_gaits_command_names_mistakes(arguments, culprit, capfd):

@@ -12,13 +12,21 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
 from template_control.cli.output import writable
 from template_control.errors import ParameterError
-from template_control.slip.gait_branch import QUANTITIES, BranchPoint, Family
+from template_control.slip.branch import QUANTITIES, BranchPoint
+from template_control.slip.controlled_branch import ControlledFamily
+from template_control.slip.controllers import ActiveRunning, ModifiedWalking
+from template_control.slip.gait_branch import Family
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.return_map import ReturnMap
+from template_control.slip.section_target import VARIED, section_target, targeted
+from template_control.slip.stride import controls
+from template_control.slip.vocabulary import Event, MapKind
 from template_control.view.stability_figures import UNITS, branch_figure
 
 Array = NDArray[np.float64]
@@ -29,6 +37,18 @@ class _Defaults:
     start: dict[str, float]
     fixed: dict[str, float]
     limits: tuple[float, float]
+    held: dict[str, float]
+    target: float
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    gait: str
+    fixed: dict[str, float]
+    start: dict[str, float]
+    over: str
+    limits: tuple[float, float]
+    step: float
 
 
 _DEFAULTS = {
@@ -36,11 +56,15 @@ _DEFAULTS = {
         {"speed": 1.148, "height": 0.9818, "angle": 70.0, "stiffness": 16.5e3},
         {"height": 0.9818, "stiffness": 16.5e3},
         (815.0, 830.0),
+        {"height": 0.9818},
+        826.0,
     ),
     "run": _Defaults(
         {"speed": 4.9, "height": 0.947, "angle": 68.0, "stiffness": 20e3},
         {"angle": 68.0, "stiffness": 20e3},
         (1500.0, 2500.0),
+        {"height": 0.98},
+        1600.0,
     ),
 }
 _COLUMNS = {
@@ -51,6 +75,7 @@ _COLUMNS = {
     "speed": "dx/dt [m/s]",
 }
 _STRIDES = {"walk": "w", "run": "r"}
+_MAPS = {kind.name.lower(): kind for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER)}
 _TABLE_ROWS = 14
 
 
@@ -63,7 +88,9 @@ def add_parser(commands: Any) -> None:
             "Follow a branch of passive periodic gaits of the template by pseudo-arclength, past"
             " its folds: two quantities are held fixed, the others vary. Quantities:"
             f" {', '.join(QUANTITIES)} (J, degrees, N/m, m, m/s at VLO or apex). Without options:"
-            " the walking gaits of Section IV-D."
+            " the walking gaits of Section IV-D. With --controlled: where the paper's controller"
+            " settles as its target is moved; one quantity of the target is held fixed, --over is"
+            " moved, and the gait found near --start is followed."
         ),
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
@@ -72,7 +99,14 @@ def add_parser(commands: Any) -> None:
         "--fix",
         action="append",
         metavar="QUANTITY=VALUE",
-        help="hold a quantity fixed; give two",
+        help="hold a quantity fixed; give two, with --controlled one",
+    )
+    parser.add_argument(
+        "--controlled",
+        choices=tuple(_MAPS),
+        metavar="MAP",
+        help="gaits of modified walking or active running, computed on this return map:"
+        f" {', '.join(_MAPS)}",
     )
     parser.add_argument(
         "--start",
@@ -96,8 +130,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Follow the branch and report it."""
     defaults = _DEFAULTS[options.gait]
-    fixed = _quantities("--fix", options.fix) or defaults.fixed
-    start = {**defaults.start, **fixed, **_quantities("--start", options.start)}
+    given = _quantities("--fix", options.fix)
     limits = (options.limits[0], options.limits[1]) if options.limits else defaults.limits
     if options.limits is None and options.over != "energy":
         raise ParameterError(f"--over {options.over} needs --limits: give its range")
@@ -106,24 +139,56 @@ def run(options: argparse.Namespace) -> int:
     if not (math.isfinite(options.step) and 0.0 < options.step <= 0.5):
         raise ParameterError(f"--step is {options.step:g}: give a number from 0 to 0.5")
     folder = None if options.no_figures else writable(options.output)
-    family = Family(
-        SlipParameters(), _STRIDES[options.gait], {k: _si(k, v) for k, v in fixed.items()}
-    )
-    guess = [start["speed"], start["height"], 0.0][: family.n]
-    x = np.array([*guess, np.radians(start["angle"]), start["stiffness"]])
-    low, high = (_si(options.over, v) for v in limits)
-    points = family.trace(x, options.over, (low, high), step=options.step)
-    free = [q for q in QUANTITIES if q not in fixed and q != options.over]
+    held = given or (defaults.held if options.controlled else defaults.fixed)
+    start = _quantities("--start", options.start)
+    wanted = _Wanted(options.gait, held, start, options.over, limits, options.step)
+    if options.controlled:
+        if options.limits is None:
+            start.setdefault(options.over, defaults.target)
+        points = _controlled(wanted, _MAPS[options.controlled])
+        show = [*held, "angle"]
+    else:
+        points = _passive(wanted)
+        show = [q for q in QUANTITIES if q not in held and q != options.over]
     paths = []
     if folder is not None:
         paths = [folder / "branch.png"]
         with mpl.rc_context({"savefig.dpi": 110}):
-            branch_figure(points, options.over, free).savefig(paths[0])
+            branch_figure(points, options.over, show, bool(options.controlled)).savefig(paths[0])
     if options.json:
         print(json.dumps({"points": [_data(p) for p in points], "figures": list(map(str, paths))}))
     else:
-        _print(points, options.gait, paths)
+        _print(points, options.gait, options.over, paths)
     return 0
+
+
+def _passive(wanted: _Wanted) -> list[BranchPoint]:
+    fixed = {name: _si(name, value) for name, value in wanted.fixed.items()}
+    family = Family(SlipParameters(), _STRIDES[wanted.gait], fixed)
+    start = {**_DEFAULTS[wanted.gait].start, **wanted.fixed, **wanted.start}
+    guess = [start["speed"], start["height"], 0.0][: family.n]
+    x = np.array([*guess, np.radians(start["angle"]), start["stiffness"]])
+    low, high = (_si(wanted.over, v) for v in wanted.limits)
+    return family.trace(x, wanted.over, (low, high), step=wanted.step)
+
+
+def _controlled(wanted: _Wanted, kind: MapKind) -> list[BranchPoint]:
+    held, varied = wanted.fixed, wanted.over
+    if len(held) != 1 or not {*held, varied} <= set(VARIED) or varied in held:
+        raise ParameterError(
+            f"--controlled holds {', '.join(held)} and moves {varied}: --fix one of"
+            f" {', '.join(VARIED)} and give another to --over"
+        )
+    p, walking = SlipParameters(), wanted.gait == "walk"
+    section = Event.VLO if walking else Event.APEX
+    controller = ModifiedWalking(p, kind) if walking else ActiveRunning(p, kind)
+    start = {**_DEFAULTS[wanted.gait].start, **wanted.start}
+    guess = controls(np.radians(start["angle"]), start["stiffness"], start["stiffness"])
+    policy = targeted(controller, p, section, held, varied, guess)
+    family = ControlledFamily(ReturnMap(p, _STRIDES[wanted.gait]), policy, varied)
+    value = wanted.start.get(varied, 0.5 * sum(wanted.limits))
+    x = np.append(section_target(p, section, {**held, varied: value}), value)
+    return family.trace(x, "target", wanted.limits, step=wanted.step)
 
 
 def _si(name: str, value: float) -> float:
@@ -154,6 +219,7 @@ def _quantities(option: str, pairs: list[str] | None) -> dict[str, float]:
 def _data(point: BranchPoint) -> dict[str, Any]:
     return {
         **{name: point.quantity(name) for name in QUANTITIES},
+        "target": point.target,
         "state": point.state.tolist(),
         "eigenvalues": [[float(v.real), float(v.imag)] for v in point.eigenvalues],
         "kind": point.kind.value,
@@ -161,28 +227,38 @@ def _data(point: BranchPoint) -> dict[str, Any]:
     }
 
 
-def _print(points: list[BranchPoint], gait: str, paths: list[Path]) -> None:
-    table = Table(title=f"branch of {gait} gaits, {len(points)} points")
+def _print(points: list[BranchPoint], gait: str, over: str, paths: list[Path]) -> None:
+    table = Table(title=f"branch of {gait} gaits, {len(points)} points", box=SIMPLE_HEAD)
+    controlled = points[0].target is not None
+    if controlled:
+        table.add_column(f"target {_COLUMNS[over]}", justify="right")
     for name in QUANTITIES:
         table.add_column(_COLUMNS[name], justify="right")
-    table.add_column("eigenvalues", justify="right")
+    table.add_column("|eig.|" if controlled else "eigenvalues", justify="right")
     table.add_column("stability")
     every = max(1, len(points) // _TABLE_ROWS)
     for i, point in enumerate(points):
         if i % every and point.special is None:
             continue
-        values = (f"{UNITS[name][1] * point.quantity(name):.4f}" for name in QUANTITIES)
+        values = (_number(name, point.quantity(name)) for name in QUANTITIES)
         text = point.special.name.lower() if point.special else point.kind.value
-        table.add_row(*values, _eigenvalues(point), text)
+        target = [_number(over, point.quantity("target"))] if controlled else []
+        table.add_row(*target, *values, _eigenvalues(point), text)
     console = Console()
     console.print(table)
     for path in paths:
         console.print(f"figure: {path}", highlight=False)
 
 
+def _number(name: str, value: float) -> str:
+    return f"{UNITS[name][1] * value:.{4 if name in ('height', 'speed') else 3}f}"
+
+
 def _eigenvalues(point: BranchPoint) -> str:
-    """A complex pair as a+-bj, real ones side by side."""
-    first = point.eigenvalues[0]
-    if abs(first.imag) > 1e-12:
-        return f"{first.real:.3f}+-{abs(first.imag):.3f}j"
-    return "  ".join(f"{v.real:.3f}" for v in point.eigenvalues)
+    """A complex pair as a±bj, real ones side by side; with a controller the largest's size."""
+    values = point.eigenvalues
+    if point.target is not None:
+        return f"{np.abs(values).max():.4f}"
+    if abs(values[0].imag) > 1e-12:
+        return f"{values[0].real:.3f}±{abs(values[0].imag):.3f}j"
+    return "  ".join(f"{v.real:.3f}" for v in values)

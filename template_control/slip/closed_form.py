@@ -172,6 +172,8 @@ def _stance(
     )
     if map_kind != _IMPROVED and edge < 0:
         return _NO_EVENT
+    if edge >= 0 and t == 0.0:
+        return edge  # the phase ends as it begins: there is nothing to correct over no time
     if map_kind == _IMPROVED:
         if edge < 0:
             edge = _GOES_ON

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from template_control.slip.automaton import STRIDE_START
 from template_control.slip.basin import steps_to_fall
+from template_control.slip.branch import BranchPoint
 from template_control.slip.gait import WalkingGait
-from template_control.slip.gait_branch import BranchPoint
 from template_control.slip.kernel import new_scratch
 from template_control.slip.return_map import ReturnMap
 from template_control.slip.step_solver import StepProblem, Unknowns

@@ -218,6 +218,8 @@ class ModifiedMap:
         """See :meth:`~.return_map.ReturnMap.derivatives`; kappa_2 varies along with u."""
         jacobian = np.empty((RESULTS, len(columns)))
         result, outcome = self.evaluate(z, u)
+        if outcome is not Outcome.SECTION:
+            return result, np.full_like(jacobian, np.nan), outcome
         zc = np.array(z, dtype=complex)
         for c, column in enumerate(columns):
             uc = u.astype(complex)

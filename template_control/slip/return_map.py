@@ -133,9 +133,15 @@ class ReturnMap:
             (RESULTS,) as :meth:`evaluate`; its (RESULTS, c) derivatives; the outcome.
         """
         result, jacobian = np.empty(RESULTS), np.empty((RESULTS, len(columns)))
-        outcome = section_jacobian(
-            *self._kernel, _padded(z), u, columns, self._complex_scratch, result, jacobian
-        )
+        try:
+            outcome = section_jacobian(
+                *self._kernel, _padded(z), u, columns, self._complex_scratch, result, jacobian
+            )
+        except ZeroDivisionError:
+            # Where a real division gives NaN, Numba's complex one raises. It happens in strides
+            # that fail, such as on a leg without stiffness; there is no derivative to lose.
+            result, ended = self.evaluate(z, u)
+            return result, np.full_like(jacobian, np.nan), ended
         return result, jacobian, Outcome(outcome)
 
     def __call__(self, z: ArrayLike, u: ArrayLike) -> Mapped:
@@ -168,6 +174,8 @@ class ReturnMap:
 
     def linearise(self, z: ArrayLike, u: ArrayLike) -> Linearisation:
         """One stride and its derivatives, event times included, exact to rounding.
+
+        The derivatives of a stride that fails mean nothing, and may be NaN.
 
         Args:
             z: (n,) state at the section.

@@ -8,13 +8,18 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.slip.gait_branch import BranchPoint, Special
+from template_control.slip.branch import BranchPoint, Special
 from template_control.slip.stability import Kind
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-_KINDS = {Kind.STABLE: "#2a6196", Kind.SADDLE: "#db7321", Kind.UNSTABLE: "#6b7078"}
+_KINDS = {
+    Kind.STABLE: "#2a6196",
+    Kind.SADDLE: "#db7321",
+    Kind.UNSTABLE: "#6b7078",
+    Kind.NEUTRAL: "#3a9a4a",
+}
 _MARKS = {
     Special.FOLD: "D",
     Special.SADDLE_NODE: "s",
@@ -31,15 +36,20 @@ UNITS = {
 }
 
 
-def branch_figure(points: Sequence[BranchPoint], over: str, show: Sequence[str]) -> Figure:
+def branch_figure(
+    points: Sequence[BranchPoint], over: str, show: Sequence[str], controlled: bool = False
+) -> Figure:
     """Quantities and the largest eigenvalue along a branch, coloured by stability.
 
     Args:
         points: of the branch, in order.
         over: quantity on the horizontal axis.
         show: quantities on the vertical axes.
+        controlled: ``over`` is of the controller's target, not of the gait it leads to.
     """
     label, unit = UNITS[over]
+    if controlled:
+        label, over = f"target's {label}", "target"
     x = unit * np.array([p.quantity(over) for p in points])
     curves = [(UNITS[s][0], UNITS[s][1] * np.array([p.quantity(s) for p in points])) for s in show]
     largest = np.array([np.abs(p.eigenvalues).max() for p in points])
@@ -58,7 +68,7 @@ def branch_figure(points: Sequence[BranchPoint], over: str, show: Sequence[str])
                 )
         axes.set(xlabel=label, ylabel=name)
     axes.axhline(1.0, color="0.4", linewidth=0.8)
-    axes.set_ylim(0.0, min(3.0, 1.1 * largest.max()))
+    axes.set_ylim(0.0, min(3.0, max(1.1, 1.1 * largest.max())))
     used = {p.special for p in points if p.special is not None}
     marks = [
         axes.plot([], [], _MARKS[s], color="black", fillstyle="none", markersize=5)[0] for s in used

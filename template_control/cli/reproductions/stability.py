@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from template_control.cli.reproductions.reproduction import Reproduction
 from template_control.slip.basin import steps_to_fall, velocity_angle, vlo_state
+from template_control.slip.branch import BranchPoint, Special
 from template_control.slip.deadbeat import backward_set, controlled_end, inside_share, settles
 from template_control.slip.gait import WalkingGait, gait_from_energy
-from template_control.slip.gait_branch import BranchPoint, Family, Special
+from template_control.slip.gait_branch import Family
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.stability import Kind
 from template_control.slip.vocabulary import MapKind
