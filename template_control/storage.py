@@ -45,10 +45,18 @@ def load(record_type: Callable[..., T], path: str | Path, kind: str) -> T:
     try:
         with np.load(path, allow_pickle=False) as data:
             metadata = json.loads(str(data["metadata"]))
-            if metadata.pop("format", None) != kind:
+            found = str(metadata.pop("format", ""))
+            if found != kind:
+                if found.rpartition(" ")[0] == kind.rpartition(" ")[0]:
+                    raise RecordError(
+                        f"{path} was written by another version of this library ({found!r}, not"
+                        f" {kind!r}): record it anew"
+                    )
                 raise KeyError("format")
             names = [f.name for f in fields(record_type) if f.name != "metadata"]  # type: ignore[arg-type]
             return record_type(**{name: data[name] for name in names}, metadata=metadata)
+    except RecordError:
+        raise
     except FileNotFoundError:
         raise RecordError(f"there is no run at {path}: give a run.npz") from None
     except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile):

@@ -1,5 +1,7 @@
 """Planners, plans, phases, swing foot, guards: the parts of the embedding."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -9,6 +11,7 @@ from template_control.embedding.guards import Sensed, fired
 from template_control.embedding.load import LoadEstimate, LoadOptions
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.modified import ModifiedPlanner
+from template_control.embedding.momentum_trim import MomentumTrim, TrimOptions, uncontrolled
 from template_control.embedding.plan import at_phase, chain, sample
 from template_control.embedding.references import leg_forces
 from template_control.embedding.start import state_at_vlo
@@ -16,7 +19,13 @@ from template_control.embedding.step_planning import ReplanOptions, StepPlanning
 from template_control.embedding.swing_foot import SwingFoot, SwingOptions, quintic_step
 from template_control.errors import GaitError, RobotError
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.gait import gait_at, gait_for_speed, gait_from_energy, vlo_energy
+from template_control.slip.gait import (
+    gait_at,
+    gait_for_speed,
+    gait_from_energy,
+    vlo_energy,
+    vlo_jacobians,
+)
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.return_map import ReturnMap
 from template_control.slip.stride import controls, run
@@ -208,7 +217,7 @@ def test_overdue_ground_keeps_the_template_in_single_stance():
     planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
     sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
     node = AUTOMATON.node(STRIDE_START["w"])
-    planning.decide(node, sensed, 0.0, 1.0)
+    planning.decide(node, sensed, 0.0, 1.0, 0.0)
     touchdown = planning.path.touchdown
     assert not planning.overdue(node, touchdown + 0.009)
     assert planning.overdue(node, touchdown + 0.011)
@@ -227,7 +236,7 @@ def test_a_template_that_would_take_off_is_planned_from_the_ground():
     high = np.array([1.1, 0.999, 0.4])
     assert not planning.planner.decide(high).feasible
     sensed = Sensed(np.array([0.0, high[1], high[0], high[2]]), np.zeros(2))
-    planning.decide(AUTOMATON.node(STRIDE_START["w"]), sensed, 0.0, 1.0)
+    planning.decide(AUTOMATON.node(STRIDE_START["w"]), sensed, 0.0, 1.0, 0.0)
     report = planning.steps[0]
     assert not report.decision.feasible, "the record keeps the truth"
     np.testing.assert_array_equal(report.state, high)
@@ -241,7 +250,7 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(later, f
     node = AUTOMATON.node(STRIDE_START["w"])
     planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
     sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
-    planning.decide(node, sensed, 0.0, 1.0)
+    planning.decide(node, sensed, 0.0, 1.0, 0.0)
     u = planning.steps[0].decision.controls
     z = gait.vlo + [faster, higher, 0.0]
     disturbed = run(P, node.name, [0.0, z[1], z[0], z[2]], u)
@@ -302,6 +311,42 @@ def test_load_learns_a_constant_and_ignores_the_gait():
         load.observe(0.0, 0.5)
         load.end_step(True)
     assert load.factor == pytest.approx(1.0, abs=1e-3)
+
+
+def test_trim_goes_against_the_drift_that_no_control_takes_away(gait):
+    a, b = vlo_jacobians(gait)
+    n = uncontrolled(gait)
+    np.testing.assert_allclose(n @ b, 0.0, atol=1e-6)
+    # Such a drift must show in dy/dt at VLO, and in nothing else.
+    np.testing.assert_allclose((n @ (np.eye(3) - a))[:2], 0.0, atol=1e-6)
+    planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
+    sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
+    planning.decide(AUTOMATON.node(STRIDE_START["w"]), sensed, 0.0, 1.0, 0.0)
+    plan = planning.path
+    trim = MomentumTrim(gait, TrimOptions())
+    trim.end_step(plan.vlo_state + 1.0, True)  # nothing was expected yet
+    assert trim.acceleration == 0.0
+    trim.expect(plan)
+    trim.end_step(plan.vlo_state + [1.0, 0.0, 0.0], False)  # a push
+    assert trim.acceleration == 0.0
+    for _ in range(20):
+        trim.end_step(plan.vlo_state + b @ [0.01, 0.01, -0.02], True)  # the planner's business
+        trim.end_step(plan.vlo_state + [0.0024, 0.0, 0.0], True)  # within the dead zone
+        trim.end_step(plan.vlo_state - [0.0024, 0.0, 0.0], True)
+    assert trim.acceleration == 0.0
+    # A robot whose drift yields to the trim settles within the dead zone.
+    duration = plan.liftoff - plan.touchdown
+    for _ in range(100):
+        drift = 0.01 + trim.acceleration * duration
+        trim.end_step(plan.vlo_state + [drift, 0.0, 0.0], True)
+    assert 0.0 < drift <= 0.0008 * np.sqrt(9.81)
+    for _ in range(100):
+        trim.end_step(plan.vlo_state + [9.0, 0.0, 0.0], True)
+    assert trim.acceleration == pytest.approx(-0.03 * 9.81)
+    # A path without a double stance teaches nothing.
+    trim.expect(replace(plan, liftoff=np.inf))
+    trim.end_step(plan.vlo_state - [9.0, 0.0, 0.0], True)
+    assert trim.acceleration == pytest.approx(-0.03 * 9.81)
 
 
 def test_start_is_where_it_was_asked_for(robot, gait):

@@ -63,10 +63,16 @@ MISTAKES = {
     "is not planar: its first joints are …": bolt(joints=()),
     "and must be revolute about y": changed(HIP, HIP.replace("revolute", "continuous")),
     "hinges in its legs: a hip and a knee each": bolt(BOLT_JOINTS[:3]),
+    "from the base's pitch joint: place the trunk's origin between the hips": changed(
+        '<origin xyz="0 0.1 0"', '<origin xyz="0.02 0.1 0"'
+    ),
     "has effort … give its torque limit": changed('effort="350"', 'effort="0"'),
     "has no foot link …": feet("left_foot", "toe"),
     "feet were named for … a biped has two": feet("left_foot"),
     "must have one sphere as collision shape": bolt(radius=None),
+    "from the link's origin: put the origin into its centre": changed(
+        SPHERE, SPHERE.replace("<geometry>", '<origin xyz="0 0 -0.02"/><geometry>')
+    ),
     "the feet have different radii": changed(SPHERE, SPHERE.replace("0.01", "0.02"), 1),
     "has no joint …": bolt((*BOLT_JOINTS[:3], "KFE")),
     "turns about … and not about the lateral axis y": bolt((*BOLT_JOINTS[:3], "FR_HAA")),

@@ -18,25 +18,22 @@ from numpy.typing import NDArray
 
 from template_control.embedding.guards import Sensed, fired
 from template_control.embedding.load import LoadEstimate
+from template_control.embedding.momentum_trim import MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.plan import at_phase
 from template_control.embedding.planner import Planner
 from template_control.embedding.references import leg_forces, pd, unloading_cap
 from template_control.embedding.scaling import Scale
-from template_control.embedding.step_planning import StepPlanning, StepReport
+from template_control.embedding.step_planning import VLO_STATE, StepPlanning, StepReport
 from template_control.embedding.swing_foot import SwingFoot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.hybrid import Node
 from template_control.slip.vocabulary import Phase, Reset
 from template_control.whole_body.solver import Solution, WholeBodyQp
-from template_control.whole_body.tasks import (
-    Row,
-    TaskStack,
-)
+from template_control.whole_body.tasks import Row, TaskStack
 
 Array = NDArray[np.float64]
-
 
 _NO_CAP = np.full(1, np.inf)
 
@@ -72,6 +69,7 @@ class EmbeddingController:
         self.tasks = TaskStack(robot.nv)
         self.swing = SwingFoot(o.swing)
         self.load = LoadEstimate(o.load, robot.gravity)
+        self.trim = MomentumTrim(planner.gait, o.trim)
         self.rear, self.front = 0, 1
         self.node: Node = AUTOMATON.node(STRIDE_START["w"])
         self.reference = np.zeros(6)
@@ -234,8 +232,12 @@ class EmbeddingController:
 
     def _decide(self) -> None:
         if self.steps:
-            self.load.end_step(self.steps[-1].decision.reached)
-        self.planning.decide(self.node, self._sensed, self.time, self.load.factor)
+            trusted = self.steps[-1].decision.reached
+            self.load.end_step(trusted)
+            self.trim.end_step(self._sensed.state[VLO_STATE], trusted)
+        learnt = (self.load.factor, self.trim.acceleration)
+        self.planning.decide(self.node, self._sensed, self.time, *learnt)
+        self.trim.expect(self.planning.path)
         self._on_new_path()
 
     def _on_new_path(self) -> None:
@@ -249,6 +251,8 @@ class EmbeddingController:
         kp, kd = self.options.gains.com
         self.tasks.read(self.robot, self.front, y)
         d[Row.COM_X] = pd(ref[4], ref[0], ref[2], x, s.state[2], kp, kd)
+        if self.node.phase is Phase.DS:
+            d[Row.COM_X] += self.trim.acceleration
         d[Row.COM_Y] = pd(ref[5], ref[1], ref[3], y, s.state[3], kp, kd)
         self.load.observe(d[Row.COM_Y] - ref[5], dt)
 

@@ -18,16 +18,14 @@ from template_control.embedding.planner import ANY_ANGLE, Decision
 from template_control.embedding.scaling import Scale
 from template_control.embedding.step_search import FALL_PRICE, Law, linear, price, search
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.gait import WalkingGait
+from template_control.slip.gait import WALKING_SLOTS, WalkingGait, vlo_jacobians
 from template_control.slip.kernel import new_scratch
-from template_control.slip.return_map import ReturnMap
 from template_control.slip.stride import kernel_model
 from template_control.slip.tables import TABLES
-from template_control.slip.vocabulary import MapKind, Slot
+from template_control.slip.vocabulary import MapKind
 
 Array = NDArray[np.float64]
 
-_SLOTS = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
 _EXACT = int(MapKind.EXACT)
 _NODE = AUTOMATON.index[STRIDE_START["w"]]
 
@@ -107,7 +105,7 @@ class LqrPlanner:
         self.gait = gait
         self.options = (options or LqrOptions()).scaled(Scale.of(gait.parameters))
         self.offset: Array = np.zeros(3)
-        self.a, self.b = _jacobians(gait)
+        self.a, self.b = vlo_jacobians(gait)
         o = self.options
         q, r = np.diag(o.state_cost), np.diag(o.control_cost)
         self._cost = solve_discrete_are(self.a, self.b, q, r)
@@ -126,7 +124,7 @@ class LqrPlanner:
         """The linear law about the fixed point the robot has with the present offset."""
         p, o = self.gait.parameters, self.options
         shift = self._settling @ self.offset
-        nominal = self.gait.controls[_SLOTS] / [1.0, p.leg_stiffness, p.leg_stiffness]
+        nominal = self.gait.controls[WALKING_SLOTS] / [1.0, p.leg_stiffness, p.leg_stiffness]
         return Law(
             target=self.gait.vlo + shift[:3],
             control=nominal + shift[3:],
@@ -157,7 +155,7 @@ class LqrPlanner:
         if not trusted:
             cost = search(TABLES, _NODE, law, s, z, self._spread, u, first)
         controls = self.gait.controls.copy()
-        controls[_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
+        controls[WALKING_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, trusted)
 
     def observe(self, decision: Decision, z: Array) -> None:
@@ -170,13 +168,6 @@ class LqrPlanner:
         bound = np.array(o.offset_bound)
         self.offset = np.clip(self.offset + o.offset_gain * surprise, -bound, bound)
         self._law = self._aim()
-
-
-def _jacobians(gait: WalkingGait) -> tuple[Array, Array]:
-    """Of the exact map in z and in (alpha, kappa_1/k0, kappa_2/k0)."""
-    linear = ReturnMap(gait.parameters).linearise(gait.vlo, gait.controls)
-    k0 = gait.parameters.leg_stiffness
-    return linear.state_jacobian, linear.control_jacobian[:, _SLOTS] * [1.0, k0, k0]
 
 
 def _settling_map(a: Array, b: Array, tolerance: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planner import ANY_ANGLE, Decision
+from template_control.embedding.scaling import Scale
 from template_control.slip.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.gait import WalkingGait
 from template_control.slip.kernel import new_scratch
@@ -29,7 +30,8 @@ class ModifiedOptions:
         angle_range: touchdown angle relative to the gait's [rad].
         stiffness_range: kappa_2 over k0.
         top_margin: alpha stays this far [rad] below asin(y / l0).
-        tolerance: distance from the gait's VLO state, in SI units, that counts as reached.
+        tolerance: distance from the gait's VLO state, in SI units, that counts as reached; of
+            the reference template, scaled with speeds.
         map_kind: the return map that steps are tried on.
     """
 
@@ -55,6 +57,7 @@ class ModifiedPlanner:
         self.gait = gait
         self.options = options or ModifiedOptions()
         self.offset: Array = np.zeros(3)
+        self._tolerance = self.options.tolerance * Scale.of(gait.parameters).speed
         self._scratch = new_scratch()
         self._model = kernel_model(gait.parameters)
         k0 = gait.parameters.leg_stiffness
@@ -85,7 +88,7 @@ class ModifiedPlanner:
         controls = self.gait.controls.copy()
         controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2
         feasible = outcome == Outcome.SECTION
-        reached = feasible and residual < o.tolerance**2
+        reached = feasible and residual < self._tolerance**2
         return Decision(controls, predicted, feasible, feasible, reached)
 
     def observe(self, decision: Decision, z: Array) -> None:

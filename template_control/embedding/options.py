@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from template_control.embedding.load import LoadOptions
+from template_control.embedding.momentum_trim import TrimOptions
 from template_control.embedding.scaling import Scale
 from template_control.embedding.step_planning import ReplanOptions
 from template_control.embedding.swing_foot import SwingOptions
@@ -30,6 +31,7 @@ class EmbeddingOptions:
         single_stance, double_stance: task weights.
         swing: shape of the swing.
         load: tuning of the load estimate.
+        trim: tuning of the momentum trim.
         friction: coefficient the QP's cones are built with.
         torque_scale: share of the URDF's torque limits that may be used.
         trunk_pitch: where the trunk is held [rad].
@@ -46,6 +48,7 @@ class EmbeddingOptions:
     double_stance: Weights = DOUBLE_STANCE_WEIGHTS
     swing: SwingOptions = field(default_factory=SwingOptions)
     load: LoadOptions = field(default_factory=LoadOptions)
+    trim: TrimOptions = field(default_factory=TrimOptions)
     friction: float = 0.63
     torque_scale: float = 1.0
     trunk_pitch: float = 0.0

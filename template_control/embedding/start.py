@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.errors import RobotError
-from template_control.robot.planar_biped import BASE_DOF, PlanarBiped
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.requirements import BASE_DOF
 
 Array = NDArray[np.float64]
 

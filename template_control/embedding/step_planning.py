@@ -25,7 +25,9 @@ Array = NDArray[np.float64]
 
 _CALMER = (0.5, 0.0)  # of dy/dt, tried in turn
 _TOP = 0.99  # of l0: no higher may the path start then
-_VLO_STATE = [2, 1, 3]  # dx/dt, y, dy/dt of a state x, y, dx/dt, dy/dt
+
+VLO_STATE = [2, 1, 3]
+"""dx/dt, y, dy/dt of a state x, y, dx/dt, dy/dt."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class StepReport:
         decision: the planner's choice for the step that begins.
         offset: (3,) the planner's offset estimate.
         load: the load factor.
+        trim: the momentum trim [m/s^2].
         plan_seconds: wall-clock time of the plan.
     """
 
@@ -66,6 +69,7 @@ class StepReport:
     decision: Decision
     offset: Array
     load: float
+    trim: float
     plan_seconds: float
 
 
@@ -94,22 +98,23 @@ class StepPlanning:
         self._planned_at = 0.0
         self._scratch = new_scratch()
 
-    def decide(self, node: Node, sensed: Sensed, now: float, load: float) -> None:
+    def decide(self, node: Node, sensed: Sensed, now: float, load: float, trim: float) -> None:
         """At VLO: learn from the step that ended, choose the next one's controls.
 
         Args:
             node: of the automaton, where the step begins.
             sensed: the robot's state.
             now: time [s].
-            load: the load factor, for the report.
+            load, trim: what the controller has learnt, for the report.
         """
-        z = sensed.state[_VLO_STATE].copy()
+        z = sensed.state[VLO_STATE].copy()
         begin = time.perf_counter()
         if self.steps:
             self.planner.observe(self.steps[-1].decision, z)
         decision, start = self._plan(z)
         seconds = time.perf_counter() - begin
-        self.steps.append(StepReport(now, z, decision, self.planner.offset.copy(), load, seconds))
+        offset = self.planner.offset.copy()
+        self.steps.append(StepReport(now, z, decision, offset, load, trim, seconds))
         self.follow(node, sensed, now, start=start)
 
     def _plan(self, z: Array) -> tuple[Decision, Array]:
@@ -156,7 +161,7 @@ class StepPlanning:
         strides = [first]
         if first.completed:
             # The next foothold must be known when the swing begins, before the next VLO.
-            ahead = self.planner.decide(first.state[_VLO_STATE])
+            ahead = self.planner.decide(first.state[VLO_STATE])
             strides.append(
                 run(
                     self.parameters,
@@ -226,4 +231,4 @@ class StepPlanning:
         before_vlo = AUTOMATON.node("SS_bv^w").name
         mirrored = [sensed.toes[0] - x, y, dx, -dy]
         past = run(self.parameters, before_vlo, mirrored, u, scratch=self._scratch)
-        return past.state[_VLO_STATE] * [1.0, 1.0, -1.0] if past.completed else None
+        return past.state[VLO_STATE] * [1.0, 1.0, -1.0] if past.completed else None

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
 from template_control.plant.rigid_contact import pressing, solve
-from template_control.robot.planar_biped import BASE_DOF, PlanarBiped
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.requirements import BASE_DOF
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from template_control import storage
 
 Array = NDArray[np.float64]
 
-FORMAT = "template-control run 1"
+FORMAT = "template-control run 2"
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class Record:
         vlo_reached: (S,) False where the planner took the best reachable step instead.
         vlo_feasible: (S,) False where the template cannot complete the step at all.
         vlo_load: (S,) load factor.
+        vlo_trim: (S,) momentum trim [m/s^2].
         tick_seconds, solve_seconds: (ticks,) wall-clock time of every control tick and QP.
         plan_seconds: (S,) wall-clock time of every plan.
         metadata: robot, gait, options, joint names, limits, outcome and summary figures.
@@ -81,6 +82,7 @@ class Record:
     vlo_reached: NDArray[np.bool_]
     vlo_feasible: NDArray[np.bool_]
     vlo_load: Array
+    vlo_trim: Array
     tick_seconds: Array
     solve_seconds: Array
     plan_seconds: Array

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from template_control.embedding.controller import EmbeddingController
 from template_control.plant.record import Record
-from template_control.robot.planar_biped import BASE_DOF
+from template_control.robot.requirements import BASE_DOF
 from template_control.slip.automaton import AUTOMATON
 from template_control.whole_body.solver import Solution
 
@@ -171,6 +171,7 @@ class Recorder:
             vlo_reached=np.array([s.decision.reached for s in steps]),
             vlo_feasible=np.array([s.decision.feasible for s in steps]),
             vlo_load=np.array([s.load for s in steps]),
+            vlo_trim=np.array([s.trim for s in steps]),
             tick_seconds=self._times[: self.ticks, 0].copy(),
             solve_seconds=self._times[: self.ticks, 1].copy(),
             plan_seconds=np.array([s.plan_seconds for s in steps]),

@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 
 from template_control.errors import ParameterError, RobotError
 from template_control.robot.planarise import planarise
+from template_control.robot.requirements import BASE_DOF, check_hips, check_planar, foot_radius_of
 
 Array = NDArray[np.float64]
 
-BASE_DOF = 3
-_BASE = ("JointModelPX", "JointModelPZ", "JointModelRY")
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-_UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 
 
 class PlanarBiped:
@@ -149,7 +147,7 @@ class PlanarBiped:
             tree = ElementTree.fromstring(urdf)
             urdf = planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
         model = pin.buildModelFromXML(urdf)
-        _check_planar(path, model)
+        check_planar(path, model)
         if len(feet) != 2:
             raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
         for foot in feet:
@@ -159,7 +157,8 @@ class PlanarBiped:
         hinges = [model.supports[model.frames[model.getFrameId(f)].parentJoint] for f in feet]
         if set(hinges[0]) & set(hinges[1]) != set(range(BASE_DOF + 1)):
             raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")
-        radius = _foot_radius(path, urdf, model, feet)
+        check_hips(path, model, [hinge[BASE_DOF + 1] for hinge in hinges])
+        radius = foot_radius_of(path, urdf, model, feet)
         return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
 
     def update(self, q: Array, v: Array) -> None:
@@ -234,51 +233,3 @@ def _sagittal(placement: pin.SE3) -> float:
     """Length of a placement's translation in the x-z plane [m]."""
     translation = placement.translation
     return float(np.hypot(translation[0], translation[2]))
-
-
-def _check_planar(path: Path, model: pin.Model) -> None:
-    kinds = [joint.shortname() for joint in model.joints][1:]
-    names = list(model.names)[1:]
-    if tuple(kinds[:BASE_DOF]) != _BASE:
-        first = list(zip(names, kinds, strict=True))[:BASE_DOF]
-        raise RobotError(
-            f"{path} is not planar: its first joints are {first},"
-            " and must be prismatic x, prismatic z, revolute y; of a 3D robot, name the hips and"
-            " knees as sagittal_joints"
-        )
-    hinged = all(joint.nq == joint.nv == 1 for joint in model.joints[1:])
-    axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
-    for i, joint in enumerate(model.joints[1:]):
-        lateral = not hinged or abs(abs(axes[i]) - 1.0) < 1e-6
-        if i >= BASE_DOF and not (joint.nq == joint.nv == 1 and lateral):
-            raise RobotError(
-                f"{path} is not planar: joint {names[i]!r} is {kinds[i]},"
-                " and must be revolute about y (with limits, not continuous)"
-            )
-    if model.nv != BASE_DOF + 4:
-        raise RobotError(
-            f"{path}: {model.nv - BASE_DOF} hinges in its legs: a hip and a knee each is what is"
-            " controlled; name these four as sagittal_joints"
-        )
-    limits = np.array(model.effortLimit[BASE_DOF:])
-    for name, limit in zip(names[BASE_DOF:], limits, strict=True):
-        if not 0.0 < limit < _UNLIMITED:
-            raise RobotError(f"{path}: joint {name!r} has effort {limit}: give its torque limit")
-
-
-def _foot_radius(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> float:
-    geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
-    radii = set()
-    for foot in feet:
-        frame = model.getFrameId(foot)
-        spheres = [
-            g.geometry.radius
-            for g in geometry.geometryObjects
-            if g.parentFrame == frame and hasattr(g.geometry, "radius")
-        ]
-        if len(spheres) != 1:
-            raise RobotError(f"{path}: foot link {foot!r} must have one sphere as collision shape")
-        radii.add(float(spheres[0]))
-    if len(radii) != 1:
-        raise RobotError(f"{path}: the feet have different radii {sorted(radii)}")
-    return radii.pop()

@@ -14,9 +14,12 @@ from template_control.slip.automaton import STRIDE_START
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.return_map import ReturnMap
 from template_control.slip.stride import controls, run
-from template_control.slip.vocabulary import Outcome
+from template_control.slip.vocabulary import Outcome, Slot
 
 Array = NDArray[np.float64]
+
+WALKING_SLOTS = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
+"""Controls of a walking step: alpha, kappa_1, kappa_2."""
 
 _SCAN = 120
 
@@ -58,6 +61,16 @@ def vlo_energy(parameters: SlipParameters, z: Array) -> float:
     kinetic = 0.5 * p.mass * (z[0] ** 2 + z[2] ** 2)
     spring = 0.5 * p.leg_stiffness * (p.rest_length - z[1]) ** 2
     return float(kinetic + p.mass * p.gravity * z[1] + spring)
+
+
+def vlo_jacobians(gait: WalkingGait) -> tuple[Array, Array]:
+    """Of the exact VLO map at a gait: A (3, 3) in z and B (3, 3) in alpha and shares of k0.
+
+    B's columns are the touchdown angle [1/rad], kappa_1 / k0 and kappa_2 / k0.
+    """
+    linear = ReturnMap(gait.parameters).linearise(gait.vlo, gait.controls)
+    k0 = gait.parameters.leg_stiffness
+    return linear.state_jacobian, linear.control_jacobian[:, WALKING_SLOTS] * [1.0, k0, k0]
 
 
 def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingGait:

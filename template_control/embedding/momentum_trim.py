@@ -1,0 +1,93 @@
+"""What double stance must add to the template's forces so that the robot keeps its momentum.
+
+A robot's step adds something systematic to the template's. The planner can cancel two of its
+three directions; the third, which is mostly forward speed, it cannot: from a symmetric gait, by
+the template's mirror symmetry, no touchdown angle and no leg stiffness changes it, and a gait
+can bear it only with dy/dt at VLO. In single stance no force can either, as a point foot cannot
+change the momentum about itself. In double stance the forces of two feet can.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.plan import Plan
+from template_control.slip.gait import WalkingGait, vlo_jacobians
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TrimOptions:
+    """Tuning of the momentum trim; drifts are speeds over sqrt(g l0).
+
+    Attributes:
+        share: of a step's drift that enters its slow average.
+        gain: share of the average that the next double stance is to take away.
+        dead_zone: average that counts as none.
+        largest: a larger drift counts as this much: a push is no drift.
+        bound: of the acceleration over g.
+    """
+
+    share: float = 0.2
+    gain: float = 0.1
+    dead_zone: float = 0.0008
+    largest: float = 0.01
+    bound: float = 0.03
+
+
+class MomentumTrim:
+    """Horizontal acceleration added in double stance, learnt from step to step.
+
+    Args:
+        gait: the template's, about which the direction is taken that the controls leave alone.
+        options: tuning.
+
+    Attributes:
+        drift: average drift of a step, as a forward speed [m/s].
+        acceleration: to add to the CoM's in double stance [m/s^2], 0 at first.
+    """
+
+    def __init__(self, gait: WalkingGait, options: TrimOptions) -> None:
+        p = gait.parameters
+        self.options = options
+        self.acceleration = 0.0
+        self._left_alone = uncontrolled(gait)
+        self.drift = 0.0
+        self._speed = float(np.sqrt(p.gravity * p.rest_length))
+        self._bound = options.bound * p.gravity
+        self._plan: Plan | None = None
+
+    def expect(self, plan: Plan) -> None:
+        """Take note of the exact template's path for the step that begins."""
+        self._plan = plan
+
+    def end_step(self, z: Array, trusted: bool) -> None:
+        """Learn from the step that ended in VLO state ``z`` (3,).
+
+        Args:
+            z: dx/dt, y, dy/dt.
+            trusted: it went near the gait; from others, a push's say, nothing is learnt.
+        """
+        plan = self._plan
+        if plan is None or not trusted or not np.isfinite(plan.liftoff - plan.touchdown):
+            return
+        o, duration = self.options, plan.liftoff - plan.touchdown
+        largest = o.largest * self._speed
+        drift = min(max(float(self._left_alone @ (z - plan.vlo_state)), -largest), largest)
+        self.drift += o.share * (drift - self.drift)
+        beyond = max(abs(self.drift) - o.dead_zone * self._speed, 0.0)
+        wanted = self.acceleration - o.gain * np.copysign(beyond, self.drift) / duration
+        self.acceleration = float(min(max(wanted, -self._bound), self._bound))
+
+
+def uncontrolled(gait: WalkingGait) -> Array:
+    """(3,) n with n B = 0 for the VLO map's control Jacobian B at the gait, n[0] = 1.
+
+    n (z - P(z, u)) is a step's drift, as a forward speed [m/s].
+    """
+    direction = np.linalg.svd(vlo_jacobians(gait)[1])[0][:, -1]
+    return np.asarray(direction / direction[0])
