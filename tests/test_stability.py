@@ -210,6 +210,23 @@ def test_controlled_eigenvalue_is_the_rate_at_which_a_walk_comes_back(modified_b
     assert (size[-1] / size[9]) ** (1.0 / 30.0) == pytest.approx(expected, abs=2e-3)
 
 
+def test_what_a_robot_adds_to_a_step_makes_modified_walking_circle():
+    controller, target = ModifiedWalking(P), np.array([1.14837527, 0.9818, 0.0])
+    guess = controls(np.radians(70.0), K0, K0)
+
+    def walk(added):
+        z, states = target, []
+        for _ in range(80):
+            z = ReturnMap(P).step(z, controller.solve(z, target, guess).controls)[0] + added
+            states.append(z)
+        return np.array(states[40:]) - target
+
+    assert np.all(np.abs(walk(np.zeros(3))) < 1e-6)
+    beside = walk(np.array([0.0033, 0.00075, -0.019]))  # five-link's
+    assert 0.015 < beside[:, 2].std() < 0.025
+    assert -0.002 < beside[:, 1].mean() < -0.001
+
+
 def test_controlled_running_has_no_memory_at_any_speed():
     guess, held = controls(np.radians(70.0), K0, K0), {"height": 0.98}
     policy = targeted(ActiveRunning(P), P, Event.APEX, held, "speed", guess)
