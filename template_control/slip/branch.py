@@ -257,7 +257,7 @@ class Branch(ABC):
             middle = 0.5 * (low + high)
             try:
                 point = self.point(self.correct(a.x + middle * (b.x - a.x), chord))
-            except GaitError:
+            except (GaitError, ParameterError):
                 break  # so near a crossing of branches that Newton's method stalls
             tangent = point.tangent * np.sign(point.tangent @ direction)
             if left * test(point, tangent) > 0.0:
