@@ -301,10 +301,10 @@ def start_killed(path, executor="None"):
     ("number", "send", "executor"),
     [
         (signal.SIGKILL, os.kill, "None"),
-        (signal.SIGTERM, os.kill, "None"),
-        (signal.SIGINT, os.kill, "None"),
+        pytest.param(signal.SIGTERM, os.kill, "None", marks=pytest.mark.slow),
+        pytest.param(signal.SIGINT, os.kill, "None", marks=pytest.mark.slow),
         (signal.SIGINT, os.killpg, "None"),  # as a terminal does
-        (signal.SIGINT, os.killpg, "ProcessPoolExecutor(2)"),
+        pytest.param(signal.SIGINT, os.killpg, "ProcessPoolExecutor(2)", marks=pytest.mark.slow),
     ],
 )
 def test_a_killed_sweep_goes_on_where_it_stopped(tmp_path, log, number, send, executor):
