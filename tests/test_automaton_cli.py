@@ -137,7 +137,9 @@ def test_table_names_every_node_guard_and_failure(tmp_path, monkeypatch, capsys)
     assert str(Path("runs/automaton.png")) in out
 
 
-@pytest.mark.parametrize("suffix", ["png", "PNG", "svg", "pdf"])
+@pytest.mark.parametrize(
+    "suffix", ["png", *(pytest.param(s, marks=pytest.mark.slow) for s in ("PNG", "svg", "pdf"))]
+)
 def test_figure_is_written_into_a_new_folder(suffix, tmp_path, capsys):
     path = tmp_path / "new" / "deep" / f"fig.{suffix}"
     assert main(["automaton", "--json", "--output", str(path)]) == 0

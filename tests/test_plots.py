@@ -41,7 +41,14 @@ def cut(record, samples):
     return replace(record, **held)
 
 
-@pytest.mark.parametrize("kind", ["whole", "fallen", "two samples", "no step"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *(pytest.param(k, marks=pytest.mark.slow) for k in ("whole", "two samples")),
+        "fallen",
+        "no step",
+    ],
+)
 def test_every_run_has_every_figure(record, gait, kind, tmp_path):
     if kind == "fallen":
         weak = tc.EmbeddingOptions(torque_scale=0.2)
