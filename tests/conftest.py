@@ -7,7 +7,7 @@ import pytest
 
 import template_control as tc
 from template_control.robot.library import load_robot
-from template_control.slip.gait import gait_at
+from template_control.slip.gait import gait_at, gait_from_energy
 from template_control.slip.parameters import SlipParameters
 
 PACKAGE = Path(__file__).parents[1] / "template_control"
@@ -31,6 +31,12 @@ def gait():
     return gait_at(SlipParameters(), np.radians(66.0), 1.1)
 
 
+@pytest.fixture(scope="session")
+def paper_gait():
+    """The paper's walking equilibrium: 0.9818 m and 826 J."""
+    return gait_from_energy(SlipParameters(), 0.9818, 826.0)
+
+
 @pytest.fixture
 def random_states():
     """Twenty states (q, v) of the five-link robot, seeded."""
@@ -46,3 +52,11 @@ def short_walk():
     robot = tc.load_robot("five-link")
     gait = tc.default_gait(robot)
     return tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=4))
+
+
+@pytest.fixture
+def log(tmp_path, monkeypatch):
+    """How the calls of ``sweep_work.logged`` are told; read with ``sweep_work.calls``."""
+    path = tmp_path / "calls.log"
+    monkeypatch.setenv("SWEEP_LOG", str(path))
+    return path

@@ -1,8 +1,5 @@
 """Raising disturbances until a walk breaks, and ``template-control robustness``."""
 
-import json
-import re
-import shlex
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +8,6 @@ import numpy as np
 import pytest
 
 from template_control.cli import robustness as command
-from template_control.cli.main import build_parser, main
 from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.scaling import default_gait
 from template_control.errors import ParameterError, RobotError, SweepError
@@ -19,7 +15,7 @@ from template_control.plant import robustness
 from template_control.plant.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
 from template_control.plant.robustness import Finding, Level, measure, off_gait, trial
 from template_control.plant.simulation import SimulationOptions, simulate
-from template_control.robot.library import load_robot, robot_path
+from template_control.robot.library import load_robot
 from template_control.slip.parameters import SlipParameters
 from template_control.view.robustness_figure import robustness_figure
 
@@ -263,105 +259,3 @@ def test_markdown_says_where_it_breaks(cheap):
     assert rows[2] == ["| step up", "5", "2 cm", *["8 cm or more"] * 2, "3 cm: 2 off its gait |"]
     assert rows[3] == ["| heavier", "5", *["20 %"] * 3, "30 %: 5 fell |"]
     assert rows[4] == ["| lighter", "5", *["90 % or more"] * 3, " |"]
-
-
-# -- the command -----------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_json_figure_and_resumption(tmp_path, capfd):
-    arguments = ["robustness", "--quick", "--disturbance", "delay", "--workers", "2", "--json"]
-    arguments += ["--output", str(tmp_path)]
-    assert main(arguments) == 0
-    captured = capfd.readouterr()
-    figures = json.loads(captured.out)
-    assert "level 2" in captured.err
-    delay = figures["disturbances"]["delay"]
-    assert [level["level"] for level in delay["levels"]] == [0.002, 0.004]
-    assert abs(figures["undisturbed"]["speed_error"]) < 0.02
-    assert Path(figures["figure"]).is_file()
-    before = {path: path.read_bytes() for path in tmp_path.glob("*.jsonl")}
-    assert len(before) == 2
-    assert main(arguments) == 0
-    assert json.loads(capfd.readouterr().out) == figures
-    assert {path: path.read_bytes() for path in tmp_path.glob("*.jsonl")} == before
-
-
-def test_a_robot_that_cannot_walk_is_one_line(tmp_path, capfd):
-    weak = tmp_path / "weak.urdf"
-    text = robot_path("five-link").read_text()
-    weak.write_text(re.sub(r'effort="350[^"]*"', 'effort="40"', text))
-    assert weak.read_text() != text
-    assert main(["robustness", "--robot", str(weak), "--output", str(tmp_path / "out")]) == 2
-    captured = capfd.readouterr()
-    assert captured.out == ""
-    (line,) = captured.err.strip().splitlines()
-    assert "falls without a disturbance" in line
-    assert str(weak) in line
-
-
-@pytest.mark.parametrize(
-    ("arguments", "culprit"),
-    [
-        (["--robot", "hexapod"], "hexapod"),
-        (["--workers", "0"], "--workers is 0"),
-        (["--output", "/proc/none"], "/proc/none"),
-    ],
-)
-def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
-    assert main(["robustness", *arguments]) == 2
-    captured = capfd.readouterr()
-    assert captured.out == ""
-    (line,) = captured.err.strip().splitlines()
-    assert culprit in line
-    assert not (tmp_path / "runs" / "robustness" / "hexapod").exists()
-
-
-def test_an_unknown_disturbance_is_refused(capfd):
-    with pytest.raises(SystemExit) as stop:
-        main(["robustness", "--disturbance", "wind"])
-    assert stop.value.code == 2
-    assert "push-forward" in capfd.readouterr().err
-
-
-def test_ctrl_c_tells_how_to_go_on(tmp_path, monkeypatch, capfd):
-    def impatient(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(command, "measure", impatient)
-    assert main(["robustness", "--output", str(tmp_path)]) == 130
-    assert "goes on from there" in capfd.readouterr().err
-
-
-def commands():
-    text = (DOCS / "robustness.md").read_text()
-    blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
-    return [line for block in blocks for line in block.strip().splitlines()]
-
-
-@pytest.mark.parametrize("line", commands())
-def test_commands_of_the_documentation_are_understood(line):
-    words = shlex.split(line)
-    assert words[0] == "template-control"
-    assert build_parser().parse_args(words[1:]).command == "robustness"
-
-
-def test_the_documentation_has_its_pictures_and_a_snippet_that_runs(capfd):
-    text = (DOCS / "robustness.md").read_text()
-    pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
-    assert len(pictures) == 2
-    assert all((DOCS / picture).is_file() for picture in pictures)
-    (snippet,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    exec(snippet, {})
-    assert "fell: False" in capfd.readouterr().out
-
-
-@pytest.mark.slow
-def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
-    (line,) = (line for line in commands() if "--quick" in line)
-    monkeypatch.chdir(tmp_path)
-    assert main(shlex.split(line)[1:]) == 0
-    assert (tmp_path / "runs" / "robustness" / "five-link" / "robustness.png").is_file()
-    out = capfd.readouterr().out
-    assert all(d.title in out for d in DISTURBANCES)

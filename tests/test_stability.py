@@ -9,24 +9,13 @@ from scipy.linalg import solve_discrete_are
 from template_control.cli.main import main
 from template_control.cli.reproductions.stability import branch, lower_limit
 from template_control.errors import GaitError, ParameterError
-from template_control.slip.automaton import STRIDE_START
-from template_control.slip.basin import margin, steps_to_fall, velocity_angle, vlo_state
 from template_control.slip.branch import Special
-from template_control.slip.controlled_branch import ControlledFamily, controlled_fixed_point
-from template_control.slip.controllers import ActiveRunning, ModifiedWalking
-from template_control.slip.deadbeat import backward_set, controlled_end, inside_share, settles
-from template_control.slip.gait import gait_from_energy, vlo_energy
+from template_control.slip.gait import vlo_energy
 from template_control.slip.gait_branch import Family
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.return_map import ReturnMap
-from template_control.slip.section_target import section_target, targeted
-from template_control.slip.stability import (
-    Kind,
-    classify,
-    closed_loop_eigenvalues,
-)
-from template_control.slip.stride import controls, run
-from template_control.slip.vocabulary import NUM_SLOTS, Event, MapKind, Outcome, Slot
+from template_control.slip.stability import Kind, classify, closed_loop_eigenvalues
+from template_control.slip.vocabulary import NUM_SLOTS, Outcome
 
 P = SlipParameters()
 K0 = P.leg_stiffness
@@ -35,11 +24,6 @@ K0 = P.leg_stiffness
 @pytest.fixture(scope="module")
 def points():
     return branch()
-
-
-@pytest.fixture(scope="module")
-def paper_gait():
-    return gait_from_energy(P, 0.9818, 826.0)
 
 
 def test_every_point_is_a_gait(points):
@@ -142,197 +126,6 @@ def test_closed_loop_eigenvalues_of_an_lqr(paper_gait):
         z, outcome = ReturnMap(P).step(z, paper_gait.controls - gain @ (z - paper_gait.vlo))
         assert outcome is Outcome.SECTION
     np.testing.assert_allclose(z, paper_gait.vlo, atol=1e-3)
-
-
-def test_deadbeat_running_has_no_memory():
-    controller, target = ActiveRunning(P), np.array([4.0, 0.98])
-    z, eigenvalues = controlled_fixed_point(
-        ReturnMap(P, "r"), lambda s: controller.solve(s, target).controls, target + 0.01
-    )
-    np.testing.assert_allclose(z, target, atol=1e-6)
-    assert np.max(np.abs(eigenvalues)) < 1e-3
-
-
-def test_papers_map_settles_walking_beside_its_target():
-    """A closed form's error moves the fixed point; simulation settles where Newton says."""
-    controller, target = ModifiedWalking(P, MapKind.IMPROVED), np.array([1.125, 0.98, 0.0])
-    guess = controller.solve(target, target).controls
-
-    def policy(s):
-        return controller.solve(s, target, guess).controls
-
-    z, eigenvalues = controlled_fixed_point(ReturnMap(P), policy, target)
-    assert 1e-7 < np.max(np.abs(z - target)) < 0.02
-    assert np.max(np.abs(eigenvalues)) < 1.02
-    again, _ = ReturnMap(P).step(z, policy(z))
-    np.testing.assert_allclose(again, z, atol=1e-7)
-
-
-@pytest.fixture(scope="module")
-def modified_branch():
-    """Modified walking on the exact map, its target moved along 0.9818 m."""
-    guess, held = controls(np.radians(70.0), K0, K0), {"height": 0.9818}
-    policy = targeted(ModifiedWalking(P), P, Event.VLO, held, "energy", guess)
-    family = ControlledFamily(ReturnMap(P), policy, "energy")
-    start = section_target(P, Event.VLO, {"height": 0.9818, "energy": 826.0})
-    return policy, family.trace(np.append(start, 826.0), "target", (815.0, 830.0), step=0.004)
-
-
-def test_controlled_walking_settles_on_its_target_up_to_the_fold(modified_branch, points):
-    policy, found = modified_branch
-    fold = next(p for p in points if p.special is Special.FOLD)
-    for point in found:
-        again, outcome = ReturnMap(P).step(point.state, policy(point.state, point.target))
-        assert outcome is Outcome.SECTION
-        np.testing.assert_allclose(again, point.state, atol=1e-8)
-        assert point.quantity("target") == pytest.approx(point.energy, abs=1e-3)
-        off = abs(point.state[1] - 0.9818)
-        if point.target < fold.energy:
-            assert off < 1e-5
-            assert point.kind is Kind.STABLE or abs(point.target - 821.87) < 1.0
-        else:
-            # There is no gait of that height; the nearest ones are folds of their energy.
-            assert off > 1e-4
-            assert point.kind is Kind.NEUTRAL
-    # Passive walking is unstable there.
-    assert min(p.target for p in found) < 816.0
-    assert not any(p.special for p in found)
-
-
-def test_controlled_eigenvalue_is_the_rate_at_which_a_walk_comes_back(modified_branch):
-    policy, found = modified_branch
-    point = min(found, key=lambda p: abs(p.target - 826.0))
-    expected = np.max(np.abs(point.eigenvalues))
-    z, size = point.state + [0.0, 1e-5, 1e-5], []
-    for _ in range(40):
-        z, _ = ReturnMap(P).step(z, policy(z, point.target))
-        size.append(np.linalg.norm(z - point.state))
-    assert (size[-1] / size[9]) ** (1.0 / 30.0) == pytest.approx(expected, abs=2e-3)
-
-
-def test_what_a_robot_adds_to_a_step_makes_modified_walking_circle():
-    controller, target = ModifiedWalking(P), np.array([1.14837527, 0.9818, 0.0])
-    guess = controls(np.radians(70.0), K0, K0)
-
-    def walk(added):
-        z, states = target, []
-        for _ in range(80):
-            z = ReturnMap(P).step(z, controller.solve(z, target, guess).controls)[0] + added
-            states.append(z)
-        return np.array(states[40:]) - target
-
-    assert np.all(np.abs(walk(np.zeros(3))) < 1e-6)
-    beside = walk(np.array([0.0033, 0.00075, -0.019]))  # five-link's
-    assert 0.015 < beside[:, 2].std() < 0.025
-    assert -0.002 < beside[:, 1].mean() < -0.001
-
-
-def test_controlled_running_has_no_memory_at_any_speed():
-    guess, held = controls(np.radians(70.0), K0, K0), {"height": 0.98}
-    policy = targeted(ActiveRunning(P), P, Event.APEX, held, "speed", guess)
-    family = ControlledFamily(ReturnMap(P, "r"), policy, "speed")
-    found = family.trace(np.array([4.0, 0.98, 4.0]), "target", (2.0, 6.0), step=0.2)
-    assert len(found) > 5
-    for point in found:
-        np.testing.assert_allclose(point.state, [point.target, 0.98], atol=1e-6)
-        assert np.max(np.abs(point.eigenvalues)) < 1e-3
-
-
-@pytest.mark.parametrize(
-    ("section", "quantities"),
-    [
-        (Event.VLO, {"energy": 826.0, "height": 0.9818}),
-        (Event.VLO, {"speed": 1.1, "height": 0.98}),
-        (Event.VLO, {"energy": 826.0, "speed": 1.1}),
-        (Event.APEX, {"energy": 1500.0, "height": 0.98}),
-        (Event.APEX, {"energy": 1500.0, "speed": 4.0}),
-    ],
-)
-def test_targets_have_the_quantities_asked_for(section, quantities):
-    z = section_target(P, section, quantities)
-    spring = 0.5 * K0 * (1.0 - z[1]) ** 2 if section is Event.VLO else 0.0
-    energy = 0.5 * P.mass * z[0] ** 2 + P.mass * P.gravity * z[1] + spring
-    found = {"energy": energy, "height": z[1], "speed": z[0]}
-    assert {name: found[name] for name in quantities} == pytest.approx(quantities)
-    assert len(z) == (3 if section is Event.VLO else 2)
-
-
-def test_impossible_targets_and_families_are_named():
-    with pytest.raises(ParameterError, match="no VLO state has energy 500"):
-        section_target(P, Event.VLO, {"energy": 500.0, "height": 0.98})
-    with pytest.raises(ParameterError, match="give two of"):
-        section_target(P, Event.VLO, {"energy": 500.0})
-    with pytest.raises(ParameterError, match="cannot vary the target's 'angle'"):
-        ControlledFamily(ReturnMap(P), lambda z, _: z, "angle")
-    with pytest.raises(ParameterError, match="stride is 'wr'"):
-        ControlledFamily(ReturnMap(P, "wr"), lambda z, _: z, "energy")
-    family = ControlledFamily(ReturnMap(P), lambda z, _: controls(1.2, K0, K0), "energy")
-    with pytest.raises(ParameterError, match="cannot draw over 'energy'"):
-        family.trace(np.array([1.1, 0.98, 0.0, 826.0]), "energy", (820.0, 830.0))
-
-
-def test_vlo_states_and_energies_belong_together():
-    y, phi = np.meshgrid(np.linspace(0.95, 0.99, 5), np.radians([-5.0, 0.0, 5.0]))
-    z = vlo_state(P, y, phi, 826.0)
-    for state, angle in zip(z.reshape(-1, 3), phi.ravel(), strict=True):
-        assert vlo_energy(P, state) == pytest.approx(826.0, rel=1e-12)
-        assert velocity_angle(state) == pytest.approx(angle)
-        assert np.sign(state[2]) == -np.sign(angle), "downward is positive"
-    assert np.isnan(vlo_state(P, 0.98, 0.0, 700.0)[0])
-
-
-def test_steps_to_fall_counts_steps(paper_gait):
-    goal = np.array([0.9818, 0.0])
-    z = vlo_state(P, [0.9818, 0.9818, 0.955, 0.9818], np.radians([0.0, 1.0, 0.0, 0.0]), 826.0)
-    z[3] = np.nan
-    result = steps_to_fall(P, z, paper_gait.controls, goal)
-    assert result.steps.tolist()[:2] == [50, 50]
-    assert result.converges.tolist() == [True, True, False, False]
-    assert result.steps[3] == 0
-    state, count = z[2], 0
-    step = ReturnMap(P)
-    while True:
-        state, outcome = step.step(state, paper_gait.controls)
-        if outcome is not Outcome.SECTION:
-            break
-        count += 1
-    assert result.steps[2] == count < 50
-
-
-def test_convergence_is_to_this_gait_and_not_to_another():
-    """Under the lower limit a walk may go on for 50 steps, but not to the unstable gait."""
-    gait = gait_from_energy(P, 0.9818, 821.5)
-    z = vlo_state(P, 0.9818 + np.array([-1e-4, 1e-4]), 0.0, 821.5)
-    assert not steps_to_fall(P, z, gait.controls, np.array([0.9818, 0.0])).converges.any()
-
-
-def test_margin_shrinks_towards_the_lower_limit():
-    radii = []
-    for energy in (822.5, 824.0, 826.0):
-        gait = gait_from_energy(P, 0.9818, energy)
-        radii.append(margin(P, gait.controls, (0.9818, 0.0), energy))
-    assert 0.0 < radii[0] < radii[1] < radii[2] < 0.05
-
-
-@pytest.mark.slow
-def test_deadbeat_set_and_what_the_maps_make_of_it(paper_gait):
-    found = backward_set(paper_gait, counts=(20, 120))
-    assert len(found.state) > 200
-    for z, u in zip(found.state[::20], found.controls[::20], strict=True):
-        stride = run(P, STRIDE_START["w"], [0.0, z[1], z[0], z[2]], u)
-        np.testing.assert_allclose(stride.state[[2, 1, 3]], paper_gait.vlo, atol=1e-7)
-        assert 0.5 * K0 <= u[Slot.K_SD] <= 1.5 * K0
-        assert u[Slot.K_SC] == K0
-    stable = [p for p in branch(0.001) if p.kind is Kind.STABLE]
-    failing = {}
-    for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER):
-        settled = settles(controlled_end(found, paper_gait, kind), stable, paper_gait)
-        shares, _ = inside_share(found, settled, np.radians([0.0, 70.8]))
-        failing[kind] = 1.0 - shares
-    assert np.all(failing[MapKind.EXACT] == 0.0)
-    assert np.all(failing[MapKind.IMPROVED] <= 0.005)
-    assert 0.1 < failing[MapKind.PAPER][0] < 0.4
-    assert failing[MapKind.PAPER][1] < 0.02, "the paper: 100 % from 70.8 degrees on"
 
 
 def test_gaits_command(tmp_path, capfd):

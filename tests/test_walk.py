@@ -12,12 +12,7 @@ from template_control.plant.disturbances import Situation
 from template_control.plant.ground import GroundStep
 from template_control.plant.record import Record
 from template_control.plant.robustness import off_gait
-from template_control.plant.simulation import (
-    Push,
-    SimulationOptions,
-    perturbed_start,
-    simulate,
-)
+from template_control.plant.simulation import Push, SimulationOptions, perturbed_start, simulate
 from template_control.plant.summary import summarise
 from template_control.robot.library import load_robot
 from template_control.slip.gait import gait_at, gait_for_speed, gait_from_energy

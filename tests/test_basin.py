@@ -1,0 +1,82 @@
+"""Basins of attraction: states and energies, steps to fall, and the deadbeat controller's set."""
+
+import numpy as np
+import pytest
+
+from template_control.cli.reproductions.stability import branch
+from template_control.slip.automaton import STRIDE_START
+from template_control.slip.basin import margin, steps_to_fall, velocity_angle, vlo_state
+from template_control.slip.deadbeat import backward_set, controlled_end, inside_share, settles
+from template_control.slip.gait import gait_from_energy, vlo_energy
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.return_map import ReturnMap
+from template_control.slip.stability import Kind
+from template_control.slip.stride import run
+from template_control.slip.vocabulary import MapKind, Outcome, Slot
+
+P = SlipParameters()
+K0 = P.leg_stiffness
+
+
+def test_vlo_states_and_energies_belong_together():
+    y, phi = np.meshgrid(np.linspace(0.95, 0.99, 5), np.radians([-5.0, 0.0, 5.0]))
+    z = vlo_state(P, y, phi, 826.0)
+    for state, angle in zip(z.reshape(-1, 3), phi.ravel(), strict=True):
+        assert vlo_energy(P, state) == pytest.approx(826.0, rel=1e-12)
+        assert velocity_angle(state) == pytest.approx(angle)
+        assert np.sign(state[2]) == -np.sign(angle), "downward is positive"
+    assert np.isnan(vlo_state(P, 0.98, 0.0, 700.0)[0])
+
+
+def test_steps_to_fall_counts_steps(paper_gait):
+    goal = np.array([0.9818, 0.0])
+    z = vlo_state(P, [0.9818, 0.9818, 0.955, 0.9818], np.radians([0.0, 1.0, 0.0, 0.0]), 826.0)
+    z[3] = np.nan
+    result = steps_to_fall(P, z, paper_gait.controls, goal)
+    assert result.steps.tolist()[:2] == [50, 50]
+    assert result.converges.tolist() == [True, True, False, False]
+    assert result.steps[3] == 0
+    state, count = z[2], 0
+    step = ReturnMap(P)
+    while True:
+        state, outcome = step.step(state, paper_gait.controls)
+        if outcome is not Outcome.SECTION:
+            break
+        count += 1
+    assert result.steps[2] == count < 50
+
+
+def test_convergence_is_to_this_gait_and_not_to_another():
+    """Under the lower limit a walk may go on for 50 steps, but not to the unstable gait."""
+    gait = gait_from_energy(P, 0.9818, 821.5)
+    z = vlo_state(P, 0.9818 + np.array([-1e-4, 1e-4]), 0.0, 821.5)
+    assert not steps_to_fall(P, z, gait.controls, np.array([0.9818, 0.0])).converges.any()
+
+
+def test_margin_shrinks_towards_the_lower_limit():
+    radii = []
+    for energy in (822.5, 824.0, 826.0):
+        gait = gait_from_energy(P, 0.9818, energy)
+        radii.append(margin(P, gait.controls, (0.9818, 0.0), energy))
+    assert 0.0 < radii[0] < radii[1] < radii[2] < 0.05
+
+
+@pytest.mark.slow
+def test_deadbeat_set_and_what_the_maps_make_of_it(paper_gait):
+    found = backward_set(paper_gait, counts=(20, 120))
+    assert len(found.state) > 200
+    for z, u in zip(found.state[::20], found.controls[::20], strict=True):
+        stride = run(P, STRIDE_START["w"], [0.0, z[1], z[0], z[2]], u)
+        np.testing.assert_allclose(stride.state[[2, 1, 3]], paper_gait.vlo, atol=1e-7)
+        assert 0.5 * K0 <= u[Slot.K_SD] <= 1.5 * K0
+        assert u[Slot.K_SC] == K0
+    stable = [p for p in branch(0.001) if p.kind is Kind.STABLE]
+    failing = {}
+    for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER):
+        settled = settles(controlled_end(found, paper_gait, kind), stable, paper_gait)
+        shares, _ = inside_share(found, settled, np.radians([0.0, 70.8]))
+        failing[kind] = 1.0 - shares
+    assert np.all(failing[MapKind.EXACT] == 0.0)
+    assert np.all(failing[MapKind.IMPROVED] <= 0.005)
+    assert 0.1 < failing[MapKind.PAPER][0] < 0.4
+    assert failing[MapKind.PAPER][1] < 0.02, "the paper: 100 % from 70.8 degrees on"

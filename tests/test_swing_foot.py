@@ -1,0 +1,61 @@
+"""The swing foot's path: clearance, reach, a slow landing, and ground that comes late."""
+
+import numpy as np
+import pytest
+
+from template_control.embedding.swing_foot import SwingFoot, SwingOptions, quintic_step
+
+
+def test_quintic_arrives():
+    state = np.array([0.1, -0.4, 3.0])
+    remaining, dt = 0.3, 1e-3
+    for i in range(299):
+        quintic_step(state, 0.7, 0.2, remaining - i * dt, dt)
+    assert state[0] == pytest.approx(0.7 - 0.2 * dt, abs=1e-5)
+    assert state[1] == pytest.approx(0.2, abs=1e-3)
+
+
+def test_swing_clears_the_ground_and_lands_slowly():
+    options = SwingOptions()
+    swing = SwingFoot(options)
+    swing.start(np.array([-0.6, 0.0]), np.zeros(2))
+    heights, accelerations = [], []
+    for i in range(400):
+        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
+        heights.append(swing.y[0])
+        accelerations.append(max(abs(swing.x[2]), abs(swing.y[2])))
+    assert max(heights) == pytest.approx(options.clearance, abs=2e-3)
+    assert heights[-1] == pytest.approx(0.0, abs=2e-3)
+    assert min(heights) > -2e-3
+    assert swing.x[0] == pytest.approx(0.6, abs=2e-3)
+    assert abs(swing.x[1]) < 0.05
+    assert abs(swing.y[1]) <= options.landing_speed + 1e-9
+    assert max(accelerations) < 80.0
+
+
+def test_swing_without_a_foothold_comes_down():
+    swing = SwingFoot(SwingOptions())
+    swing.start(np.array([0.0, 0.05]), np.array([1.0, 0.0]))
+    for _ in range(100):
+        swing.advance(np.nan, 0.3, 1e-3, 0.0)
+    assert swing.y[0] == pytest.approx(0.05 - 0.02)
+    assert swing.x[1] == 0.0
+
+
+def test_swing_stays_within_reach_of_the_hip():
+    swing = SwingFoot(SwingOptions(reach=0.97))
+    swing.start(np.array([0.55, 0.1]), np.zeros(2))
+    x = swing.furthest(np.array([0.2, 0.85]), 0.9)
+    assert np.hypot(x - 0.2, 0.75) == pytest.approx(0.97 * 0.9)
+    assert swing.furthest(np.array([0.2, 1.2]), 0.9) == 0.2, "nowhere but below the hip"
+
+
+def test_swing_falls_to_ground_that_comes_late():
+    options = SwingOptions()
+    swing = SwingFoot(options)
+    swing.start(np.array([0.6, 0.0]), np.array([0.1, -0.2]))
+    for _ in range(50):
+        swing.reach_down(1e-3)
+    assert swing.y[0] == pytest.approx(-0.2 * 0.05 - 0.5 * options.reach_acceleration * 0.05**2)
+    assert swing.x[0] == 0.6
+    assert swing.x[1] == 0.0
