@@ -1,5 +1,6 @@
 """Shared objects: the shipped robot and its default gait."""
 
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,15 @@ PACKAGE = Path(__file__).parents[1] / "template_control"
 
 
 def pytest_configure():
-    """Drop compiled kernels older than a source: Numba looks at a function's own file only."""
+    """Make what a test sees independent of the last run's kernels and of who runs the tests."""
+    # Drop compiled kernels older than a source: Numba looks at a function's own file only.
     newest = max(path.stat().st_mtime for path in PACKAGE.rglob("*.py"))
     for compiled in PACKAGE.rglob("*.nb[ic]"):
         if compiled.stat().st_mtime < newest:
             compiled.unlink(missing_ok=True)
+    # A shell without job control starts its background jobs with SIGINT ignored, which the
+    # processes that the tests interrupt would inherit.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
