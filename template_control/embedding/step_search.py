@@ -21,7 +21,8 @@ from template_control.slip.vocabulary import MapKind
 
 Array = NDArray[np.float64]
 
-_EXACT, _FAST = int(MapKind.EXACT), int(MapKind.IMPROVED)
+# Numba would compile the maps once more for each literal int.
+_EXACT, _FAST = np.int64(MapKind.EXACT), np.int64(MapKind.IMPROVED)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
 

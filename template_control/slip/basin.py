@@ -24,7 +24,8 @@ from template_control.slip.vocabulary import MapKind, Outcome
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_EXACT = int(MapKind.EXACT)
+# Numba would compile the maps once more for a literal int.
+_EXACT = np.int64(MapKind.EXACT)
 _SECTION = int(Outcome.SECTION)
 _WINDOW = 5
 _THERE = 0.01  # as near as this, it need not come nearer

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _EXACT = int(MapKind.EXACT)
+# Numba would compile the stride once more for a literal False.
+_LAST_ONLY = np.bool_(False)
 _STEP = 1e-20  # of a complex step: its square vanishes against 1
 
 RESULTS = 6
@@ -52,7 +54,7 @@ def section_map(
     toes[0] = toes[1] = 0.0
     bottom[0] = bottom[1] = np.nan
     if kind == _EXACT:
-        outcome = run_stride(tables, model, node, state, toes, controls, False, scratch)[0]
+        outcome = run_stride(tables, model, node, state, toes, controls, _LAST_ONLY, scratch)[0]
     else:
         outcome = closed_form_stride(tables, model, kind, node, state, toes, controls, scratch)
     result[0], result[1], result[2], result[3] = state[2], state[1], state[3], state[0]

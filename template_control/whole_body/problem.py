@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 ROWS_PER_FOOT = 3
 _FAR = 1e20  # ProxQP's infinity
+_GRID = 2.0**24
 
 
 @njit(cache=True)
@@ -145,7 +146,11 @@ def _forward(factor: Array, vector: Array) -> None:
 
 @njit(cache=True)
 def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
-    """Joint torques [N m] of the QP's solution: tau_max * (L^-T w), kept within tau_max."""
+    """Joint torques [N m] of the QP's solution: tau_max * (L^-T w), kept within tau_max.
+
+    Digits below ProxQP's tolerance are dropped: the last of them depend on where its workspace
+    happens to lie in memory, and a walk near a fall would not be the same twice.
+    """
     n = w.shape[0]
     for i in range(n - 1, -1, -1):
         out[i] = w[i]
@@ -154,7 +159,8 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
         out[i] /= factor[i, i]
     for i in range(n):
         # The solver's tolerance may leave a torque a hair beyond its limit.
-        out[i] = min(1.0, max(-1.0, out[i])) * torque_limit[i]
+        share = np.round(min(1.0, max(-1.0, out[i])) * _GRID) / _GRID
+        out[i] = share * torque_limit[i]
 
 
 @njit(cache=True)
