@@ -47,7 +47,8 @@ class LqrOptions:
             part of an offset that the controls cannot cancel shows up where.
         stiffness_range: kappa_1 and kappa_2 over k0.
         angle_range: touchdown angle relative to the gait's [rad]; steeper ones make steps
-            too short in time for the swing leg.
+            too short in time for the swing leg, flatter ones let the CoM sink lower than the
+            knees can carry it.
         top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the
             foot would touch down at once.
         trusted_price: the linear law's step is taken without a search below this price.
@@ -64,9 +65,9 @@ class LqrOptions:
     surprise_bound: tuple[float, float, float] = (0.03, 0.008, 0.06)
     tolerance: tuple[float, float, float] = (0.011, 0.005, 0.03)
     stiffness_range: tuple[float, float] = (0.5, 1.5)
-    angle_range: tuple[float, float] = (-0.14, 0.08)
+    angle_range: tuple[float, float] = (-0.12, 0.065)
     top_margin: float = 0.01
-    trusted_price: float = 2.0
+    trusted_price: float = 1.0
     spread: tuple[float, float] = (0.16, 0.25)
     second_steps: tuple[tuple[float, float, float], ...] = (
         (0.0, 1.5, 1.0),
