@@ -1,4 +1,4 @@
-"""Shared objects: the shipped robot and its default gait."""
+"""What tests share: robot, gaits, a short walk, how a mistake is told, and their own setting."""
 
 import signal
 from pathlib import Path
@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.cli.main import main
 from template_control.robot.library import load_robot
 from template_control.slip.gait import gait_at, gait_from_energy
 from template_control.slip.parameters import SlipParameters
@@ -57,6 +58,20 @@ def short_walk():
     robot = tc.load_robot("five-link")
     gait = tc.default_gait(robot)
     return tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=4))
+
+
+@pytest.fixture
+def refused(capfd):
+    """Runs a command that must refuse what it is given; its one line on stderr."""
+
+    def run(arguments):
+        assert main(arguments) == 2
+        captured = capfd.readouterr()
+        assert captured.out == ""
+        (line,) = captured.err.strip().splitlines()
+        return line
+
+    return run
 
 
 @pytest.fixture

@@ -253,17 +253,13 @@ def test_the_data_make_the_figure():
         ("folder.png", "folder.png"),
     ],
 )
-def test_a_bad_output_is_one_line(output, culprit, tmp_path, monkeypatch, capfd):
+def test_a_bad_output_is_one_line(output, culprit, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     (tmp_path / "folder.png").mkdir()
-    assert main(["automaton", "--output", output]) == 2
-    captured = capfd.readouterr()
-    assert captured.out == ""
-    lines = captured.err.strip().splitlines()
-    assert len(lines) == 1
-    assert culprit in lines[0]
-    assert "give a" in lines[0]
+    line = refused(["automaton", "--output", output])
+    assert culprit in line
+    assert "give a" in line
 
 
 def test_save_raises_the_librarys_own_error(tmp_path):

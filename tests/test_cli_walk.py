@@ -92,14 +92,10 @@ def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
         (["--seed", "-1"], "--seed"),
     ],
 )
-def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, capfd):
+def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
-    assert main(["walk", *arguments]) == 2
-    captured = capfd.readouterr()
-    assert captured.out == ""
-    lines = captured.err.strip().splitlines()
-    assert len(lines) == 1
-    assert culprit in lines[0]
+    line = refused(["walk", *arguments])
+    assert culprit in line
 
 
 def test_a_robot_that_is_not_planar_is_one_line(tmp_path, capfd):

@@ -104,16 +104,12 @@ def test_a_gif_too_long_is_refused(record, tmp_path):
         (["{run}", "--start", "50"], "start 50"),
     ],
 )
-def test_bad_input_is_one_line(arguments, culprit, run_file, tmp_path, monkeypatch, capfd):
+def test_bad_input_is_one_line(arguments, culprit, run_file, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "junk.npz").write_text("junk")
     filled = [a.format(tmp=tmp_path, run=run_file) for a in arguments]
-    assert main(["replay", *filled]) == 2
-    captured = capfd.readouterr()
-    assert captured.out == ""
-    lines = captured.err.strip().splitlines()
-    assert len(lines) == 1
-    assert culprit in lines[0]
+    line = refused(["replay", *filled])
+    assert culprit in line
 
 
 # Server and browser.

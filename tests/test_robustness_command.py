@@ -34,15 +34,12 @@ def test_json_figure_and_resumption(tmp_path, capfd):
     assert {path: path.read_bytes() for path in tmp_path.glob("*.jsonl")} == before
 
 
-def test_a_robot_that_cannot_walk_is_one_line(tmp_path, capfd):
+def test_a_robot_that_cannot_walk_is_one_line(tmp_path, refused):
     weak = tmp_path / "weak.urdf"
     text = robot_path("five-link").read_text()
     weak.write_text(re.sub(r'effort="350[^"]*"', 'effort="40"', text))
     assert weak.read_text() != text
-    assert main(["robustness", "--robot", str(weak), "--output", str(tmp_path / "out")]) == 2
-    captured = capfd.readouterr()
-    assert captured.out == ""
-    (line,) = captured.err.strip().splitlines()
+    line = refused(["robustness", "--robot", str(weak), "--output", str(tmp_path / "out")])
     assert "falls without a disturbance" in line
     assert str(weak) in line
 
@@ -55,12 +52,9 @@ def test_a_robot_that_cannot_walk_is_one_line(tmp_path, capfd):
         (["--output", "/proc/none"], "/proc/none"),
     ],
 )
-def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, capfd):
+def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
-    assert main(["robustness", *arguments]) == 2
-    captured = capfd.readouterr()
-    assert captured.out == ""
-    (line,) = captured.err.strip().splitlines()
+    line = refused(["robustness", *arguments])
     assert culprit in line
     assert not (tmp_path / "runs" / "robustness" / "hexapod").exists()
 

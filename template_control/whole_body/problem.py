@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 ROWS_PER_FOOT = 3
 _FAR = 1e20  # ProxQP's infinity
-_GRID = 2.0**24
+_GRID = 2.0**24  # steps of a torque up to its limit
 
 
 @njit(cache=True)
@@ -148,8 +148,8 @@ def _forward(factor: Array, vector: Array) -> None:
 def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
     """Joint torques [N m] of the QP's solution: tau_max * (L^-T w), kept within tau_max.
 
-    Digits below ProxQP's tolerance are dropped: the last of them depend on where its workspace
-    happens to lie in memory, and a walk near a fall would not be the same twice.
+    Rounded to 2^-24 of tau_max, near ProxQP's tolerance: its last digits depend on where its
+    workspace happens to lie in memory, and a walk near a fall would not be the same twice.
     """
     n = w.shape[0]
     for i in range(n - 1, -1, -1):
