@@ -15,11 +15,11 @@ from rich.console import Console
 from rich.table import Table
 
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.lqr import LqrPlanner
-from template_control.embedding.start import state_at_vlo
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.robot.library import load_robot
-from template_control.slip.gait import gait_at
+from template_control.robot.start import state_at_vlo
+from template_control.slip.gaits.gait import gait_at
 from template_control.slip.parameters import SlipParameters
 
 _WARM_UP = 3  # steps, while the compiled kernels load

@@ -25,16 +25,16 @@ from rich.console import Console
 from rich.table import Column, Table
 from scipy.integrate import solve_ivp
 
-from template_control.slip import controllers
-from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.gait import gait_at
-from template_control.slip.guards import guard
-from template_control.slip.hybrid import Edge, Node
-from template_control.slip.kernel import apply_reset
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.hybrid import Edge, Node
+from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.control import controllers
+from template_control.slip.dynamics.guards import guard
+from template_control.slip.dynamics.kernel import apply_reset
+from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.gait import gait_at
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.stride import run
-from template_control.slip.vocabulary import MapKind, Outcome
 
 try:
     import heyoka
@@ -180,7 +180,9 @@ def mapped(kind: MapKind, case: Case, states: Array) -> Passages:
     ends = np.column_stack((result.advance, result.state))
     if kind is not MapKind.EXACT:
         return np.empty(0), ends
-    strides = [run(_P, STRIDE_START[case.stride], _start(z), case.controls) for z in states]
+    strides = [
+        simulate_stride(_P, STRIDE_START[case.stride], _start(z), case.controls) for z in states
+    ]
     return np.array([[e.time for e in stride.events] for stride in strides]), ends
 
 

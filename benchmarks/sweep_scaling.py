@@ -29,11 +29,11 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.slip.gait import gait_at
+from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.gaits.gait import gait_at
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.vocabulary import Outcome
-from template_control.sweep import grid, sweep
+from template_control.sweep.sweep import grid, sweep
 
 try:
     import distributed

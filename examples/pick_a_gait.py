@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 import template_control as tc
-from template_control.slip.basin import margin, steps_to_fall, vlo_state
-from template_control.slip.branch import BranchPoint
-from template_control.slip.gait_branch import Family
-from template_control.slip.stability import Kind
+from template_control.slip.gaits.basin import margin, steps_to_fall, vlo_state
+from template_control.slip.gaits.branch import BranchPoint
+from template_control.slip.gaits.gait_branch import Family
+from template_control.slip.gaits.stability import Kind
 from template_control.view.stability_figures import basin_figure
 
 HEIGHT, STIFFNESS = 0.9818, 16.5e3

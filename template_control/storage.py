@@ -61,3 +61,21 @@ def load(record_type: Callable[..., T], path: str | Path, kind: str) -> T:
         raise RecordError(f"there is no run at {path}: give a run.npz") from None
     except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile):
         raise RecordError(f"{path} is no recorded run: give a run.npz of this library") from None
+
+
+def writable(folder: Path) -> Path:
+    """The folder, made if need be.
+
+    Raises:
+        RecordError: if nothing can be written there.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".write-probe"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise RecordError(
+            f"cannot write to {folder}: {error.strerror}; give another --output"
+        ) from None
+    return folder

@@ -9,7 +9,7 @@ import pytest
 import template_control as tc
 from template_control.cli.main import main
 from template_control.robot.library import load_robot
-from template_control.slip.gait import gait_at, gait_from_energy
+from template_control.slip.gaits.gait import gait_at, gait_from_energy
 from template_control.slip.parameters import SlipParameters
 
 PACKAGE = Path(__file__).parents[1] / "template_control"

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from template_control.slip.gait import gait_at
+from template_control.slip.gaits.gait import gait_at
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.sweep import sweep
+from template_control.sweep.sweep import sweep
 
 P = SlipParameters()
 COUNT = 60

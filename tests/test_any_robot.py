@@ -8,13 +8,13 @@ import pinocchio as pin
 import pytest
 
 from template_control.cli.main import main
-from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.scaling import Scale, default_gait, paper_gait, template_for
 from template_control.errors import RobotError
-from template_control.plant.simulation import SimulationOptions, simulate
 from template_control.robot.five_link import FiveLink, Link
 from template_control.robot.library import ROBOTS, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.run.simulation import SimulationOptions, simulate
 from template_control.slip.parameters import SlipParameters
 
 BOLT_FEET = ("FL_FOOT", "FR_FOOT")

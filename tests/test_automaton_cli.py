@@ -15,9 +15,9 @@ from matplotlib.patches import FancyArrowPatch
 from template_control.cli.automaton import describe, save
 from template_control.cli.main import main
 from template_control.errors import RecordError
-from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.hybrid import Automaton, Edge, Node
-from template_control.slip.vocabulary import Event, Outcome, Phase, Reset, Slot
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.hybrid import Automaton, Edge, Node
+from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
 from template_control.view.automaton_figure import (
     automaton_figure,
     choices,

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from template_control.cli.reproductions.stability import branch
-from template_control.slip.automaton import STRIDE_START
-from template_control.slip.basin import margin, steps_to_fall, velocity_angle, vlo_state
-from template_control.slip.deadbeat import backward_set, controlled_end, inside_share, settles
-from template_control.slip.gait import gait_from_energy, vlo_energy
+from template_control.paper.deadbeat import backward_set, controlled_end, inside_share, settles
+from template_control.paper.stability import branch
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
+from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.basin import margin, steps_to_fall, velocity_angle, vlo_state
+from template_control.slip.gaits.gait import gait_from_energy, vlo_energy
+from template_control.slip.gaits.stability import Kind
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.stability import Kind
-from template_control.slip.stride import run
-from template_control.slip.vocabulary import MapKind, Outcome, Slot
 
 P = SlipParameters()
 K0 = P.leg_stiffness
@@ -66,7 +66,7 @@ def test_deadbeat_set_and_what_the_maps_make_of_it(paper_gait):
     found = backward_set(paper_gait, counts=(20, 120))
     assert len(found.state) > 200
     for z, u in zip(found.state[::20], found.controls[::20], strict=True):
-        stride = run(P, STRIDE_START["w"], [0.0, z[1], z[0], z[2]], u)
+        stride = simulate_stride(P, STRIDE_START["w"], [0.0, z[1], z[0], z[2]], u)
         np.testing.assert_allclose(stride.state[[2, 1, 3]], paper_gait.vlo, atol=1e-7)
         assert 0.5 * K0 <= u[Slot.K_SD] <= 1.5 * K0
         assert u[Slot.K_SC] == K0

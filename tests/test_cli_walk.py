@@ -11,8 +11,8 @@ import pytest
 from template_control.cli import walk
 from template_control.cli.main import main
 from template_control.errors import RecordError
-from template_control.plant.record import Record
 from template_control.robot.library import robot_path
+from template_control.run.record import Record
 from template_control.view.figures import FIGURES, save_figures
 
 KEYS = {

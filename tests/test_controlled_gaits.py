@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from template_control.cli.reproductions.stability import branch
 from template_control.errors import ParameterError
-from template_control.slip.branch import Special
-from template_control.slip.controlled_branch import ControlledFamily, controlled_fixed_point
-from template_control.slip.controllers import ActiveRunning, ModifiedWalking
+from template_control.paper.stability import branch
+from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome
+from template_control.slip.control.controllers import ActiveRunning, ModifiedWalking
+from template_control.slip.control.section_target import section_target, targeted
+from template_control.slip.dynamics.stride import controls
+from template_control.slip.gaits.branch import Special
+from template_control.slip.gaits.controlled_branch import ControlledFamily, controlled_fixed_point
+from template_control.slip.gaits.stability import Kind
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.section_target import section_target, targeted
-from template_control.slip.stability import Kind
-from template_control.slip.stride import controls
-from template_control.slip.vocabulary import Event, MapKind, Outcome
 
 P = SlipParameters()
 K0 = P.leg_stiffness

@@ -5,19 +5,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.cli.reproductions import transitions
 from template_control.errors import ParameterError
-from template_control.slip.controllers import (
+from template_control.paper import transitions
+from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
+from template_control.slip.control.controllers import (
     ActiveRunning,
     ActiveWalking,
     ModifiedWalking,
     RunToWalk,
     WalkToRun,
 )
+from template_control.slip.dynamics.stride import controls
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.stride import controls
-from template_control.slip.vocabulary import MapKind, Outcome, Slot
 
 P = SlipParameters()
 CLOSED = [MapKind.PAPER, MapKind.IMPROVED]

@@ -14,8 +14,8 @@ import pytest
 from sweep_work import COUNT, P, alive, drawn, kept, logged, quietly, wait_until, walking_step
 
 from template_control.errors import SweepError
-from template_control.sweep import grid
-from template_control.sweep_file import plain
+from template_control.sweep.file import plain
+from template_control.sweep.sweep import grid
 
 
 def fatal(x):

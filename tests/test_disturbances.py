@@ -5,14 +5,14 @@ import pybullet
 import pytest
 
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.lqr import LqrPlanner
-from template_control.embedding.start import state_at_vlo
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ground import GroundStep
-from template_control.plant.record import Record
-from template_control.plant.sensing import SensorOptions, Sensors
-from template_control.plant.simulation import SimulationOptions, simulate
+from template_control.robot.start import state_at_vlo
+from template_control.run.record import Record
+from template_control.run.sensing import SensorOptions, Sensors
+from template_control.run.simulation import SimulationOptions, simulate
 from template_control.view.figures import stick_diagram
 
 

@@ -9,21 +9,23 @@ from template_control.embedding.guards import Sensed, fired
 from template_control.embedding.load import LoadEstimate, LoadOptions
 from template_control.embedding.plan import at_phase, chain, sample
 from template_control.embedding.references import leg_forces
-from template_control.embedding.start import state_at_vlo
 from template_control.errors import GaitError, RobotError
-from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.gait import gait_for_speed, gait_from_energy
+from template_control.robot.start import state_at_vlo
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.gaits.gait import gait_for_speed, gait_from_energy
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.stride import controls, run
-from template_control.slip.vocabulary import Event
 
 P = SlipParameters()
 
 
 def test_chained_plan_is_continuous_and_knows_its_events(gait):
     u = gait.controls
-    first = run(P, STRIDE_START["w"], [2.0, gait.vlo[1], gait.vlo[0], 0.0], u, (2.0, 0.0))
-    second = run(P, first.node, first.state, u, tuple(first.toes))
+    first = simulate_stride(
+        P, STRIDE_START["w"], [2.0, gait.vlo[1], gait.vlo[0], 0.0], u, (2.0, 0.0)
+    )
+    second = simulate_stride(P, first.node, first.state, u, tuple(first.toes))
     plan = chain([first, second])
     times = np.linspace(0.0, plan.duration - 1e-6, 400)
     states = np.empty((400, 6))
@@ -41,7 +43,7 @@ def test_chained_plan_is_continuous_and_knows_its_events(gait):
 def test_phase_look_up_inverts_the_path(time, scale):
     gait = gait_for_speed(P, 1.2)
     u = gait.controls
-    plan = chain([run(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)])
+    plan = chain([simulate_stride(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)])
     state, found = np.empty(6), np.empty(6)
     sample(plan.cx, plan.cy, plan.meta, time, state)
     # A robot on the same ray from the foot, a little nearer or farther, is in the same phase.
@@ -54,7 +56,7 @@ def test_phase_look_up_inverts_the_path(time, scale):
 
 def test_template_forces_accelerate_the_template(gait):
     u = gait.controls
-    stride = run(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)
+    stride = simulate_stride(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)
     forces = np.empty((2, 2))
     for row in stride.meta:
         t = row[0] + 0.5 * row[1]
@@ -126,7 +128,7 @@ def test_gaits_by_speed_and_impossible_ones():
 
 
 def test_events_lead_where_the_automaton_says(gait):
-    stride = run(
+    stride = simulate_stride(
         P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], controls(1.15, 1.6e4, 1.7e4)
     )
     for event in stride.events:

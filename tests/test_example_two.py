@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from template_control.cli.reproductions.example_two import (
+from template_control.embedding.guards import Sensed, fired
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.paper.example_two import (
     EARLIER,
     PLANNERS,
     PLANTS,
@@ -13,16 +16,13 @@ from template_control.cli.reproductions.example_two import (
     start_state,
     template_walk,
 )
-from template_control.embedding.guards import Sensed, fired
-from template_control.embedding.lqr import LqrPlanner
-from template_control.embedding.options import EmbeddingOptions
+from template_control.paper.example_two_figures import beginning, liftoff
 from template_control.plant.ideal import IdealOptions
-from template_control.plant.simulation import SimulationOptions, simulate
 from template_control.robot.library import load_robot
-from template_control.slip.gait import gait_from_energy
+from template_control.run.simulation import SimulationOptions, simulate
+from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.gaits.gait import gait_from_energy
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.vocabulary import Event
-from template_control.view.example_two_figures import beginning, liftoff
 
 GAIT = gait_from_energy(SlipParameters(), 0.9818, 826.0)
 

@@ -4,15 +4,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from template_control.embedding.lqr import LqrPlanner
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.start import state_at_vlo
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.plant import open_plant, plant_name
-from template_control.plant.record import Record
-from template_control.plant.simulation import Push, SimulationOptions, simulate
+from template_control.robot.start import state_at_vlo
+from template_control.run.record import Record
+from template_control.run.simulation import Push, SimulationOptions, simulate
 
 NOTHING = np.zeros(4)
 
@@ -226,7 +226,7 @@ def test_agrees_with_pybullet_over_a_short_stance(robot):
 @pytest.fixture(scope="module")
 def record():
     from template_control.robot.library import load_robot
-    from template_control.slip.gait import gait_at
+    from template_control.slip.gaits.gait import gait_at
     from template_control.slip.parameters import SlipParameters
 
     gait = gait_at(SlipParameters(), np.radians(66.0), 1.1)

@@ -8,16 +8,16 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from template_control.embedding.guards import Sensed
-from template_control.embedding.lqr import LqrPlanner
-from template_control.embedding.modified import ModifiedPlanner
 from template_control.embedding.momentum_trim import MomentumTrim, TrimOptions, uncontrolled
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.embedding.step_planning import ReplanOptions, StepPlanning
-from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.gait import gait_at, gait_for_speed, vlo_energy, vlo_jacobians
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
+from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.gait import gait_at, gait_for_speed, vlo_energy, vlo_jacobians
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.stride import run
-from template_control.slip.vocabulary import Event, Outcome, Slot
 
 P = SlipParameters()
 
@@ -110,7 +110,7 @@ def test_overdue_ground_keeps_the_template_in_single_stance():
     touchdown = planning.path.touchdown
     assert not planning.overdue(node, touchdown + 0.009)
     assert planning.overdue(node, touchdown + 0.011)
-    stride = run(P, node.name, sensed.state, planning.steps[0].decision.controls)
+    stride = simulate_stride(P, node.name, sensed.state, planning.steps[0].decision.controls)
     sensed.state[:] = stride.sample(touchdown - 1e-6)[0][:4]
     planning.reach_on(node, sensed, touchdown)
     assert planning.reaching
@@ -142,7 +142,7 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(later, f
     planning.decide(node, sensed, 0.0, 1.0, 0.0)
     u = planning.steps[0].decision.controls
     z = gait.vlo + [faster, higher, 0.0]
-    disturbed = run(P, node.name, [0.0, z[1], z[0], z[2]], u)
+    disturbed = simulate_stride(P, node.name, [0.0, z[1], z[0], z[2]], u)
     assume(later < disturbed.time_of(Event.TOUCHDOWN))
     sensed.state[:] = disturbed.sample(later)[0][:4]
     change = ReplanOptions().agility * (planning.path.touchdown - later) ** 2

@@ -8,7 +8,7 @@ from matplotlib.image import imread
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.slip.gait import vlo_energy
+from template_control.slip.gaits.gait import vlo_energy
 from template_control.view.figures import FIGURES
 from template_control.view.state_figures import phase_portrait, template_energies, vlo_states
 

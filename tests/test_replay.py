@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.view.playback import footholds, force_arrows, playback, spring, template_legs
-from template_control.view.replay_scene import scene_commands
-from template_control.view.robot_visuals import load_visuals, placements
+from template_control.view.replay.playback import (
+    footholds,
+    force_arrows,
+    playback,
+    spring,
+    template_legs,
+)
+from template_control.view.replay.replay_scene import scene_commands
+from template_control.view.replay.robot_visuals import load_visuals, placements
 
 FOOT_RADIUS = 0.01
 

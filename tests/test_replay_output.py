@@ -14,8 +14,8 @@ from PIL import Image
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.view.film import write_film
-from template_control.view.playback import playback
+from template_control.view.replay.film import write_film
+from template_control.view.replay.playback import playback
 
 
 @pytest.fixture

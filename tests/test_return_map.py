@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton import STRIDE_START
-from template_control.slip.error_study import Grid, study
-from template_control.slip.gait import gait_at, vlo_energy
+from template_control.paper.error_study import Grid, study
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, sample
+from template_control.slip.dynamics.stance_map import axial_torsional, harmonic, momentum_changes
+from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.gaits.gait import gait_at, vlo_energy
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.path import COEFFICIENTS, STANCE, sample
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.stance_map import axial_torsional, harmonic, momentum_changes
-from template_control.slip.stride import controls, run
-from template_control.slip.vocabulary import MapKind, Outcome
 
 P = SlipParameters()
 K0 = P.leg_stiffness
@@ -108,7 +108,9 @@ def test_exact_and_improved_maps_conserve_energy(z):
 
 
 def test_a_passive_symmetric_step_is_its_own_mirror_image(gait):
-    stride = run(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], gait.controls)
+    stride = simulate_stride(
+        P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], gait.controls
+    )
     t = np.linspace(0.0, stride.duration, 101)
     there, back = stride.sample(t), stride.sample(stride.duration - t)
     np.testing.assert_allclose(there[:, 1:3], back[:, 1:3], atol=1e-8)  # y, dx/dt
@@ -125,7 +127,7 @@ def test_composed_maps_equal_a_simulation_on_through_sections():
     for stride, u in plan:
         mapped = ReturnMap(P, stride)(z, u)
         before = state[0]
-        simulated = run(P, STRIDE_START[stride], state, u, (state[0], state[0]))
+        simulated = simulate_stride(P, STRIDE_START[stride], state, u, (state[0], state[0]))
         assert mapped.outcome == simulated.outcome == Outcome.SECTION
         state, z = simulated.state, mapped.state
         np.testing.assert_allclose(state[[2, 1, 3]][: len(z)], z, rtol=1e-10, atol=1e-10)

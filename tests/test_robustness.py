@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from template_control.cli import robustness as command
-from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.scaling import default_gait
 from template_control.errors import ParameterError, RobotError, SweepError
-from template_control.plant import robustness
-from template_control.plant.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
-from template_control.plant.robustness import Finding, Level, measure, off_gait, trial
-from template_control.plant.simulation import SimulationOptions, simulate
 from template_control.robot.library import load_robot
+from template_control.robustness import campaign as robustness
+from template_control.robustness.campaign import Finding, Level, measure, off_gait, trial
+from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
+from template_control.run.simulation import SimulationOptions, simulate
 from template_control.slip.parameters import SlipParameters
 from template_control.view.robustness_figure import robustness_figure
 

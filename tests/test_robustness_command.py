@@ -9,8 +9,8 @@ import pytest
 
 from template_control.cli import robustness as command
 from template_control.cli.main import build_parser, main
-from template_control.plant.disturbances import DISTURBANCES
 from template_control.robot.library import robot_path
+from template_control.robustness.disturbances import DISTURBANCES
 
 DOCS = Path(__file__).parents[1] / "docs"
 

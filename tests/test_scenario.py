@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from template_control.cli.main import main
-from template_control.cli.reproductions import REPRODUCTIONS
-from template_control.cli.reproductions.example_one import summary
 from template_control.errors import RecordError, ScenarioError
-from template_control.slip.scenario import Scenario, Segment, example_one, load_scenario
-from template_control.slip.scenario_record import ScenarioRecord
-from template_control.slip.scenario_run import simulate_scenario
-from template_control.slip.vocabulary import MapKind
+from template_control.paper import REPRODUCTIONS
+from template_control.paper.example_one import summary
+from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.scenario.record import ScenarioRecord
+from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.scenario import Scenario, Segment, example_one, load_scenario
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "example_one.toml"
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.tables import TABLES
-from template_control.slip.vocabulary import Event, Outcome, Phase, Reset
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.tables import TABLES
+from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset
 
 
 def path(start, events):

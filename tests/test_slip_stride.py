@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton import STRIDE_START
-from template_control.slip.gait import gait_at, gait_from_energy
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import Event, Outcome
+from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.gaits.gait import gait_at, gait_from_energy
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.stride import controls, run
-from template_control.slip.vocabulary import Event, Outcome
 
 P = SlipParameters()
 ALPHA = np.radians(66.0)
@@ -67,7 +67,7 @@ def walk_by_scipy(state, alpha, k1, k2):
 
 @pytest.mark.parametrize("k2", [16.5e3, 17.5e3])
 def test_step_agrees_with_dop853(k2):
-    stride = run(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, k2))
+    stride = simulate_stride(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, k2))
     times, state = walk_by_scipy(START, ALPHA, 16.5e3, k2)
     assert stride.completed
     np.testing.assert_allclose([e.time for e in stride.events], times, rtol=0, atol=1e-9)
@@ -89,7 +89,7 @@ def energy(sample, toes, stiffness):
 )
 @settings(max_examples=30, deadline=None)
 def test_passive_step_conserves_energy(speed, height, vertical):
-    stride = run(
+    stride = simulate_stride(
         P, STRIDE_START["w"], [0.0, height, speed, vertical], controls(ALPHA, 16.5e3, 16.5e3)
     )
     values = []
@@ -100,7 +100,7 @@ def test_passive_step_conserves_energy(speed, height, vertical):
 
 
 def test_events_lie_on_their_guards():
-    stride = run(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, 17.0e3))
+    stride = simulate_stride(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, 17.0e3))
     states = {e.event: e.state for e in stride.events}
     toe = stride.toes[0]
     assert states[Event.TOUCHDOWN][1] == pytest.approx(np.sin(ALPHA), abs=1e-12)
@@ -112,14 +112,14 @@ def test_events_lie_on_their_guards():
 
 
 def test_path_is_smooth_over_segments():
-    stride = run(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, 16.5e3))
+    stride = simulate_stride(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, 16.5e3))
     joints = stride.meta[1:, 0]
     before, after = stride.sample(joints - 1e-9), stride.sample(joints + 1e-9)
     np.testing.assert_allclose(before[:, :4], after[:, :4], atol=1e-7)
 
 
 def test_derivatives_of_the_path_are_consistent():
-    stride = run(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, 16.5e3))
+    stride = simulate_stride(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, 16.5e3))
     t, h = np.array([0.05, 0.23, 0.3, 0.45]), 1e-5
     numeric = (stride.sample(t + h)[:, :4] - stride.sample(t - h)[:, :4]) / (2 * h)
     np.testing.assert_allclose(numeric, stride.sample(t)[:, 2:], atol=1e-5)
@@ -135,7 +135,7 @@ def test_derivatives_of_the_path_are_consistent():
     ],
 )
 def test_failures_are_values(state, alpha, k, outcome):
-    stride = run(P, STRIDE_START["w"], state, controls(alpha, k, k))
+    stride = simulate_stride(P, STRIDE_START["w"], state, controls(alpha, k, k))
     assert stride.outcome is outcome
     assert not stride.completed
     assert np.all(np.isfinite(stride.state))
@@ -143,7 +143,7 @@ def test_failures_are_values(state, alpha, k, outcome):
 
 def test_guard_that_starts_at_zero_does_not_fire():
     # Touchdown happens with the front leg exactly at rest length.
-    stride = run(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, 16.5e3))
+    stride = simulate_stride(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, 16.5e3))
     assert [e.event for e in stride.events] == [
         Event.TOUCHDOWN,
         Event.VIRTUAL_BOTTOM,
@@ -154,7 +154,7 @@ def test_guard_that_starts_at_zero_does_not_fire():
 
 def test_running_stride_runs_on_the_same_kernel():
     u = controls(np.radians(68.0), 25e3, 25e3)
-    stride = run(P, STRIDE_START["r"], [0.0, 1.0, 3.0, 0.0], u)
+    stride = simulate_stride(P, STRIDE_START["r"], [0.0, 1.0, 3.0, 0.0], u)
     assert stride.completed
     assert [e.event for e in stride.events] == [
         Event.TOUCHDOWN,
@@ -172,7 +172,9 @@ def test_gait_returns_to_itself_and_is_symmetric():
     z, outcome = ReturnMap(P).step(gait.vlo, gait.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(z, gait.vlo, atol=1e-8)
-    stride = run(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], gait.controls)
+    stride = simulate_stride(
+        P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], gait.controls
+    )
     t = np.linspace(0.0, stride.duration, 41)
     forth, back = stride.sample(t), stride.sample(stride.duration - t)
     np.testing.assert_allclose(forth[:, 0], stride.state[0] - back[:, 0], atol=1e-8)
@@ -188,7 +190,7 @@ def test_papers_equilibrium_exists():
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_nan_never_enters(bad):
     with pytest.raises(ParameterError, match="finite"):
-        run(P, STRIDE_START["w"], [0.0, bad, 1.0, 0.0], controls(ALPHA, 16.5e3, 16.5e3))
+        simulate_stride(P, STRIDE_START["w"], [0.0, bad, 1.0, 0.0], controls(ALPHA, 16.5e3, 16.5e3))
     with pytest.raises(ParameterError, match="finite"):
         controls(ALPHA, bad, 16.5e3)
     with pytest.raises(ParameterError, match="mass"):

@@ -7,15 +7,15 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from template_control.cli.main import main
-from template_control.cli.reproductions.stability import branch, lower_limit
 from template_control.errors import GaitError, ParameterError
-from template_control.slip.branch import Special
-from template_control.slip.gait import vlo_energy
-from template_control.slip.gait_branch import Family
+from template_control.paper.stability import branch, lower_limit
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
+from template_control.slip.gaits.branch import Special
+from template_control.slip.gaits.gait import vlo_energy
+from template_control.slip.gaits.gait_branch import Family
+from template_control.slip.gaits.stability import Kind, classify, closed_loop_eigenvalues
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.stability import Kind, classify, closed_loop_eigenvalues
-from template_control.slip.vocabulary import NUM_SLOTS, Outcome
 
 P = SlipParameters()
 K0 = P.leg_stiffness

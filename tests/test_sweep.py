@@ -12,16 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sweep_work import P, drawn, fragile, other, quietly, square, walking_step
 
-from template_control.embedding.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import SweepError
-from template_control.plant.simulation import SimulationOptions, simulate
 from template_control.robot.library import load_robot
-from template_control.slip.gait import gait_at
-from template_control.slip.scenario import Segment, example_one
-from template_control.slip.scenario_run import simulate_scenario
-from template_control.slip.vocabulary import MapKind, Outcome
-from template_control.sweep import grid, item_seed, sample, sweep
-from template_control.sweep_file import plain
+from template_control.run.simulation import SimulationOptions, simulate
+from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.gaits.gait import gait_at
+from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.scenario import Segment, example_one
+from template_control.sweep.file import plain
+from template_control.sweep.sweep import grid, item_seed, sample, sweep
 
 
 def short_scenario(speed, kind):

@@ -31,8 +31,8 @@ from sweep_work import (
 )
 
 from template_control.errors import SweepError
-from template_control.sweep import grid
-from template_control.sweep_file import plain
+from template_control.sweep.file import plain
+from template_control.sweep.sweep import grid
 
 
 def deadly(x):
@@ -100,7 +100,7 @@ def test_numpy_and_not_finite_numbers_survive_the_file(tmp_path):
 
 KILLED = """
 from concurrent.futures import ProcessPoolExecutor
-from template_control.sweep import grid, sweep
+from template_control.sweep.sweep import grid, sweep
 from sweep_work import COUNT, logged
 sweep(logged, grid(x=range(COUNT)), {path!r}, {executor}, seed=1, progress=False)
 """

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.lqr import LqrPlanner
-from template_control.embedding.modified import ModifiedPlanner
 from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.disturbances import Situation
 from template_control.plant.ground import GroundStep
-from template_control.plant.record import Record
-from template_control.plant.robustness import off_gait
-from template_control.plant.simulation import Push, SimulationOptions, perturbed_start, simulate
-from template_control.plant.summary import summarise
 from template_control.robot.library import load_robot
-from template_control.slip.gait import gait_at, gait_for_speed, gait_from_energy
+from template_control.robustness.campaign import off_gait
+from template_control.robustness.disturbances import Situation
+from template_control.run.record import Record
+from template_control.run.simulation import Push, SimulationOptions, perturbed_start, simulate
+from template_control.run.summary import summarise
+from template_control.slip.gaits.gait import gait_at, gait_for_speed, gait_from_energy
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()

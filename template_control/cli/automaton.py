@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.table import Table
 
 from template_control.errors import ParameterError, RecordError
-from template_control.slip.automaton import AUTOMATON
-from template_control.slip.hybrid import Automaton, Edge, Node
-from template_control.slip.vocabulary import Outcome, Reset, Slot
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton, Edge, Node
+from template_control.slip.automaton.vocabulary import Outcome, Reset, Slot
 from template_control.view.automaton_figure import (
     GAIT_NAMES,
     automaton_figure,
@@ -90,7 +90,7 @@ def describe(automaton: Automaton) -> dict[str, Any]:
     """The whole automaton in JSON's types: its nodes in order, each with its edges in order.
 
     Phases, slots, events, resets and outcomes go by their names in
-    :mod:`template_control.slip.vocabulary`. An edge has either a ``target`` or a ``failure``.
+    ``vocabulary``. An edge has either a ``target`` or a ``failure``.
     """
     return {"nodes": [_describe_node(node) for node in automaton.nodes]}
 

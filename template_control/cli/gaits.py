@@ -16,17 +16,17 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from template_control.cli.output import writable
 from template_control.errors import ParameterError
-from template_control.slip.branch import QUANTITIES, BranchPoint
-from template_control.slip.controlled_branch import ControlledFamily
-from template_control.slip.controllers import ActiveRunning, ModifiedWalking
-from template_control.slip.gait_branch import Family
+from template_control.slip.automaton.vocabulary import Event, MapKind
+from template_control.slip.control.controllers import ActiveRunning, ModifiedWalking
+from template_control.slip.control.section_target import VARIED, section_target, targeted
+from template_control.slip.dynamics.stride import controls
+from template_control.slip.gaits.branch import QUANTITIES, BranchPoint
+from template_control.slip.gaits.controlled_branch import ControlledFamily
+from template_control.slip.gaits.gait_branch import Family
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.return_map import ReturnMap
-from template_control.slip.section_target import VARIED, section_target, targeted
-from template_control.slip.stride import controls
-from template_control.slip.vocabulary import Event, MapKind
+from template_control.storage import writable
 from template_control.view.stability_figures import UNITS, branch_figure
 
 Array = NDArray[np.float64]

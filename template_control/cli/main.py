@@ -11,13 +11,14 @@ from template_control.cli import (
     gaits,
     plots,
     replay,
-    reproduce,
     robots,
     robustness,
     slip,
     walk,
 )
+from template_control.cli.output import INTERRUPTED
 from template_control.errors import TemplateControlError
+from template_control.paper import command as reproduce
 
 _COMMANDS = (walk, robots, replay, plots, robustness, slip, gaits, automaton, reproduce)
 _USER_ERROR = 2
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _USER_ERROR
     except KeyboardInterrupt:
         print("template-control: interrupted before anything was done", file=sys.stderr)
-        return walk.INTERRUPTED
+        return INTERRUPTED
 
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from template_control.cli.output import writable
-from template_control.plant.record import Record
+from template_control.run.record import Record
+from template_control.storage import writable
 from template_control.view.figures import save_figures
 
 

@@ -10,8 +10,8 @@ from typing import Any
 from rich.console import Console
 
 from template_control.errors import ParameterError
-from template_control.plant.record import Record
-from template_control.view.replay import GIF_FPS, GIF_SECONDS, replay, save_film, save_html
+from template_control.run.record import Record
+from template_control.view.replay.replay import GIF_FPS, GIF_SECONDS, replay, save_film, save_html
 
 
 def add_parser(commands: Any) -> None:

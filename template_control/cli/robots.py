@@ -12,7 +12,7 @@ from rich.table import Table
 
 from template_control.embedding.scaling import default_gait
 from template_control.robot.library import ROBOTS, load_robot
-from template_control.slip.vocabulary import Slot
+from template_control.slip.automaton.vocabulary import Slot
 
 
 def add_parser(commands: Any) -> None:

@@ -13,15 +13,15 @@ import matplotlib as mpl
 from rich.console import Console
 from rich.table import Table
 
-from template_control.cli.output import writable
+from template_control.cli.output import INTERRUPTED
 from template_control.cli.robot_options import add_robot
-from template_control.cli.walk import INTERRUPTED
 from template_control.errors import ParameterError, RecordError
-from template_control.plant.disturbances import AFTER, DISTURBANCES
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.plant.robustness import SETTLED, Finding, Robustness, measure
 from template_control.robot.library import load_robot
-from template_control.sweep_executor import worker_processes
+from template_control.robustness.campaign import SETTLED, Finding, Robustness, measure
+from template_control.robustness.disturbances import AFTER, DISTURBANCES
+from template_control.storage import writable
+from template_control.sweep.executor import worker_processes
 from template_control.view.robustness_figure import robustness_figure
 
 _NAMES = tuple(d.name for d in DISTURBANCES)

@@ -13,11 +13,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from template_control.cli.output import writable
-from template_control.slip.scenario import load_scenario
-from template_control.slip.scenario_record import ScenarioRecord
-from template_control.slip.scenario_run import simulate_scenario
-from template_control.slip.vocabulary import MapKind
+from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.scenario.record import ScenarioRecord
+from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.scenario import load_scenario
+from template_control.storage import writable
 from template_control.view.scenario_figures import save_scenario_figures
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}

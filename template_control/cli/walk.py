@@ -11,26 +11,26 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from template_control.cli.output import progress_bar, writable
+from template_control.cli.output import INTERRUPTED, progress_bar
 from template_control.cli.robot_options import add_robot_options, robot_from
-from template_control.embedding.lqr import LqrPlanner
-from template_control.embedding.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planner import Planner
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
+from template_control.embedding.planners.planner import Planner
 from template_control.embedding.scaling import default_gait, paper_gait, template_for
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.plant.record import Record
-from template_control.plant.simulation import SimulationOptions, perturbed_start, simulate
-from template_control.plant.summary import summarise
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.gait import WalkingGait, gait_for_speed
-from template_control.slip.vocabulary import MapKind
+from template_control.run.record import Record
+from template_control.run.simulation import SimulationOptions, perturbed_start, simulate
+from template_control.run.summary import summarise
+from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.gaits.gait import WalkingGait, gait_for_speed
+from template_control.storage import writable
 from template_control.view.figures import save_figures
 
-INTERRUPTED = 130  # exit status after Ctrl-C, as shells have it
 _CONE_MARGIN = 0.9  # the controller trusts this share of the friction
 _LONG = 200  # steps beyond which samples are thinned
 

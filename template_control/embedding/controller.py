@@ -21,15 +21,15 @@ from template_control.embedding.load import LoadEstimate
 from template_control.embedding.momentum_trim import MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.plan import at_phase
-from template_control.embedding.planner import Planner
+from template_control.embedding.planners.planner import Planner
 from template_control.embedding.references import leg_forces, pd, unloading_cap
 from template_control.embedding.scaling import Scale
 from template_control.embedding.step_planning import VLO_STATE, StepPlanning, StepReport
 from template_control.embedding.swing_foot import SwingFoot
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.hybrid import Node
-from template_control.slip.vocabulary import Phase, Reset
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.hybrid import Node
+from template_control.slip.automaton.vocabulary import Phase, Reset
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.tasks import Row, TaskStack
 

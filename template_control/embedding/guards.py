@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.guards import guard
-from template_control.slip.vocabulary import Event
+from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.dynamics.guards import guard
 
 Array = NDArray[np.float64]
 

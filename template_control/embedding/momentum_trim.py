@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.plan import Plan
-from template_control.slip.gait import WalkingGait, vlo_jacobians
+from template_control.slip.gaits.gait import WalkingGait, vlo_jacobians
 
 Array = NDArray[np.float64]
 

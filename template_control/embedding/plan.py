@@ -14,9 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.stride import Stride
-from template_control.slip.taylor import ORDER
-from template_control.slip.vocabulary import Event, Outcome
+from template_control.slip.automaton.vocabulary import Event, Outcome
+from template_control.slip.dynamics.stride import Stride
+from template_control.slip.dynamics.taylor import ORDER
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class Plan:
 
     Attributes:
         cx, cy, meta: the segments' polynomials, times, nodes, toes and stiffnesses (see
-            :class:`~template_control.slip.stride.Stride`).
+            :class:`~template_control.slip.dynamics.stride.Stride`).
         touchdown, liftoff, vlo: times of the next such events [s], inf if there is none.
         foothold: x of the next toe [m].
         front_toe: x of the front toe at the start [m].

@@ -15,7 +15,7 @@ from template_control.embedding.step_planning import ReplanOptions
 from template_control.embedding.swing_foot import SwingOptions
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
-from template_control.slip.gait import WalkingGait, gait_at, gait_from_energy
+from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
 from template_control.slip.parameters import SlipParameters
 from template_control.whole_body.tasks import Gains, Weights
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from template_control.embedding.guards import Sensed
 from template_control.embedding.plan import Plan, chain
-from template_control.embedding.planner import Decision, Planner
-from template_control.slip.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.hybrid import Node
-from template_control.slip.kernel import new_scratch
-from template_control.slip.stride import run
-from template_control.slip.vocabulary import Event, Slot
+from template_control.embedding.planners.planner import Decision, Planner
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.hybrid import Node
+from template_control.slip.automaton.vocabulary import Event, Slot
+from template_control.slip.dynamics.kernel import new_scratch
+from template_control.slip.dynamics.stride import simulate_stride
 
 Array = NDArray[np.float64]
 
@@ -157,13 +157,13 @@ class StepPlanning:
         u = self.steps[-1].decision.controls.copy()
         u[Slot.TOUCHDOWN_ANGLE] -= reach
         self.reaching = reach > 0.0
-        first = run(self.parameters, node.name, state, u, toes, scratch=self._scratch)
+        first = simulate_stride(self.parameters, node.name, state, u, toes, scratch=self._scratch)
         strides = [first]
         if first.completed:
             # The next foothold must be known when the swing begins, before the next VLO.
             ahead = self.planner.decide(first.state[VLO_STATE])
             strides.append(
-                run(
+                simulate_stride(
                     self.parameters,
                     first.node,
                     first.state,
@@ -230,5 +230,5 @@ class StepPlanning:
         u[Slot.K_SD] = u[Slot.K_SC]
         before_vlo = AUTOMATON.node("SS_bv^w").name
         mirrored = [sensed.toes[0] - x, y, dx, -dy]
-        past = run(self.parameters, before_vlo, mirrored, u, scratch=self._scratch)
+        past = simulate_stride(self.parameters, before_vlo, mirrored, u, scratch=self._scratch)
         return past.state[VLO_STATE] * [1.0, 1.0, -1.0] if past.completed else None

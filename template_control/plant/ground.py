@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from template_control.errors import ParameterError
-from template_control.slip.gait import WalkingGait
+from template_control.slip.gaits.gait import WalkingGait
 
 _HIGHEST = 1.0  # [m]
 _FARTHEST = 1000.0  # [m]

@@ -16,8 +16,8 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from template_control.slip.hybrid import Automaton, Edge
-from template_control.slip.vocabulary import Event, Outcome, Phase, Reset
+from template_control.slip.automaton.hybrid import Automaton, Edge
+from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
-from template_control.plant.record import Record
+from template_control.run.record import Record
 from template_control.view.state_figures import (
     energies,
     phase_portrait,

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.slip.scenario_record import ScenarioRecord
-from template_control.slip.vocabulary import Slot
+from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.scenario.record import ScenarioRecord
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.slip.branch import BranchPoint, Special
-from template_control.slip.stability import Kind
+from template_control.slip.gaits.branch import BranchPoint, Special
+from template_control.slip.gaits.stability import Kind
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.plant.record import Record
-from template_control.slip.automaton import AUTOMATON
-from template_control.slip.gait import vlo_energy
+from template_control.run.record import Record
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.gaits.gait import vlo_energy
 from template_control.slip.parameters import SlipParameters
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, shade, window
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from template_control.plant.record import Record
+from template_control.run.record import Record
 
 LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
 WINDOW = 2.2  # [s], about four steps

@@ -1,0 +1,95 @@
+"""The paper's own planner: the modified walking controller once a step at VLO."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.scaling import Scale
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.tables import TABLES
+from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
+from template_control.slip.control.modified_walking import search_angle
+from template_control.slip.dynamics.kernel import new_scratch
+from template_control.slip.dynamics.stride import kernel_model
+from template_control.slip.gaits.gait import WalkingGait
+
+Array = NDArray[np.float64]
+
+_NODE = AUTOMATON.index[STRIDE_START["w"]]
+
+
+@dataclass(frozen=True)
+class ModifiedOptions:
+    """Bounds of the search.
+
+    Attributes:
+        angle_range: touchdown angle relative to the gait's [rad].
+        stiffness_range: kappa_2 over k0.
+        top_margin: alpha stays this far [rad] below asin(y / l0).
+        tolerance: distance from the gait's VLO state, in SI units, that counts as reached; of
+            the reference template, scaled with speeds.
+        map_kind: the return map that steps are tried on.
+    """
+
+    angle_range: tuple[float, float] = (-0.14, 0.08)
+    stiffness_range: tuple[float, float] = (0.5, 1.5)
+    top_margin: float = 0.01
+    tolerance: float = 0.05
+    map_kind: MapKind = MapKind.EXACT
+
+
+class ModifiedPlanner:
+    """kappa_1 = k0, kappa_2 by equation (38), alpha by search on a return map.
+
+    Args:
+        gait: to reach at the next VLO.
+        options: bounds.
+
+    Attributes:
+        offset: zero; the paper's planner learns nothing.
+    """
+
+    def __init__(self, gait: WalkingGait, options: ModifiedOptions | None = None) -> None:
+        self.gait = gait
+        self.options = options or ModifiedOptions()
+        self.offset: Array = np.zeros(3)
+        self._tolerance = self.options.tolerance * Scale.of(gait.parameters).speed
+        self._scratch = new_scratch()
+        self._model = kernel_model(gait.parameters)
+        k0 = gait.parameters.leg_stiffness
+        self._stiffness = np.array(self.options.stiffness_range) * k0
+
+    def decide(self, z: Array, angles: tuple[float, float] = ANY_ANGLE) -> Decision:
+        """Controls for a step from VLO state ``z`` (3,); see :class:`Planner`."""
+        p, o = self.gait.parameters, self.options
+        predicted = np.empty(3)
+        nominal = float(self.gait.controls[Slot.TOUCHDOWN_ANGLE])
+        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
+        high = min(nominal + o.angle_range[1], top, max(angles[1], nominal + o.angle_range[0]))
+        low = min(max(nominal + o.angle_range[0], angles[0]), high)
+        outcome, alpha, kappa_2, residual = search_angle(
+            TABLES,
+            self._model,
+            int(o.map_kind),
+            _NODE,
+            z,
+            self.gait.vlo,
+            min(max(nominal, low), high),
+            np.array([low, high]),
+            p.leg_stiffness,
+            self._stiffness,
+            self._scratch,
+            predicted,
+        )
+        controls = self.gait.controls.copy()
+        controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2
+        feasible = outcome == Outcome.SECTION
+        reached = feasible and residual < self._tolerance**2
+        return Decision(controls, predicted, feasible, feasible, reached)
+
+    def observe(self, decision: Decision, z: Array) -> None:
+        """The paper's planner plans every step afresh."""

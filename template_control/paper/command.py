@@ -1,0 +1,78 @@
+"""``template-control reproduce``: a table or figure of the paper, ours beside it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from rich.console import Console
+from rich.table import Table
+
+from template_control.errors import ParameterError
+from template_control.paper import REPRODUCTIONS
+from template_control.paper.reproduction import Reproduction
+from template_control.storage import writable
+
+_DPI = 110
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command's options."""
+    parser = commands.add_parser(
+        "reproduce",
+        help="reproduce a table or figure of the paper, ours beside the paper's",
+        description="Compute a table or figure of the paper again and print ours beside it.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(REPRODUCTIONS)}")
+    parser.add_argument(
+        "--output", type=Path, default=Path("runs/reproduce"), help="folder for the figures"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the numbers as JSON, and nothing else, on stdout"
+    )
+    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Reproduce what was asked for."""
+    if options.name not in REPRODUCTIONS:
+        raise ParameterError(
+            f"no reproduction {options.name!r}: give one of {', '.join(REPRODUCTIONS)}"
+        )
+    folder = None if options.no_figures else writable(options.output)
+    with Console(stderr=True).status(f"computing {options.name}"):
+        result = REPRODUCTIONS[options.name]()
+    paths = _save(result, folder) if folder is not None else []
+    if options.json:
+        print(json.dumps({"name": options.name, **result.data, "figures": [str(p) for p in paths]}))
+    else:
+        _print(result, paths)
+    return 0
+
+
+def _save(result: Reproduction, folder: Path) -> list[Path]:
+    paths = []
+    with mpl.rc_context({"savefig.dpi": _DPI}):
+        for name, figure in result.figures.items():
+            paths.append(folder / f"{name}.png")
+            figure.savefig(paths[-1])
+    return paths
+
+
+def _print(result: Reproduction, paths: list[Path]) -> None:
+    console = Console()
+    table = Table(title=result.title)
+    for i, column in enumerate(result.columns):
+        table.add_column(column, justify="left" if i < 1 else "right")
+    for row in result.rows:
+        table.add_row(*row)
+    console.print(table)
+    for note in result.notes:
+        console.print(f"- {note}", highlight=False)
+    for path in paths:
+        console.print(f"figure: {path}", highlight=False)

@@ -1,0 +1,106 @@
+"""Fig. 10: Example I, with controllers on each map (Section V-A)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from template_control.paper.reproduction import Reproduction
+from template_control.slip.automaton.vocabulary import MapKind, Slot
+from template_control.slip.scenario.record import ScenarioRecord
+from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.scenario import example_one
+from template_control.view.scenario_figures import energy_figure, scenario_figure
+
+_TOP_SPEED = 5.0
+_PAPER_STIFFNESS = 28.2e3
+_MAPS = (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)
+
+
+def summary(record: ScenarioRecord) -> dict[str, Any]:
+    """Figures of a run of Example I, SI units."""
+    kinds = np.array(record.strides)
+    error = record.section_state[1:, 0] - record.wanted_speed
+    running, walking = kinds == "r", kinds == "w"
+    phases = np.array([record.energy_phase(i) for i in range(len(kinds))])
+    top = np.flatnonzero(running & (record.wanted_speed >= _TOP_SPEED))
+    first = int(np.flatnonzero(kinds != "w")[0])
+    step = record.during(first - 1)
+    walked = record.state[step.stop, 0] - record.state[step.start, 0]
+    last_walk = kinds.size - 1 - int(np.argmax(kinds[::-1] != "w"))
+    return {
+        "completed": record.completed,
+        "strides": kinds.size,
+        "walking_speed_before": float(walked / np.diff(record.section_time)[first - 1]),
+        "speed_error_rms": float(np.sqrt(np.mean(error**2))),
+        "speed_error_rms_running": float(np.sqrt(np.mean(error[running] ** 2))),
+        "speed_error_max": float(np.max(np.abs(error))),
+        "stiffness_at_5": float(np.mean(record.controls[top[-1], [Slot.K_SC, Slot.K_SD]])),
+        "rwt_apex": record.section_state[kinds.tolist().index("rw"), :2].tolist(),
+        "rwt_vlo": record.section_state[kinds.tolist().index("rw") + 1].tolist(),
+        "walking_steps_after": int(kinds.size - 1 - last_walk),
+        "last_vlo": record.section_state[-1].tolist(),
+        "energy_phase_walking": [float(phases[walking].min()), float(phases[walking].max())],
+        "energy_phase_running": [float(phases[running].min()), float(phases[running].max())],
+        "solve_seconds_median": float(np.median(record.solve_seconds)),
+    }
+
+
+def fig10() -> Reproduction:
+    """Example I on the paper's map, and what the maps cost in tracking."""
+    records = {kind: simulate_scenario(example_one(kind)) for kind in _MAPS}
+    data = {kind.name.lower(): summary(record) for kind, record in records.items()}
+
+    def row(name: str, published: str, text: Any) -> tuple[str, ...]:
+        return (name, published, *(text(s) for s in data.values()))
+
+    def state(values: list[float]) -> str:
+        return "  ".join(f"{value:.4f}" for value in values)
+
+    rows = [
+        row("completed", "yes", lambda s: "yes" if s["completed"] else "no"),
+        row("walking speed before [m/s]", "1.17", lambda s: f"{s['walking_speed_before']:.3f}"),
+        row("speed error RMS, all sections [m/s]", "", lambda s: f"{s['speed_error_rms']:.2g}"),
+        row("speed error RMS, running [m/s]", "", lambda s: f"{s['speed_error_rms_running']:.2g}"),
+        row("speed error max [m/s]", "", lambda s: f"{s['speed_error_max']:.2g}"),
+        row(
+            "leg stiffness at 5 m/s [kN/m]",
+            f"{_PAPER_STIFFNESS / 1e3:g}",
+            lambda s: f"{s['stiffness_at_5'] / 1e3:.2f}",
+        ),
+        row("apex before RWT", "1.754  0.9766", lambda s: state(s["rwt_apex"])),
+        row("VLO after RWT", "", lambda s: state(s["rwt_vlo"])),
+        row("walking steps after RWT", "", lambda s: f"{s['walking_steps_after']}"),
+        row(
+            "last VLO (target 1.1  0.98  0)",
+            "1.085  0.9807  -0.018",
+            lambda s: state(s["last_vlo"]),
+        ),
+        row(
+            "energy phase, walking",
+            "out",
+            lambda s: f"{s['energy_phase_walking'][0]:.2f} to {s['energy_phase_walking'][1]:.2f}",
+        ),
+        row(
+            "energy phase, running",
+            "in",
+            lambda s: f"{s['energy_phase_running'][0]:+.2f} to {s['energy_phase_running'][1]:+.2f}",
+        ),
+    ]
+    record = records[MapKind.PAPER]
+    return Reproduction(
+        title="Fig. 10: Example I",
+        columns=("", "paper", *(f"{kind.name.lower()} map" for kind in _MAPS)),
+        rows=rows,
+        data={**data, "published": {"stiffness_at_5": _PAPER_STIFFNESS}},
+        notes=(
+            "The simulation is exact in every column; the columns differ in the map that the"
+            " controllers compute with.",
+            "Energy phase: correlation of forward kinetic and gravitational energy over a"
+            " stride, -1 out of phase, +1 in phase.",
+            "Walking starts at 1.125 m/s at VLO, which is 1.17 m/s on average as Section V-A"
+            " tells it; Table IV's 1.1 m/s would be 1.13 m/s.",
+        ),
+        figures={"fig10": scenario_figure(record), "fig10_energies": energy_figure(record)},
+    )

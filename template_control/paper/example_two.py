@@ -1,0 +1,281 @@
+"""Figs. 12 and 13: Example II, the five-link robot from z_0 to the equilibrium (Section V-B)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
+from template_control.embedding.planners.planner import Planner
+from template_control.embedding.scaling import paper_gait, template_for
+from template_control.paper.example_two_figures import (
+    Liftoff,
+    beginning,
+    liftoff,
+    liftoff_figure,
+    states_figure,
+)
+from template_control.paper.reproduction import Reproduction
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
+from template_control.robot.library import load_robot
+from template_control.run.record import Record
+from template_control.run.simulation import SimulationOptions, simulate
+from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.gaits.basin import velocity_angle, vlo_state
+from template_control.slip.gaits.gait import WalkingGait, vlo_energy
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.view.figures import stick_diagram
+
+Array = NDArray[np.float64]
+
+START = (0.9695, np.radians(1.9), 821.55)  # y, phi (positive downward), E of z_0
+STEPS, LAST = 60, 20
+GRIP = 5.0  # a friction coefficient that never binds
+EARLIER, LATER = np.radians(72.0), np.radians(67.0)  # predefined liftoffs about beta_l = 70 deg
+
+PLANNERS: dict[str, Callable[[WalkingGait], Planner]] = {
+    "LQR": LqrPlanner,
+    **{
+        f"modified, {kind.name.lower()} map": partial(
+            ModifiedPlanner, options=ModifiedOptions(map_kind=kind)
+        )
+        for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)
+    },
+}
+TEMPLATE = "template alone"
+PLANTS: dict[str, tuple[PlantOptions | IdealOptions, EmbeddingOptions]] = {
+    "ideal, full grip": (IdealOptions(), EmbeddingOptions(friction=GRIP)),
+    "ideal": (IdealOptions(), EmbeddingOptions()),
+    "PyBullet": (PlantOptions(), EmbeddingOptions()),
+}
+_LIFTOFFS = {"template's": None, "later": LATER, "earlier": EARLIER}
+_JOINTS = ("lifting hip", "lifting knee", "standing hip", "standing knee")
+
+
+@dataclass(frozen=True)
+class Walk:
+    """VLO states of a walk from z_0.
+
+    Attributes:
+        states: (steps + 1, 3) y [m], phi [rad], E [J].
+        fall: why it ended early, or "".
+    """
+
+    states: Array
+    fall: str
+
+    @property
+    def settled(self) -> tuple[Array, Array] | None:
+        """Mean and standard deviation (3,) over the last steps; None after a fall."""
+        if self.fall:
+            return None
+        last = self.states[-LAST:]
+        return last.mean(axis=0), last.std(axis=0)
+
+
+def _gait() -> WalkingGait:
+    return paper_gait(template_for(load_robot("five-link")))
+
+
+def start_state(gait: WalkingGait) -> tuple[float, float, float]:
+    """z_0 as dx/dt, y, dy/dt."""
+    dx, y, dy = vlo_state(gait.parameters, *START)
+    return float(dx), float(y), float(dy)
+
+
+def sections(gait: WalkingGait, z: Array) -> Array:
+    """y, phi, E (n, 3) of VLO states (n, 3), with the template's formulas."""
+    energy = [vlo_energy(gait.parameters, state) for state in z]
+    return np.column_stack((z[:, 1], velocity_angle(z), energy))
+
+
+def robot_walk(
+    planner: str, plant: str, steps: int = STEPS, beta: float | None = None
+) -> tuple[Walk, Record]:
+    """The robot from z_0; ``beta`` is a predefined liftoff direction [rad]."""
+    gait = _gait()
+    world, tuning = PLANTS[plant]
+    options = SimulationOptions(
+        steps=steps,
+        plant=world,
+        embedding=EmbeddingOptions(friction=tuning.friction, liftoff_angle=beta),
+        start=start_state(gait),
+    )
+    record = simulate(load_robot("five-link"), PLANNERS[planner](gait), options)
+    return Walk(sections(gait, record.vlo_state), record.metadata["fall_reason"]), record
+
+
+def template_walk(planner: str, steps: int = STEPS) -> Walk:
+    """The template itself, integrated exactly, with the planner that the robot has."""
+    gait = _gait()
+    chooses, step = PLANNERS[planner](gait), ReturnMap(gait.parameters)
+    states, fall = [np.array(start_state(gait))], ""
+    for k in range(steps):
+        decision = chooses.decide(states[-1])
+        z, outcome = step.step(states[-1], decision.controls)
+        if outcome is not Outcome.SECTION:
+            fall = f"{outcome.reason}, in step {k + 1}"
+            break
+        chooses.observe(decision, z)
+        states.append(z)
+    return Walk(sections(gait, np.array(states)), fall)
+
+
+def _walk(case: tuple[str, str]) -> Walk:
+    planner, plant = case
+    return template_walk(planner) if plant == TEMPLATE else robot_walk(planner, plant)[0]
+
+
+def _texts(walk: Walk) -> tuple[str, ...]:
+    settled = walk.settled
+    if settled is None:
+        return "", "", "", f"step {len(walk.states)}"
+    mean, spread = settled
+    return (
+        f"{mean[0]:.4f} ± {spread[0]:.4f}",
+        f"{np.degrees(mean[1]):+.2f} ± {np.degrees(spread[1]):.2f}",
+        f"{mean[2]:.2f} ± {spread[2]:.2f}",
+        "",
+    )
+
+
+def _numbers(walk: Walk) -> dict[str, Any]:
+    settled = walk.settled
+    return {
+        "steps": len(walk.states) - 1,
+        "fall": walk.fall or None,
+        "mean": None if settled is None else settled[0].tolist(),
+        "spread": None if settled is None else settled[1].tolist(),
+    }
+
+
+def fig12() -> Reproduction:
+    """From z_0: where the robot settles, by planner and by plant."""
+    plants = (TEMPLATE, *PLANTS)
+    cases = [(planner, plant) for planner in PLANNERS for plant in plants]
+    with ProcessPoolExecutor() as pool:
+        walks = dict(zip(cases, pool.map(_walk, cases), strict=True))
+    _, record = robot_walk("LQR", "PyBullet", steps=6)
+    sticks = stick_diagram(beginning(record, 2.2))
+    sticks.axes[0].set_title("five-link from z_0: LQR, PyBullet")
+    gait = _gait()
+    target = sections(gait, gait.vlo[None])[0]
+    return Reproduction(
+        title="Fig. 12: Example II, last 20 of 60 steps from z_0 = [0.9695 m, 1.9 deg, 821.55 J]",
+        columns=("planner", "plant", "y_v [m]", "phi_v [deg]", "E [J]", "falls in"),
+        rows=[
+            ("paper", "its robot", "0.9818", "0", "826", ""),
+            *((*case, *_texts(walk)) for case, walk in walks.items()),
+        ],
+        data={
+            "target": target.tolist(),
+            "walks": {
+                planner: {plant: _numbers(walks[planner, plant]) for plant in plants}
+                for planner in PLANNERS
+            },
+        },
+        notes=(
+            "Mean ± standard deviation of the VLO states, the robot's in the template's formula"
+            " (dx/dt from the angular momentum about the foot, E with the stance spring); phi_v"
+            " is positive downward. The paper gives no numbers for its robot, only that it"
+            " stabilizes the same equilibrium.",
+            "Template alone is the exact SLIP: its error is the planner's map. On the ideal plant"
+            " (rigid contacts that stick) the error of a robot that is no SLIP is added, in"
+            " PyBullet that of its contacts.",
+            f"Full grip: the controller's friction cone ({EmbeddingOptions().friction:g} otherwise)"
+            " never binds. It makes no difference to speak of: where the template is light on its"
+            " foot near VLO, the swing foot gives way and not the CoM's height.",
+        ),
+        figures={
+            "fig12": sticks,
+            "fig12_states": states_figure(
+                {key: walk.states for key, walk in walks.items()}, tuple(PLANNERS), plants, target
+            ),
+        },
+    )
+
+
+def _liftoffs(case: tuple[str, str]) -> tuple[Liftoff, Record, Walk, Record]:
+    """One step from the equilibrium with a liftoff rule on a plant; and the walk from z_0."""
+    rule, plant = case
+    gait, beta = _gait(), _LIFTOFFS[rule]
+    options = SimulationOptions(
+        steps=2, plant=PLANTS[plant][0], embedding=EmbeddingOptions(liftoff_angle=beta)
+    )
+    record = simulate(load_robot("five-link"), LqrPlanner(gait), options)
+    return liftoff(record), record, *robot_walk("LQR", plant, beta=beta)
+
+
+def fig13() -> Reproduction:
+    """Torques with the template's liftoff and with predefined ones."""
+    cases = [(rule, plant) for plant in ("PyBullet", "ideal") for rule in _LIFTOFFS]
+    with ProcessPoolExecutor() as pool:
+        results = dict(zip(cases, pool.map(_liftoffs, cases), strict=True))
+    rows: list[tuple[str, ...]] = []
+    for (rule, plant), (event, _, walk, _) in results.items():
+        rows.append(
+            (
+                rule,
+                plant,
+                f"{np.degrees(event.beta):.1f}",
+                f"{event.load:.0f}",
+                "  ".join(f"{x:.0f}" for x in event.jump),
+                "  ".join(f"{x:.0f}" for x in event.peak),
+                "60 steps" if not walk.fall else f"falls in step {len(walk.states)}",
+            )
+        )
+    return Reproduction(
+        title="Fig. 13: torques about liftoff, one step from the equilibrium",
+        columns=(
+            "liftoff",
+            "plant",
+            "beta [deg]",
+            "load [N]",
+            "jump [N m]",
+            "peak [N m]",
+            "from z_0",
+        ),
+        rows=rows,
+        data={
+            "joints": list(_JOINTS),
+            "cases": [
+                {
+                    "liftoff": rule,
+                    "plant": plant,
+                    "beta": event.beta,
+                    "load": event.load,
+                    "jump": event.jump.tolist(),
+                    "peak": event.peak.tolist(),
+                    **_numbers(walk),
+                }
+                for (rule, plant), (event, _, walk, _) in results.items()
+            ],
+        },
+        notes=(
+            f"Joints: {', '.join(_JOINTS)}. Jump: |torque| difference between the last tick of"
+            " double stance and the first of single stance, 1 ms apart. Peak: largest |torque|"
+            " from the first touchdown to the second. Load: vertical force on the rear foot in"
+            " the last tick before. All cases of a plant share their history up to liftoff.",
+            f"Predefined directions: {np.degrees(EARLIER):.0f} deg (earlier than the template)"
+            f" and {np.degrees(LATER):.0f} deg (later; the rear leg is let go sooner where it is"
+            " 3 % longer than l0). The paper does not say which it used; what it reports, smaller"
+            " amplitudes and a rougher liftoff than with the template's, is the earlier one.",
+            "With the template's liftoff the rear leg has faded when it lifts off, so all jumps"
+            " are small; a later one is as smooth but leaves the swing less time.",
+        ),
+        figures={
+            "fig13": liftoff_figure(
+                results["template's", "PyBullet"][3],
+                {rule: results[rule, "PyBullet"][1] for rule in _LIFTOFFS},
+            )
+        },
+    )

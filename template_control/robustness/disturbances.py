@@ -1,0 +1,269 @@
+"""The disturbances whose breaking points are sought: what each does at a level, in a trial.
+
+Levels are those of the reference template (80 kg, 1 m), where they are round numbers; another
+robot gets them scaled by dynamic similarity. The controller is told of none of them, except of
+weaker motors, which is what its torque limits are for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.scaling import REFERENCE, Scale
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ground import GroundStep
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.run.sensing import SensorOptions
+from template_control.run.simulation import Push, SimulationOptions, perturbed_start, simulate
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.parameters import SlipParameters
+
+BEGIN = 10
+"""Steps of a walk on its gait before a push comes."""
+
+AFTER = 20
+"""Steps a walk must go on after it, or with a lasting one from the start."""
+
+_SOON = 4  # steps of a walk that starts off its gait before a step of the ground comes
+_PHASES = 10  # of the step in which a push begins
+_EDGES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the way between two footholds
+_STARTS = 5  # seeds of the starts off the gait
+_PUSH_SECONDS = 0.1
+_VELOCITY_NOISE = 20.0  # [1/s] noise of velocities over that of positions
+_TIME_STEP = PlantOptions().time_step
+
+
+@dataclass(frozen=True)
+class Situation:
+    """Where a disturbance meets the robot.
+
+    Attributes:
+        robot: its last update is overwritten.
+        gait: that is walked.
+    """
+
+    robot: PlanarBiped
+    gait: WalkingGait
+
+    @property
+    def scale(self) -> Scale:
+        """Units of the gait's template."""
+        return Scale.of(self.gait.parameters)
+
+    def footholds(self, start: tuple[float, float, float], steps: int) -> NDArray[np.float64]:
+        """Where the robot treads when it walks undisturbed, (steps + 1,) [m].
+
+        Args:
+            start: (3,) VLO state.
+            steps: how many.
+
+        Returns:
+            The gait's footholds if it falls: disturbed it will fall as well.
+        """
+        options = SimulationOptions(steps=steps, start=start)
+        record = simulate(self.robot, LqrPlanner(self.gait), options)
+        if record.fell:
+            return self.gait.step_length * np.arange(steps + 1.0)
+        # The last VLO may round to just after the last sample.
+        at = np.minimum(np.searchsorted(record.time, record.vlo_time), len(record.time) - 1)
+        return np.asarray(record.foot[at, record.rear[at], 0])
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """One kind of disturbance.
+
+    Attributes:
+        name: on the command line.
+        title: in tables and figures.
+        unit: that levels are shown in.
+        factor: units in one of SI; negative where a level is a share taken away.
+        levels: for the reference template [SI], from mild to severe.
+        trials: at each level.
+        passing: it comes once and the walk must be back on its gait; otherwise it lasts from
+            the start and the walk must only go on.
+        size: of a template's level over the reference's.
+        options: of the run at a level [SI] and a trial's index.
+        grain: levels are whole multiples of it, at least one; 0 for any levels [SI].
+    """
+
+    name: str
+    title: str
+    unit: str
+    factor: float
+    levels: tuple[float, ...]
+    trials: int
+    passing: bool
+    size: Callable[[SlipParameters], float]
+    options: Callable[[Situation, float, int], SimulationOptions]
+    grain: float = 0.0
+
+    def levels_for(self, parameters: SlipParameters) -> list[float]:
+        """The levels for a template [SI]."""
+        levels = [self.size(parameters) * level for level in self.levels]
+        if self.grain:
+            grains = (max(1, round(level / self.grain)) for level in levels)
+            levels = [self.grain * n for n in dict.fromkeys(grains)]
+        return levels
+
+    def shown(self, level: float) -> str:
+        """A level with its unit."""
+        return f"{self.factor * level:.3g} {self.unit}".strip()
+
+
+def _plain(_: SlipParameters) -> float:
+    return 1.0
+
+
+def _length(parameters: SlipParameters) -> float:
+    return Scale.of(parameters).length
+
+
+def _time(parameters: SlipParameters) -> float:
+    return Scale.of(parameters).time
+
+
+def _impulse(parameters: SlipParameters) -> float:
+    """M sqrt(g l0)."""
+    return parameters.mass / REFERENCE.mass * Scale.of(parameters).speed
+
+
+def _pushed(where: Situation, level: float, trial: int) -> SimulationOptions:
+    push = Push(level, BEGIN, trial / _PHASES, _PUSH_SECONDS * where.scale.time)
+    return SimulationOptions(steps=BEGIN + 1 + AFTER, pushes=(push,))
+
+
+def _pushed_back(where: Situation, level: float, trial: int) -> SimulationOptions:
+    return _pushed(where, -level, trial)
+
+
+def _stepped(where: Situation, level: float, trial: int) -> SimulationOptions:
+    start = perturbed_start(where.gait, trial)
+    before, beyond = where.footholds(start, _SOON + 1)[-2:]
+    step = GroundStep(level, float(before + _EDGES[trial] * (beyond - before)))
+    plant = PlantOptions(ground_step=step)
+    return SimulationOptions(steps=_SOON + 1 + AFTER, plant=plant, start=start)
+
+
+def _stepped_down(where: Situation, level: float, trial: int) -> SimulationOptions:
+    return _stepped(where, -level, trial)
+
+
+def _lasting(
+    where: Situation,
+    trial: int,
+    plant: PlantOptions | None = None,
+    embedding: EmbeddingOptions | None = None,
+    sensors: SensorOptions | None = None,
+    delay: float = 0.0,
+) -> SimulationOptions:
+    return SimulationOptions(
+        steps=AFTER,
+        plant=plant or PlantOptions(),
+        embedding=embedding or EmbeddingOptions(),
+        start=perturbed_start(where.gait, trial),
+        sensors=sensors or SensorOptions(),
+        delay=delay,
+    )
+
+
+def _slippery(where: Situation, level: float, trial: int) -> SimulationOptions:
+    return _lasting(where, trial, plant=PlantOptions(friction=level))
+
+
+def _other_mass(where: Situation, level: float, trial: int) -> SimulationOptions:
+    return _lasting(where, trial, plant=PlantOptions(mass_scale=1.0 + level))
+
+
+def _weak(where: Situation, level: float, trial: int) -> SimulationOptions:
+    return _lasting(where, trial, embedding=EmbeddingOptions(torque_scale=level))
+
+
+def _noisy(where: Situation, level: float, trial: int) -> SimulationOptions:
+    rate = _VELOCITY_NOISE / where.scale.time
+    return _lasting(where, trial, sensors=SensorOptions(level, rate * level, trial))
+
+
+def _late(where: Situation, level: float, trial: int) -> SimulationOptions:
+    return _lasting(where, trial, delay=level)
+
+
+def _ladder(step: float, count: int, start: float = 0.0) -> tuple[float, ...]:
+    """``count`` levels away from ``start``, free of rounding's tails."""
+    return tuple(float(x) for x in np.round(start + step * np.arange(1, count + 1), 10))
+
+
+_PUSHES = _ladder(5.0, 30)
+_HEIGHTS = (0.005, *_ladder(0.01, 8))
+
+# Name, title, unit, its factor, levels, trials, passing, size, options.
+DISTURBANCES: tuple[Disturbance, ...] = (
+    Disturbance(
+        "push-forward", "push forward", "N s", 1.0, _PUSHES, _PHASES, True, _impulse, _pushed
+    ),
+    Disturbance(
+        "push-backward",
+        "push backward",
+        "N s",
+        1.0,
+        _PUSHES,
+        _PHASES,
+        True,
+        _impulse,
+        _pushed_back,
+    ),
+    Disturbance("step-up", "step up", "cm", 100.0, _HEIGHTS, len(_EDGES), True, _length, _stepped),
+    Disturbance(
+        "step-down", "step down", "cm", 100.0, _HEIGHTS, len(_EDGES), True, _length, _stepped_down
+    ),
+    Disturbance(
+        "friction",
+        "friction",
+        "",
+        1.0,
+        _ladder(-0.05, 13, 0.7),
+        _STARTS,
+        False,
+        _plain,
+        _slippery,
+    ),
+    Disturbance(
+        "heavier", "heavier", "%", 100.0, _ladder(0.1, 15), _STARTS, False, _plain, _other_mass
+    ),
+    Disturbance(
+        "lighter", "lighter", "%", -100.0, _ladder(-0.1, 9), _STARTS, False, _plain, _other_mass
+    ),
+    Disturbance(
+        "torque",
+        "torque limits",
+        "%",
+        100.0,
+        _ladder(-0.05, 19, 1.0),
+        _STARTS,
+        False,
+        _plain,
+        _weak,
+    ),
+    Disturbance(
+        "noise", "sensor noise", "mrad", 1e3, _ladder(5e-4, 20), _STARTS, False, _plain, _noisy
+    ),
+    Disturbance(
+        "delay",
+        "control delay",
+        "ms",
+        1e3,
+        _ladder(2e-3, 25),
+        _STARTS,
+        False,
+        _time,
+        _late,
+        grain=_TIME_STEP,
+    ),
+)
+"""All that are measured, in the order they are shown in."""

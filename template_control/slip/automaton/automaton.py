@@ -1,0 +1,281 @@
+"""The hybrid automaton of Fig. 2 and Table I as data.
+
+Nothing here integrates anything: the compiled kernel, the planner and the robot's
+controller all read these tables, so "what comes after touchdown" is written once.
+
+A leg is *rear* or *front*. In single stance the stance leg is the rear one, because the
+leg that touches down next lands in front of it; at the rear leg's liftoff the front leg
+takes its place (``Reset.SHIFT``).
+"""
+
+from __future__ import annotations
+
+from template_control.slip.automaton.hybrid import Automaton, Edge, Node
+from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
+
+_SINGLE_STANCE_FAILURES = (
+    Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+_AWAITING_TOUCHDOWN_FAILURES = (
+    Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+_DOUBLE_STANCE_FAILURES = (
+    Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.PASSED_FRONT_FOOT, Outcome.NO_LIFTOFF),
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+_RUNNING_STANCE_FAILURES = (
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+_FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
+
+
+def _walking() -> tuple[Node, ...]:
+    """VLO -> touchdown -> virtual bottom -> rear liftoff -> VLO."""
+    return (
+        Node(
+            "SS_av^w",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^w", Reset.PLACE_FRONT, "G_t^w"),
+                *_AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sc^w",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "DS_sd^w", Reset.NONE, "G_b^w"),
+                # The paper assumes a virtual bottom in every double stance; a short one of a
+                # disturbed walker ends without.
+                Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^w"),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sd^w",
+            Phase.DS,
+            Slot.K_SD,
+            Slot.K_SD,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^w"),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_bv^w",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^w", section=True),
+                *_SINGLE_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
+def _running() -> tuple[Node, ...]:
+    """Apex -> touchdown -> bottom -> liftoff -> apex."""
+    return (
+        Node(
+            "F_aa^r",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^r", Reset.PLACE_REAR, "G_t^r"), *_FLIGHT_FAILURES),
+        ),
+        Node(
+            "SS_sc^r",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^r", Reset.NONE, "G_b^r"), *_RUNNING_STANCE_FAILURES),
+        ),
+        Node(
+            "SS_sd^r",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.NONE, "G_l^r"),
+                *_RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "F_ba^r",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *_FLIGHT_FAILURES),
+        ),
+    )
+
+
+def _walk_to_run() -> tuple[Node, ...]:
+    """The WRT stride: the rear leg walks, the front leg runs (Section IV-C1)."""
+    return (
+        Node(
+            "SS_av^wr",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
+                *_AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sc^wr",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sd^wr",
+            Phase.DS,
+            Slot.K_SD,
+            Slot.K_SC_WR,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_sc^wr",
+            Phase.SS,
+            Slot.K_SC_WR,
+            None,
+            (
+                Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *_RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_sd^wr",
+            Phase.SS,
+            Slot.K_SD_WR,
+            None,
+            (
+                Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.NONE, "G_f^wr"),
+                *_RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "F_ba^wr",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *_FLIGHT_FAILURES),
+        ),
+    )
+
+
+def _simplified_walk_to_run() -> tuple[Node, ...]:
+    """The WRT stride as its controller sees it (Section IV-C1).
+
+    The rear leg is ignored after the virtual bottom, though its liftoff still ends the
+    phase; from there on the stride is the real one.
+    """
+    return (
+        Node(
+            "SS_av^wr*",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^wr*", Reset.PLACE_FRONT, "G_t^wr"),
+                *_AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sc^wr*",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *_DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_br^wr*",
+            Phase.SS,
+            None,
+            Slot.K_SC_WR,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                # Alone, the front leg may be passed before: that is no failure here.
+                Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *_RUNNING_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
+def _run_to_walk() -> tuple[Node, ...]:
+    """The RWT stride: apex -> touchdown -> bottom -> VLO (Section IV-C2)."""
+    return (
+        Node(
+            "F_aa^rw",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^rw", Reset.PLACE_REAR, "G_t^rw"), *_FLIGHT_FAILURES),
+        ),
+        Node(
+            "SS_sc^rw",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^rw", Reset.NONE, "G_b^rw"), *_RUNNING_STANCE_FAILURES),
+        ),
+        Node(
+            "SS_sd^rw",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^rw", section=True),
+                *_SINGLE_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
+AUTOMATON = Automaton(
+    (
+        *_walking(),
+        *_running(),
+        *_walk_to_run(),
+        *_run_to_walk(),
+        *_simplified_walk_to_run(),
+    )
+)
+"""The one automaton of the library."""
+
+STRIDE_START = {
+    "w": "SS_av^w",
+    "r": "F_aa^r",
+    "wr": "SS_av^wr",
+    "rw": "F_aa^rw",
+    "wr*": "SS_av^wr*",
+}
+"""First node of each kind of stride (superscripts of Table I; * the controller's WRT)."""

@@ -1,0 +1,196 @@
+"""Least squares for the controls of one stride: the optimisation problem (36)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import leastsq
+
+from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_FAILED = 10.0  # residual of a stride that fails, in each component
+_PENALTY = 10.0  # slope of the penalty on a control (in units of its scale) out of bounds
+_REAR_BOTTOM = 4  # of a map's results: length of the rear leg at the bottom
+
+
+@dataclass(frozen=True)
+class StepSolution:
+    """Controls of one stride, and what they are predicted to do.
+
+    Attributes:
+        controls: (NUM_SLOTS,) u by Slot.
+        predicted: (m,) state at the next section, on the map the controls were found on.
+        residual: root of the weighted sum of squared errors in (36).
+        outcome: how the predicted stride ends.
+        reached: whether it ends at the target (and, running, at the wanted compression).
+    """
+
+    controls: Array
+    predicted: Array
+    residual: float
+    outcome: Outcome
+    reached: bool
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Which controls are free, and between which bounds.
+
+    Attributes:
+        slots: of the control vector.
+        lower, upper: (len(slots),) bounds [rad, N/m].
+        scale: (len(slots),) sizes that count as alike [rad, N/m].
+    """
+
+    slots: tuple[Slot, ...]
+    lower: Array
+    upper: Array
+    scale: Array
+
+
+class Step(Protocol):
+    """What a controller needs of a return map; ``ReturnMap`` is one.
+
+    ``evaluate`` and ``derivatives`` may complete the controls they are given in place.
+    """
+
+    parameters: SlipParameters
+    dimensions: tuple[int, int]
+
+    def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
+        """Results of one stride and how it ended."""
+
+    def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
+        """Results (n, RESULTS) and outcomes (n,) of controls ``u`` (n, NUM_SLOTS)."""
+
+    def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
+        """Results of one stride, their derivatives, and how it ended."""
+
+
+class StepProblem:
+    """Find the free controls that bring a stride to a target.
+
+    Args:
+        step: the return map.
+        unknowns: the free controls; bounds are penalised, as the paper does.
+        weights: (m,) rho of (36); one more where ``compression`` is given.
+        compression: wanted length of the stance leg at the bottom, (34) [m].
+        tolerance: residual that counts as reached.
+        acceptable: residual below which no further start is tried.
+        evaluations: of the map from each start, at most; the default takes about 0.5 ms.
+    """
+
+    def __init__(
+        self,
+        step: Step,
+        unknowns: Unknowns,
+        weights: Sequence[float] | None = None,
+        compression: float | None = None,
+        tolerance: float = 1e-3,
+        acceptable: float = 0.05,
+        evaluations: int = 14,
+    ) -> None:
+        self.step = step
+        self.unknowns = unknowns
+        self.compression = compression
+        self.tolerance = tolerance
+        self.acceptable = acceptable
+        self._evaluations = evaluations
+        self.size = step.dimensions[1]
+        rows = self.size + (compression is not None)
+        self._weights = np.sqrt(np.ones(rows) if weights is None else np.asarray(weights))
+        self._rows = [*range(self.size)] + ([_REAR_BOTTOM] if compression is not None else [])
+        self._slots = np.array([int(s) for s in unknowns.slots])
+        self._columns = self._slots + 3
+        # Errors are target - result; one row for the compression, none for the penalties.
+        self._aim = np.zeros(rows)
+
+    def solve(self, z: Array, target: Array, starts: Sequence[Array]) -> StepSolution:
+        """Best controls found from ``starts``, tried in turn until one is acceptable.
+
+        Args:
+            z: (n,) state at the section.
+            target: (m,) state wanted at the next.
+            starts: control vectors (NUM_SLOTS,) to begin from; fixed controls are theirs.
+        """
+        self._set(target)
+        best: StepSolution | None = None
+        for start in starts:
+            solution = self._descend(z, start)
+            if best is None or solution.residual < best.residual:
+                best = solution
+            if best.residual <= self.acceptable:
+                break
+        assert best is not None
+        return best
+
+    def costs(self, z: Array, target: Array, grid: Array) -> Array:
+        """Squared errors (n,) of the controls ``grid`` (n, NUM_SLOTS), inf for a failed stride."""
+        self._set(target)
+        results, outcomes = self.step.evaluate_many(z, grid)
+        costs = np.sum((self._weights * (self._aim - results[:, self._rows])) ** 2, axis=1)
+        costs[outcomes != Outcome.SECTION] = np.inf
+        return costs
+
+    def _set(self, target: Array) -> None:
+        self._aim[: self.size] = target
+        if self.compression is not None:
+            self._aim[-1] = self.compression
+
+    def _controls(self, start: Array, x: Array) -> Array:
+        u = start.copy()
+        u[self._slots] = x * self.unknowns.scale
+        return u
+
+    def _errors(self, x: Array, z: Array, start: Array) -> Array:
+        result, outcome = self.step.evaluate(z, self._controls(start, x))
+        if outcome is not Outcome.SECTION:
+            errors = np.full(len(self._aim), _FAILED)
+        else:
+            errors = self._weights * (self._aim - result[self._rows])
+        return np.concatenate((errors, self._excess(x)))
+
+    def _jacobian(self, x: Array, z: Array, start: Array) -> Array:
+        u = self._controls(start, x)
+        _, jacobian, outcome = self.step.derivatives(z, u, self._columns)
+        slopes = -self._weights[:, None] * jacobian[self._rows] * self.unknowns.scale
+        if outcome is not Outcome.SECTION:
+            slopes[:] = 0.0
+        out = np.sign(self._excess(x))
+        return np.vstack((slopes, np.diag(_PENALTY * out * out)))
+
+    def _excess(self, x: Array) -> Array:
+        """Penalty of each control out of its bounds."""
+        b = self.unknowns
+        inside = np.clip(x, b.lower / b.scale, b.upper / b.scale)
+        return _PENALTY * (x - inside)
+
+    def _descend(self, z: Array, start: Array) -> StepSolution:
+        x0 = start[self._slots] / self.unknowns.scale
+        x, *_ = leastsq(
+            self._errors,
+            x0,
+            args=(z, start),
+            Dfun=self._jacobian,
+            ftol=1e-10,
+            xtol=1e-10,
+            gtol=1e-12,
+            maxfev=self._evaluations,
+            full_output=True,
+        )
+        b = self.unknowns
+        u = self._controls(start, np.clip(x, b.lower / b.scale, b.upper / b.scale))
+        result, outcome = self.step.evaluate(z, u)
+        error = self._weights * (self._aim - result[self._rows])
+        residual = float(np.linalg.norm(error)) if outcome is Outcome.SECTION else np.inf
+        return StepSolution(
+            u, result[: self.size].copy(), residual, outcome, residual <= self.tolerance
+        )

@@ -1,0 +1,281 @@
+"""Closed-form strides (Section III) that interpret the automaton's tables.
+
+The same tables as the exact kernel's, but each phase is one closed-form path: flight (10),
+single stance (11) and double stance (Algorithm 1), in two iterations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.slip.automaton.tables import Tables
+from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.dynamics.compiled import inner
+from template_control.slip.dynamics.kernel import Model, Scratch, apply_reset, note_bottom
+from template_control.slip.dynamics.locate import arm, first_event, root
+from template_control.slip.dynamics.path import FLIGHT, STANCE, sample
+from template_control.slip.dynamics.stance_map import (
+    axial_torsional,
+    corrected,
+    harmonic,
+    momentum_changes,
+    polar,
+)
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_GEYER = int(MapKind.GEYER)
+_PAPER = int(MapKind.PAPER)
+_IMPROVED = int(MapKind.IMPROVED)
+_TIMEOUT = int(Outcome.TIMEOUT)
+_FALL = int(Outcome.FALL)
+_MAX_PIECES = 24
+_NO_EVENT, _GOES_ON = -1, -2
+_PIECE = 2.7  # radians of the spring's oscillation that one improved path covers at most
+_SAFE_SHARE = 0.7  # of a piece without an event: the corrected path may meet one before its end
+_SUBSTEP = 0.32  # of sqrt(l0 / g)
+_EVENT_TIME = 1e-11  # [s]
+_NODE_TIME = 1e-10  # [s], of the first path's event where it only places the correction's nodes
+
+
+@inner
+def _follow(
+    kind: int,
+    a: Array,
+    events: IntArray,
+    edge: int,
+    t: float,
+    toes: Array,
+    model: Model,
+    touchdown_height: float,
+    out: Array,
+    values: Array,
+    armed: Array,
+) -> float:
+    """Time of the same event on a corrected path, from its time on the first; -1 if none."""
+    event, guess = events[edge], t.real
+    t = root(
+        kind,
+        a,
+        a,
+        event,
+        guess,
+        0.5 * guess,
+        1.5 * guess,
+        _EVENT_TIME,
+        toes,
+        model.rest_length,
+        touchdown_height,
+        out,
+    )
+    if t.real >= 0.0:
+        return t
+    values[0, event], armed[0] = -1.0, False
+    fired, t = first_event(
+        kind,
+        a,
+        a,
+        3.0 * guess,
+        0.1 * guess,
+        _EVENT_TIME,
+        events[edge : edge + 1],
+        toes,
+        model.rest_length,
+        touchdown_height,
+        values,
+        armed,
+        out,
+    )
+    return t if fired >= 0 else 0.0 * t - 1.0
+
+
+@inner
+def _end_velocity(a: Array, momentum: float, t: float, state: Array, out: Array) -> None:
+    """State at ``t``: position and radial speed of the path, angular rate p / (m r^2)."""
+    sample(STANCE, a, a, t, out)
+    x, y = out[0] - a[0], out[1]
+    r = np.sqrt(x * x + y * y)
+    c, s = x / r, y / r
+    radial, tangential = out[2] * c + out[3] * s, momentum / r
+    state[0], state[1] = out[0], out[1]
+    state[2], state[3] = radial * c - tangential * s, radial * s + tangential * c
+
+
+@inner
+def _potential(state: Array, toes: Array, stiffness: Array, model: Model) -> float:
+    """Gravitational and spring energy over mass [J/kg]."""
+    x, y = state[0], state[1]
+    potential = model.gravity * y
+    for leg in range(2):
+        if stiffness[leg] == 0.0:
+            continue
+        d = model.rest_length - np.sqrt((x - toes[leg]) ** 2 + y * y)
+        potential += 0.5 * stiffness[leg] / model.mass * d * d
+    return potential
+
+
+@inner
+def _stance(
+    map_kind: int,
+    model: Model,
+    state: Array,
+    toes: Array,
+    stiffness: Array,
+    events: IntArray,
+    touchdown_height: float,
+    values: Array,
+    armed: Array,
+    a: Array,
+    out: Array,
+) -> int:
+    """Carry ``state`` to the end of a stance phase; the edge that fires.
+
+    ``_NO_EVENT`` if none does, ``_GOES_ON`` where the phase is too long for one path.
+    """
+    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
+    torsion = 0.0 * state[0]
+    if stiffness[0] == 0.0 or stiffness[1] == 0.0:
+        leg = 0 if stiffness[1] == 0.0 else 1
+        pivot, k, length = toes[leg], stiffness[leg], rest_length + 0.0 * state[0]
+    else:
+        pivot = 0.5 * (toes[0] + toes[1])
+        mean = 0.5 * (stiffness[0] + stiffness[1])
+        if stiffness[0].real != stiffness[1].real:
+            # The AT-SLIP stands for two equal legs; for others only the correction is right.
+            map_kind = _IMPROVED
+        k, length, torsion = axial_torsional(toes[1] - toes[0], mean, mass, gravity, rest_length)
+    r, theta = polar(state[0] - pivot, state[1])
+    c, s = (state[0] - pivot) / r, state[1] / r
+    radial = state[2] * c + state[3] * s
+    momentum = r * (state[3] * c - state[2] * s)
+    w2 = k / mass
+    harmonic(a, pivot, r, theta, radial, w2, length, momentum, gravity)
+    horizon, accuracy = model.max_time + 0.0 * r, _EVENT_TIME
+    if map_kind == _IMPROVED:
+        horizon, accuracy = _PIECE / a[5], _NODE_TIME
+    edge, t = first_event(
+        STANCE,
+        a,
+        a,
+        horizon.real,
+        _SUBSTEP * np.sqrt(rest_length / gravity),
+        accuracy,
+        events,
+        toes,
+        rest_length,
+        touchdown_height,
+        values,
+        armed,
+        out,
+    )
+    if map_kind != _IMPROVED and edge < 0:
+        return _NO_EVENT
+    if edge >= 0 and t == 0.0:
+        return edge  # the phase ends as it begins: there is nothing to correct over no time
+    if map_kind == _IMPROVED:
+        if edge < 0:
+            edge = _GOES_ON
+            t = _SAFE_SHARE * horizon
+        end = corrected(a, t, momentum, toes, stiffness, mass, gravity, rest_length, out)
+    elif map_kind == _PAPER:
+        end = momentum + momentum_changes(a, t, gravity, torsion / mass)
+        harmonic(a, pivot, r, theta, radial, w2, length, end, gravity)
+    else:
+        end = momentum
+    if map_kind != _GEYER and edge >= 0:
+        t = _follow(STANCE, a, events, edge, t, toes, model, touchdown_height, out, values, armed)
+        if t.real < 0.0:
+            return _NO_EVENT
+    before = 0.5 * (state[2] ** 2 + state[3] ** 2) + _potential(state, toes, stiffness, model)
+    _end_velocity(a, end, t, state, out)
+    if map_kind == _IMPROVED:
+        # Energy is conserved within a phase, so the end speed is known.
+        squared = 2.0 * (before - _potential(state, toes, stiffness, model))
+        ratio = squared / (state[2] ** 2 + state[3] ** 2)
+        if ratio.real > 0.0:
+            scale = np.sqrt(ratio)
+            state[2] *= scale
+            state[3] *= scale
+    return edge
+
+
+@inner
+def closed_form_stride(
+    tables: Tables,
+    model: Model,
+    map_kind: int,
+    node: int,
+    state: Array,
+    toes: Array,
+    controls: Array,
+    scratch: Scratch,
+) -> int:
+    """As :func:`~.kernel.run_stride`, with one closed-form map a phase.
+
+    Args:
+        map_kind: value of a MapKind other than EXACT.
+        The rest as there; ``state`` and ``toes`` are overwritten.
+
+    Returns:
+        The Outcome's value.
+    """
+    alpha = controls[0]
+    touchdown_height = model.rest_length * np.sin(alpha)
+    a, out, stiffness = scratch.path, scratch.out, scratch.stiffness
+    values, armed = scratch.values, scratch.armed
+    for _ in range(_MAX_PIECES):
+        rear, front = tables.rear[node], tables.front[node]
+        stiffness[0] = controls[rear] if rear >= 0 else 0.0
+        stiffness[1] = controls[front] if front >= 0 else 0.0
+        first_edge = tables.first_edge[node]
+        guards = tables.event[first_edge : tables.first_edge[node + 1]]
+        arm(guards, state, toes, model.rest_length, touchdown_height, values, armed)
+        if stiffness[0] == 0.0 and stiffness[1] == 0.0:
+            for i in range(4):
+                a[i] = state[i]
+            a[4] = model.gravity
+            edge, t = first_event(
+                FLIGHT,
+                a,
+                a,
+                model.max_time,
+                _SUBSTEP * np.sqrt(model.rest_length / model.gravity),
+                _EVENT_TIME,
+                guards,
+                toes,
+                model.rest_length,
+                touchdown_height,
+                values,
+                armed,
+                out,
+            )
+            sample(FLIGHT, a, a, t, out)
+            for i in range(4):
+                state[i] = out[i]
+        else:
+            edge = _stance(
+                map_kind,
+                model,
+                state,
+                toes,
+                stiffness,
+                guards,
+                touchdown_height,
+                values,
+                armed,
+                a,
+                out,
+            )
+        if edge == _NO_EVENT or not np.isfinite(state[0].real + state[2].real):
+            return _TIMEOUT
+        if edge == _GOES_ON:
+            continue
+        edge += first_edge
+        note_bottom(tables.event[edge], state, toes, scratch.bottom)
+        apply_reset(tables.reset[edge], state, toes, model.rest_length, alpha)
+        if tables.outcome[edge] >= 0:
+            return tables.outcome[edge]
+        node = tables.target[edge]
+    return _TIMEOUT

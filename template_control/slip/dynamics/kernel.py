@@ -1,0 +1,205 @@
+"""Compiled interpreter of the automaton's tables: one stride, event-exact.
+
+Every gait runs through :func:`run_stride`; it knows guards as functions and resets as
+assignments, and reads which of them belong where from ``Tables``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.slip.automaton.tables import Tables
+from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Reset
+from template_control.slip.dynamics.compiled import inner
+from template_control.slip.dynamics.locate import MAX_EDGES, arm, first_event
+from template_control.slip.dynamics.path import COEFFICIENTS, SERIES, sample
+from template_control.slip.dynamics.taylor import ORDER, expand
+
+Array = NDArray[np.float64]
+
+# Numba freezes module-level integers into the compiled code.
+_PLACE_REAR = int(Reset.PLACE_REAR)
+_PLACE_FRONT = int(Reset.PLACE_FRONT)
+_SHIFT = int(Reset.SHIFT)
+_BOTTOM = int(Event.BOTTOM)
+_VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
+_TIMEOUT = int(Outcome.TIMEOUT)
+
+MAX_SEGMENTS = 96
+MAX_EVENTS = 16
+_SUBSTEPS = 4
+_EVENT_TIME = 1e-14  # [s]
+
+
+class Model(NamedTuple):
+    """The template's physics as the kernel takes it, SI units."""
+
+    mass: float
+    gravity: float
+    rest_length: float
+    max_time: float
+
+
+class Scratch(NamedTuple):
+    """Arrays a stride is written to; one set a thread, reused from call to call.
+
+    Attributes:
+        cx, cy: (MAX_SEGMENTS, ORDER + 1) polynomials of the path, one row a segment.
+        meta: (MAX_SEGMENTS, 7) start time, duration, node, toes, stiffnesses of a segment.
+        events: (MAX_EVENTS, 8) time, event, node left, node entered, state before the reset.
+        work: (2, 4, ORDER + 1) for the series.
+        path: (COEFFICIENTS,) of a closed-form phase.
+        out: (6,) a sample of a path.
+        state, toes: (4,) and (2,) of the section maps.
+        bottom: (2,) lengths of rear and front leg at the last (virtual) bottom [m].
+        stiffness: (2,) of the phase's legs.
+        values, armed: (2, NUM_EVENTS) and (MAX_EDGES,) the guards.
+    """
+
+    cx: Array
+    cy: Array
+    meta: Array
+    events: Array
+    work: Array
+    path: Array
+    out: Array
+    state: Array
+    toes: Array
+    bottom: Array
+    stiffness: Array
+    values: Array
+    armed: NDArray[np.bool_]
+
+
+def new_scratch(dtype: type[float] | type[complex] = float) -> Scratch:
+    """Fresh arrays for one thread; complex ones for complex steps."""
+    return Scratch(
+        np.zeros((MAX_SEGMENTS, ORDER + 1), dtype),
+        np.zeros((MAX_SEGMENTS, ORDER + 1), dtype),
+        np.zeros((MAX_SEGMENTS, 7)),
+        np.zeros((MAX_EVENTS, 8)),
+        np.zeros((2, 4, ORDER + 1), dtype),
+        np.zeros(COEFFICIENTS, dtype),
+        np.zeros(6, dtype),
+        np.zeros(4, dtype),
+        np.zeros(2, dtype),
+        np.zeros(2, dtype),
+        np.zeros(2, dtype),
+        np.zeros((2, NUM_EVENTS)),
+        np.zeros(MAX_EDGES, dtype=np.bool_),
+    )
+
+
+@inner
+def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha: float) -> None:
+    """Move the toes (2,) as the ``Reset`` with this value says."""
+    if reset == _PLACE_REAR:
+        toes[0] = state[0] + rest_length * np.cos(alpha)
+    elif reset == _PLACE_FRONT:
+        toes[1] = state[0] + rest_length * np.cos(alpha)
+    elif reset == _SHIFT:
+        toes[0] = toes[1]
+
+
+@inner
+def note_bottom(event: int, state: Array, toes: Array, bottom: Array) -> None:
+    """At a bottom, virtual or not, write the legs' lengths to ``bottom`` (2,)."""
+    if event in (_BOTTOM, _VIRTUAL_BOTTOM):
+        for leg in range(2):
+            bottom[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
+
+
+@inner
+def run_stride(
+    tables: Tables,
+    model: Model,
+    node: int,
+    state: Array,
+    toes: Array,
+    controls: Array,
+    record: bool,
+    scratch: Scratch,
+) -> tuple[int, int, int, int, float]:
+    """Run the automaton from ``node`` until a section or a failure.
+
+    Args:
+        tables: the packed automaton.
+        model: the template; a stride longer than its ``max_time`` counts as failed.
+        node: index of the first node.
+        state: (4,) x, y, dx/dt, dy/dt [m, m/s], overwritten with the final state.
+        toes: (2,) x of rear and front toe [m], overwritten.
+        controls: (NUM_SLOTS,) u: touchdown angle [rad] and stiffnesses [N/m] by Slot.
+        record: keep every segment and event; otherwise only the last is kept.
+        scratch: overwritten.
+
+    ``state``, ``toes``, ``controls`` and ``scratch`` are all real or all complex.
+
+    Returns:
+        Outcome, last node (the one entered, where the section was reached), number of
+        segments, number of events, duration [s].
+    """
+    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
+    max_time = model.max_time
+    cx, cy, meta, events, work = scratch[:5]
+    out, stiffness, values, armed = scratch.out, scratch.stiffness, scratch.values, scratch.armed
+    alpha = controls[0]
+    touchdown_height = rest_length * np.sin(alpha)
+    time, segments, event_count = 0.0, 0, 0
+    entered = True
+    while time < max_time and segments < MAX_SEGMENTS and event_count < MAX_EVENTS:
+        rear, front = tables.rear[node], tables.front[node]
+        stiffness[0] = controls[rear] if rear >= 0 else 0.0
+        stiffness[1] = controls[front] if front >= 0 else 0.0
+        first_edge = tables.first_edge[node]
+        guards = tables.event[first_edge : tables.first_edge[node + 1]]
+        if entered:
+            arm(guards, state, toes, rest_length, touchdown_height, values, armed)
+            entered = False
+        row = segments if record else 0
+        px, py = cx[row], cy[row]
+        horizon = expand(state, toes, stiffness, mass, gravity, rest_length, px, py, work)
+        horizon = min(horizon, max_time - time, 0.1 * np.sqrt(rest_length / gravity) * _SUBSTEPS)
+        fired, step = first_event(
+            SERIES,
+            px,
+            py,
+            horizon,
+            horizon / _SUBSTEPS,
+            _EVENT_TIME,
+            guards,
+            toes,
+            rest_length,
+            touchdown_height,
+            values,
+            armed,
+            out,
+        )
+        sample(SERIES, px, py, step, out)
+        for i in range(4):
+            state[i] = out[i]
+        meta[row, 0], meta[row, 1], meta[row, 2] = time, step.real, node
+        for leg in range(2):
+            meta[row, 3 + leg], meta[row, 5 + leg] = toes[leg].real, stiffness[leg].real
+        segments += 1
+        time += step.real
+        if fired < 0:
+            continue
+
+        fired += first_edge
+        outcome, target = tables.outcome[fired], tables.target[fired]
+        row = event_count if record else 0
+        events[row, 0], events[row, 1] = time, tables.event[fired]
+        events[row, 2], events[row, 3] = node, target
+        for i in range(4):
+            events[row, 4 + i] = state[i].real
+        event_count += 1
+        note_bottom(tables.event[fired], state, toes, scratch.bottom)
+        apply_reset(tables.reset[fired], state, toes, rest_length, alpha)
+        if outcome >= 0:
+            return outcome, (target if target >= 0 else node), segments, event_count, time
+        node = target
+        entered = True
+    return _TIMEOUT, node, segments, event_count, time

@@ -1,0 +1,199 @@
+"""One stride of the template: run it, look at its path, its events and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from template_control.errors import ParameterError
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.tables import TABLES
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
+from template_control.slip.dynamics.kernel import Model, Scratch, new_scratch, run_stride
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+
+def kernel_model(parameters: SlipParameters, max_time: float | None = None) -> Model:
+    """``parameters`` as the kernel takes them.
+
+    Args:
+        parameters: the template.
+        max_time: time limit of a stride [s]; default 20 sqrt(l0/g).
+    """
+    p = parameters
+    limit = 20.0 * np.sqrt(p.rest_length / p.gravity) if max_time is None else max_time
+    return Model(p.mass, p.gravity, p.rest_length, float(limit))
+
+
+@dataclass(frozen=True)
+class FiredEvent:
+    """A guard that fired.
+
+    Attributes:
+        time: since the start of the stride [s].
+        event: which guard.
+        source, target: node left, and node entered ("" where the stride failed).
+        state: (4,) x, y, dx/dt, dy/dt [m, m/s] at the event.
+    """
+
+    time: float
+    event: Event
+    source: str
+    target: str
+    state: Array
+
+
+@dataclass(frozen=True)
+class Stride:
+    """A simulated stride; world frame with y up, SI units.
+
+    Attributes:
+        outcome: how it ended.
+        node: node at the end (the successor, where the section was reached).
+        state: (4,) final x, y, dx/dt, dy/dt.
+        toes: (2,) final x of rear and front toe.
+        duration: [s].
+        events: guards in the order they fired.
+        cx, cy: (segments, ORDER + 1) Taylor polynomials of the path.
+        meta: (segments, 7) start time, duration, node index, toes (2), stiffness (2).
+    """
+
+    outcome: Outcome
+    node: str
+    state: Array
+    toes: Array
+    duration: float
+    events: tuple[FiredEvent, ...]
+    cx: Array
+    cy: Array
+    meta: Array
+
+    @property
+    def completed(self) -> bool:
+        """True where the stride reached its section."""
+        return self.outcome is Outcome.SECTION
+
+    def time_of(self, event: Event) -> float:
+        """Time of the first firing of ``event`` [s]; NaN if it did not fire."""
+        return next((e.time for e in self.events if e.event is event), np.nan)
+
+    def sample(self, times: ArrayLike) -> Array:
+        """States at ``times`` [s]: (n, 6) x, y, dx/dt, dy/dt, d2x/dt2, d2y/dt2."""
+        t = np.atleast_1d(np.asarray(times, dtype=float))
+        row = np.clip(np.searchsorted(self.meta[:, 0], t, side="right") - 1, 0, len(self.meta) - 1)
+        local = t - self.meta[row, 0]
+        out = np.empty((t.size, 6))
+        for axis, c in enumerate((self.cx, self.cy)):
+            for derivative in range(3):
+                coefficients = np.array(
+                    [np.polynomial.polynomial.polyder(r, derivative) for r in c]
+                )
+                power = local[:, None] ** np.arange(coefficients.shape[1])
+                out[:, 2 * derivative + axis] = np.sum(coefficients[row] * power, axis=1)
+        return out
+
+    def nodes(self, times: ArrayLike) -> list[str]:
+        """Name of the automaton's node at each of ``times`` [s]."""
+        t = np.atleast_1d(np.asarray(times, dtype=float))
+        row = np.clip(np.searchsorted(self.meta[:, 0], t, side="right") - 1, 0, len(self.meta) - 1)
+        return [AUTOMATON.nodes[int(i)].name for i in self.meta[row, 2]]
+
+
+def controls(
+    touchdown_angle: float, k_sc: float, k_sd: float, k_sc_wr: float = 0.0, k_sd_wr: float = 0.0
+) -> Array:
+    """Control vector u (5,) of a stride: angle [rad] and stiffnesses [N/m] by Slot.
+
+    Raises:
+        ParameterError: if the angle is not in (0, pi/2) or a stiffness is negative or NaN.
+    """
+    u = np.zeros(NUM_SLOTS)
+    u[Slot.TOUCHDOWN_ANGLE] = touchdown_angle
+    u[Slot.K_SC], u[Slot.K_SD] = k_sc, k_sd
+    u[Slot.K_SC_WR], u[Slot.K_SD_WR] = k_sc_wr, k_sd_wr
+    if not 0.0 < touchdown_angle < np.pi / 2:
+        raise ParameterError(
+            f"touchdown angle is {touchdown_angle!r} rad: give one between 0 and pi/2"
+        )
+    if not (np.all(np.isfinite(u)) and np.all(u >= 0.0)):
+        raise ParameterError(f"leg stiffnesses are {u[1:].tolist()}: give finite ones >= 0 [N/m]")
+    return u
+
+
+def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
+    """``values`` as a new array of this size.
+
+    Raises:
+        ParameterError: if its shape is another, or a number is not finite.
+    """
+    array = np.array(values, dtype=float)
+    if array.shape != (size,):
+        raise ParameterError(f"{name} has shape {array.shape}: give {size} numbers")
+    if not np.all(np.isfinite(array)):
+        raise ParameterError(f"{name} is {array.tolist()}: give finite numbers")
+    return array
+
+
+def simulate_stride(
+    parameters: SlipParameters,
+    start: str,
+    state: Sequence[float] | Array,
+    u: Array,
+    toes: Sequence[float] = (0.0, 0.0),
+    max_time: float | None = None,
+    scratch: Scratch | None = None,
+) -> Stride:
+    """Simulate one stride on the exact model.
+
+    Args:
+        parameters: the template.
+        start: first node, usually from ``STRIDE_START``.
+        state: (4,) x, y, dx/dt, dy/dt [m, m/s].
+        u: (5,) controls from :func:`controls`.
+        toes: x of the rear and front toe [m].
+        max_time: give up after this time [s]; default 20 sqrt(l0/g).
+        scratch: reuse these arrays.
+
+    Raises:
+        ParameterError: for NaN or a wrong shape.
+        KeyError: if there is no node ``start``.
+    """
+    w = scratch or new_scratch()
+    x = finite("state", state, 4)
+    c = finite("toes", toes, 2)
+    outcome, node, segments, events, duration = run_stride(
+        TABLES,
+        kernel_model(parameters, max_time),
+        AUTOMATON.index[start],
+        x,
+        c,
+        finite("controls", u, NUM_SLOTS),
+        True,
+        w,
+    )
+    names = [n.name for n in AUTOMATON.nodes]
+    return Stride(
+        outcome=Outcome(outcome),
+        node=names[node],
+        state=x,
+        toes=c,
+        duration=duration,
+        events=tuple(
+            FiredEvent(
+                time=float(row[0]),
+                event=Event(int(row[1])),
+                source=names[int(row[2])],
+                target=names[int(row[3])] if row[3] >= 0 else "",
+                state=row[4:8].copy(),
+            )
+            for row in w.events[:events]
+        ),
+        cx=w.cx[:segments].copy(),
+        cy=w.cy[:segments].copy(),
+        meta=w.meta[:segments].copy(),
+    )

@@ -1,0 +1,86 @@
+"""Taylor series of the SLIP dynamics, equations (1) to (3), to 13 digits.
+
+The right-hand side is built from sums, products and one power, so all Taylor
+coefficients of the CoM path follow from recurrences (automatic differentiation of the
+ODE; Jorba and Zou 2005). A phase then takes one to three steps, each a polynomial that
+also serves as dense output and as the path on which events are located.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.slip.dynamics.compiled import inner
+
+Array = NDArray[np.float64]
+
+ORDER = 16
+"""Degree of the polynomials."""
+
+TOLERANCE = 1e-13
+"""Size of the last terms relative to the rest length; sets the step."""
+
+
+@inner
+def expand(
+    state: Array,
+    toes: Array,
+    stiffness: Array,
+    mass: float,
+    gravity: float,
+    rest_length: float,
+    cx: Array,
+    cy: Array,
+    work: Array,
+) -> float:
+    """Taylor coefficients of the CoM path from ``state`` and the step they are good for.
+
+    Args:
+        state: (4,) x, y, dx/dt, dy/dt [m, m/s] in the world frame (y up).
+        toes: (2,) x of the rear and the front toe [m].
+        stiffness: (2,) stiffness [N/m] of the rear and front leg, 0 for a leg in the air.
+        mass, gravity, rest_length: SI.
+        cx, cy: (ORDER + 1,) overwritten with x(t) = sum cx[i] t^i, and y.
+        work: (2, 4, ORDER + 1) scratch.
+
+    Returns:
+        The step h [s] within which the truncated series are exact to ``TOLERANCE``.
+    """
+    cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
+    for n in range(ORDER - 1):
+        ax = 0.0 * cx[0]
+        ay = ax - (gravity if n == 0 else 0.0)
+        for leg in range(2):
+            if stiffness[leg] == 0.0:
+                continue
+            d, s, q, w = work[leg, 0], work[leg, 1], work[leg, 2], work[leg, 3]
+            d[n] = cx[n] - (toes[leg] if n == 0 else 0.0)
+            total = 0.0 * cx[0]
+            for j in range((n + 1) // 2):
+                total += d[j] * d[n - j] + cy[j] * cy[n - j]
+            total *= 2.0
+            if n % 2 == 0:
+                total += d[n // 2] * d[n // 2] + cy[n // 2] * cy[n // 2]
+            s[n] = total
+            if n == 0:
+                q[0] = 1.0 / np.sqrt(total)
+                w[0] = stiffness[leg] / mass * (rest_length * q[0] - 1.0)
+            else:
+                total = 0.0 * cx[0]
+                for j in range(n):
+                    total += (-0.5 * (n - j) - j) * s[n - j] * q[j]
+                q[n] = total / (n * s[0])
+                w[n] = stiffness[leg] / mass * rest_length * q[n]
+            for j in range(n + 1):
+                ax += w[j] * d[n - j]
+                ay += w[j] * cy[n - j]
+        scale = 1.0 / ((n + 1) * (n + 2))
+        cx[n + 2] = ax * scale
+        cy[n + 2] = ay * scale
+    step = np.inf
+    for n in (ORDER - 1, ORDER):
+        size = max(abs(cx[n]), abs(cy[n])) / rest_length
+        if size > 0.0:
+            step = min(step, (TOLERANCE / size) ** (1.0 / n))
+    return step

@@ -1,0 +1,189 @@
+"""Steps to fall of the walking template: how far from a gait it still comes back.
+
+A state at VLO is given as in Section IV-D by height y, velocity angle phi (positive
+downward) and energy E, the stance spring's included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.tables import TABLES, Tables
+from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.dynamics.compiled import inner
+from template_control.slip.dynamics.kernel import Model, Scratch, new_scratch
+from template_control.slip.dynamics.stride import kernel_model
+from template_control.slip.maps.section_map import RESULTS, section_map
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Numba would compile the maps once more for a literal int.
+_EXACT = np.int64(MapKind.EXACT)
+_SECTION = int(Outcome.SECTION)
+_WINDOW = 5
+_THERE = 0.01  # as near as this, it need not come nearer
+_SHRINKS = 0.95  # of the distance half-way must be left at most: no other gait, no cycle
+_HEIGHT, _ANGLE = 0.01, np.radians(1.0)  # what counts as equally far, per l0 and in angle
+
+
+def vlo_state(parameters: SlipParameters, y: ArrayLike, phi: ArrayLike, energy: ArrayLike) -> Array:
+    """VLO states (..., 3) dx/dt, y, dy/dt from height [m], velocity angle [rad], energy [J].
+
+    The speeds are NaN where the energy does not suffice.
+    """
+    p = parameters
+    y, phi, energy = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (y, phi, energy)))
+    potential = p.mass * p.gravity * y + 0.5 * p.leg_stiffness * (p.rest_length - y) ** 2
+    squared = 2.0 * (energy - potential) / p.mass
+    v = np.sqrt(np.where(squared > 0.0, squared, np.nan))
+    return np.stack((v * np.cos(phi), y, -v * np.sin(phi)), axis=-1)
+
+
+def velocity_angle(z: Array) -> Array:
+    """phi of VLO states (..., 3), positive downward [rad]."""
+    return np.asarray(-np.arctan2(z[..., 2], z[..., 0]))
+
+
+@inner
+def _steps(
+    tables: Tables,
+    model: Model,
+    node: int,
+    z: Array,
+    controls: Array,
+    goal: Array,
+    limit: int,
+    scratch: Scratch,
+    result: Array,
+) -> tuple[int, bool]:
+    """Steps taken (at most ``limit``), and whether they lead to ``goal``.
+
+    ``z`` (3,) is overwritten with the last VLO state; ``goal`` (2,) is y, phi.
+    """
+    early = middle = late = 0.0
+    for step in range(limit):
+        if section_map(tables, model, _EXACT, node, z, controls, scratch, result) != _SECTION:
+            return step, False
+        for i in range(3):
+            z[i] = result[i]
+        height = (z[1] - goal[0]) / (_HEIGHT * model.rest_length)
+        angle = (-np.arctan2(z[2], z[0]) - goal[1]) / _ANGLE
+        distance = np.sqrt(height * height + angle * angle)
+        if step < _WINDOW:
+            early = max(early, distance)
+        if 2 * step >= limit - _WINDOW and 2 * step < limit + _WINDOW:
+            middle = max(middle, distance)
+        if step >= limit - _WINDOW:
+            late = max(late, distance)
+    return limit, late < _THERE or (late < _SHRINKS * middle and late < early)
+
+
+@njit(cache=True)
+def _many(
+    tables: Tables,
+    model: Model,
+    node: int,
+    z: Array,
+    controls: Array,
+    goal: Array,
+    limit: int,
+    scratch: Scratch,
+    steps: IntArray,
+    converges: NDArray[np.bool_],
+) -> None:
+    result = np.empty(RESULTS)
+    for i in range(z.shape[0]):
+        steps[i] = 0
+        converges[i] = False
+        if np.isfinite(z[i, 0]):
+            steps[i], converges[i] = _steps(
+                tables, model, node, z[i], controls[i], goal[i], limit, scratch, result
+            )
+
+
+@dataclass(frozen=True)
+class StepsToFall:
+    """Result of :func:`steps_to_fall`.
+
+    Attributes:
+        steps: (n,) steps taken before a failure, at most the limit.
+        converges: (n,) all steps were taken, and the distance from the gait (1 cm, for l0 =
+            1 m, counting as much as 1 degree) shrank: the farthest of the last five is less
+            than that of the first five and of five half-way, or it is under 0.1 mm.
+        last: (n, 3) VLO state after the last step taken.
+    """
+
+    steps: IntArray
+    converges: NDArray[np.bool_]
+    last: Array
+
+
+def steps_to_fall(
+    parameters: SlipParameters, z: Array, controls: Array, goal: Array, limit: int = 50
+) -> StepsToFall:
+    """Walk passively from many states.
+
+    Args:
+        parameters: the template.
+        z: (n, 3) VLO states; NaN counts as no step.
+        controls: (n, NUM_SLOTS), or one (NUM_SLOTS,) for all.
+        goal: (n, 2) or (2,) y [m] and phi [rad] of the gait each should come to.
+        limit: steps to take.
+    """
+    states = np.array(z, dtype=float)
+    count = len(states)
+    steps, converges = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.bool_)
+    _many(
+        TABLES,
+        kernel_model(parameters),
+        AUTOMATON.index[STRIDE_START["w"]],
+        states,
+        np.ascontiguousarray(np.broadcast_to(controls, (count, np.shape(controls)[-1]))),
+        np.ascontiguousarray(np.broadcast_to(goal, (count, 2))),
+        limit,
+        new_scratch(),
+        steps,
+        converges,
+    )
+    return StepsToFall(steps, converges, states)
+
+
+def margin(
+    parameters: SlipParameters,
+    controls: Array,
+    goal: tuple[float, float],
+    energy: float,
+    largest: float = 0.05,
+    counts: tuple[int, int] = (50, 32),
+) -> float:
+    """Radius of the largest disc around a gait from which walking converges to it.
+
+    Args:
+        parameters: the template.
+        controls: (NUM_SLOTS,) of the gait.
+        goal: its y [m] and phi [rad] at VLO.
+        energy: its energy [J]; all states of the disc have it.
+        largest: where to stop looking, over l0.
+        counts: numbers of radii and of directions.
+
+    Returns:
+        The radius over l0 in height; in velocity angle 1 degree counts as 0.01.
+    """
+    radii = np.linspace(largest / counts[0], largest, counts[0])
+    turn = np.linspace(0.0, 2.0 * np.pi, counts[1], endpoint=False)
+    r, t = np.meshgrid(radii, turn, indexing="ij")
+    y = goal[0] + r * parameters.rest_length * np.cos(t)
+    phi = goal[1] + r / _HEIGHT * _ANGLE * np.sin(t)
+    z = vlo_state(parameters, y.ravel(), phi.ravel(), energy)
+    good = steps_to_fall(parameters, z, controls, np.array(goal)).converges.reshape(r.shape)
+    lost = np.flatnonzero(~good.all(axis=1))
+    if not lost.size:
+        return float(radii[-1])
+    return float(radii[lost[0] - 1]) if lost[0] else 0.0

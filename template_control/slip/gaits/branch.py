@@ -1,0 +1,282 @@
+"""Branches of periodic gaits: pseudo-arclength past folds, stability, special points.
+
+A gait is a point X where a family's equations vanish, one fewer than X has numbers: a curve.
+What the equations are is the family's: :mod:`~.gait_branch`, :mod:`~.controlled_branch`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import GaitError, ParameterError
+from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.gaits.stability import Kind
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+QUANTITIES = ("energy", "angle", "stiffness", "height", "speed")
+_NEWTON = 12
+_CONVERGED = 1e-10
+_SINGULAR = 3e-6  # where branches cross, a step leaves the crossing direction alone
+_SMALLEST_STEP = 1e-6
+_LOCATE = 40
+
+
+class Special(Enum):
+    """What happens between two points of a branch."""
+
+    FOLD = "fold"
+    """The branch turns back in the quantity it is drawn over."""
+    SADDLE_NODE = "eigenvalue through +1"
+    FLIP = "eigenvalue through -1"
+    NEIMARK_SACKER = "complex pair through the unit circle"
+
+
+@dataclass(frozen=True)
+class BranchPoint:
+    """A periodic gait on a branch.
+
+    Attributes:
+        x: (n + 1,) X, the family's coordinates.
+        state: at the section: dx/dt, y, dy/dt at VLO, dx/dt, y at apex.
+        controls: (NUM_SLOTS,) u of the stride.
+        energy: at the section [J].
+        target: what a controller is asked for, in the quantity it is varied in; None where
+            there is no controller.
+        eigenvalues: of the stride: within its energy shell if passive, all of them if
+            controlled.
+        kind: stable, saddle or unstable.
+        tangent: of the branch, in scaled coordinates.
+        special: what happens here, None at an ordinary point.
+    """
+
+    x: Array
+    state: Array
+    controls: Array
+    energy: float
+    target: float | None
+    eigenvalues: ComplexArray
+    kind: Kind
+    tangent: Array
+    special: Special | None = None
+
+    @property
+    def angle(self) -> float:
+        """Touchdown angle [rad]."""
+        return float(self.controls[Slot.TOUCHDOWN_ANGLE])
+
+    @property
+    def stiffness(self) -> float:
+        """Of the leg that lands, from touchdown on [N/m]."""
+        return float(self.controls[Slot.K_SC])
+
+    def quantity(self, name: str) -> float:
+        """One of :data:`QUANTITIES`, the angle in radians, or the controller's "target"."""
+        if name == "target" and self.target is not None:
+            return self.target
+        return float(
+            {
+                "energy": self.energy,
+                "angle": self.angle,
+                "stiffness": self.stiffness,
+                "height": self.state[1],
+                "speed": self.state[0],
+            }[name]
+        )
+
+
+class Equations(NamedTuple):
+    """A family's equations at X, scaled.
+
+    Attributes:
+        residual: (n,) zero on the branch.
+        jacobian: (n, n + 1) in scaled X.
+        valid: whether the stride ended at its section.
+    """
+
+    residual: Array
+    jacobian: Array
+    valid: bool
+
+
+class Branch(ABC):
+    """A curve of gaits that can be followed.
+
+    Attributes:
+        scale: (n + 1,) natural size of each coordinate.
+        free: quantities that vary along it.
+        noise: to which eigenvalues are known; one that close to the unit circle does not
+            cross it.
+        anchor: (n + 1,) direction that the first gait is not moved in from its guess (scaled);
+            None where the nearest gait will do.
+    """
+
+    scale: Array
+    free: tuple[str, ...]
+    noise: float = 0.0
+    anchor: Array | None = None
+
+    @abstractmethod
+    def equations(self, x: Array) -> Equations:
+        """Residual and Jacobian at X (n + 1,)."""
+
+    @abstractmethod
+    def point(self, x: Array) -> BranchPoint:
+        """The branch point at X (n + 1,); its tangent is oriented arbitrarily."""
+
+    @abstractmethod
+    def quantity(self, x: Array, name: str) -> tuple[float, Array]:
+        """One of the free quantities, and its (n + 1,) gradient in X."""
+
+    def correct(self, x: Array, direction: Array | None = None) -> Array:
+        """The gait nearest X along the plane through it normal to ``direction`` (scaled).
+
+        Without a direction the least change of X is made.
+
+        Raises:
+            GaitError: if Newton's method does not converge.
+        """
+        start = x.copy()
+        x = x.copy()
+        for _ in range(_NEWTON):
+            residual, jacobian, valid = self.equations(x)
+            if not valid:
+                break
+            if np.max(np.abs(residual)) < _CONVERGED:
+                return x
+            if direction is not None:
+                jacobian = np.vstack((jacobian, direction))
+                residual = np.append(residual, direction @ ((x - start) / self.scale))
+            step = np.linalg.lstsq(jacobian, -residual, rcond=_SINGULAR)[0]
+            x = x + step * self.scale
+        raise GaitError("no periodic gait near the guess: give another start or a smaller step")
+
+    def trace(
+        self,
+        start: Array,
+        over: str,
+        limits: tuple[float, float],
+        step: float = 0.01,
+        points: int = 400,
+    ) -> list[BranchPoint]:
+        """Follow the branch both ways from ``start`` by pseudo-arclength.
+
+        Args:
+            start: (n + 1,) guess of X.
+            over: the quantity the branch is drawn over; folds are where it turns back.
+            limits: of that quantity; the branch ends outside of them.
+            step: largest arclength step, in scaled units.
+            points: at most so many points each way.
+
+        Returns:
+            Points in order along the branch, special ones included.
+
+        Raises:
+            GaitError: if there is no gait near ``start``.
+            ParameterError: if ``over`` does not vary along the branch.
+        """
+        if over not in self.free:
+            raise ParameterError(
+                f"cannot draw over {over!r}: give a quantity left free, {', '.join(self.free)}"
+            )
+        first = self.point(self.correct(start, self.anchor))
+        back = self._follow(first, -first.tangent, over, limits, step, points)
+        ahead = self._follow(first, first.tangent, over, limits, step, points)
+        return [*reversed(back), first, *ahead]
+
+    def _follow(
+        self,
+        first: BranchPoint,
+        direction: Array,
+        over: str,
+        limits: tuple[float, float],
+        largest: float,
+        points: int,
+    ) -> list[BranchPoint]:
+        found: list[BranchPoint] = []
+        here, step = first, largest
+        while len(found) < points and step > _SMALLEST_STEP:
+            try:
+                there = self.point(self.correct(here.x + step * direction * self.scale, direction))
+            except (GaitError, ParameterError):  # no gait, or none that a controller takes
+                step *= 0.5
+                continue
+            turn = float(there.tangent @ direction)
+            if abs(turn) < 0.9:
+                step *= 0.5
+                continue
+            ahead = there.tangent * np.sign(turn)
+            found += self._special(here, there, direction, ahead, over)
+            found.append(there)
+            if not limits[0] <= self.quantity(there.x, over)[0] <= limits[1]:
+                break
+            here, direction = there, ahead
+            step = min(largest, 1.5 * step)
+        return found
+
+    def _special(
+        self, a: BranchPoint, b: BranchPoint, start: Array, end: Array, over: str
+    ) -> list[BranchPoint]:
+        """Special points between two neighbours, in order."""
+        tests: list[tuple[Special, Callable[[BranchPoint, Array], float]]] = [
+            (Special.FOLD, lambda point, tangent: self._rate(point, tangent, over)),
+            (Special.SADDLE_NODE, lambda p, _: float(np.prod(1.0 - p.eigenvalues).real)),
+            (Special.FLIP, lambda p, _: float(np.prod(1.0 + p.eigenvalues).real)),
+            (Special.NEIMARK_SACKER, lambda p, _: _pair(p.eigenvalues)),
+        ]
+        found = []
+        for special, test in tests:
+            left, right = test(a, start), test(b, end)
+            known = special is Special.FOLD or min(abs(left), abs(right)) > self.noise
+            if known and np.isfinite(left) and np.isfinite(right) and left * right < 0.0:
+                share, point = self._locate(a, b, start, test, left)
+                found.append((share, replace(point, special=special)))
+        return [point for _, point in sorted(found, key=lambda pair: pair[0])]
+
+    def _locate(
+        self,
+        a: BranchPoint,
+        b: BranchPoint,
+        direction: Array,
+        test: Callable[[BranchPoint, Array], float],
+        left: float,
+    ) -> tuple[float, BranchPoint]:
+        """Bisect the arc between two points for the zero of a test function."""
+        chord = (b.x - a.x) / self.scale
+        chord /= np.linalg.norm(chord)
+        low, high, point = 0.0, 1.0, a
+        for _ in range(_LOCATE):
+            middle = 0.5 * (low + high)
+            try:
+                point = self.point(self.correct(a.x + middle * (b.x - a.x), chord))
+            except (GaitError, ParameterError):
+                break  # so near a crossing of branches that Newton's method stalls
+            tangent = point.tangent * np.sign(point.tangent @ direction)
+            if left * test(point, tangent) > 0.0:
+                low = middle
+            else:
+                high = middle
+        return 0.5 * (low + high), point
+
+    def _rate(self, point: BranchPoint, tangent: Array, name: str) -> float:
+        """Rate of a quantity along the branch."""
+        return float(self.quantity(point.x, name)[1] @ (tangent * self.scale))
+
+
+def null_vector(jacobian: Array) -> Array:
+    """(n + 1,) the direction an (n, n + 1) Jacobian leaves free."""
+    return np.asarray(np.linalg.svd(jacobian)[2][-1])
+
+
+def _pair(eigenvalues: ComplexArray) -> float:
+    """|lambda|^2 - 1 of a complex pair, NaN without one."""
+    complex_ones = eigenvalues[np.abs(eigenvalues.imag) > 1e-12]
+    return float(np.abs(complex_ones[0]) ** 2 - 1.0) if complex_ones.size else np.nan

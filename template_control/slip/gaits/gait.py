@@ -1,0 +1,201 @@
+"""Walking gaits: period-one fixed points of the VLO return map, symmetric in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from template_control.errors import GaitError
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+WALKING_SLOTS = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
+"""Controls of a walking step: alpha, kappa_1, kappa_2."""
+
+_SCAN = 120
+
+
+@dataclass(frozen=True)
+class WalkingGait:
+    """A passive symmetric walking gait.
+
+    Attributes:
+        name: for tables and records.
+        parameters: the template.
+        vlo: (3,) dx/dt, y, dy/dt at VLO; dy/dt is 0 [m/s, m, m/s].
+        controls: (5,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
+        step_length: [m].
+        step_duration: [s].
+    """
+
+    name: str
+    parameters: SlipParameters
+    vlo: Array
+    controls: Array
+    step_length: float
+    step_duration: float
+
+    @property
+    def mean_speed(self) -> float:
+        """Step length over step duration [m/s]."""
+        return self.step_length / self.step_duration
+
+    @property
+    def energy(self) -> float:
+        """Mechanical energy at VLO, the stance spring's included [J]."""
+        return vlo_energy(self.parameters, self.vlo)
+
+
+def vlo_energy(parameters: SlipParameters, z: Array) -> float:
+    """E = m v^2 / 2 + m g y + k0 (l0 - y)^2 / 2 at the VLO state z (3,) [J]."""
+    p = parameters
+    kinetic = 0.5 * p.mass * (z[0] ** 2 + z[2] ** 2)
+    spring = 0.5 * p.leg_stiffness * (p.rest_length - z[1]) ** 2
+    return float(kinetic + p.mass * p.gravity * z[1] + spring)
+
+
+def vlo_jacobians(gait: WalkingGait) -> tuple[Array, Array]:
+    """Of the exact VLO map at a gait: A (3, 3) in z and B (3, 3) in alpha and shares of k0.
+
+    B's columns are the touchdown angle [1/rad], kappa_1 / k0 and kappa_2 / k0.
+    """
+    linear = ReturnMap(gait.parameters).linearise(gait.vlo, gait.controls)
+    k0 = gait.parameters.leg_stiffness
+    return linear.state_jacobian, linear.control_jacobian[:, WALKING_SLOTS] * [1.0, k0, k0]
+
+
+def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingGait:
+    stride = simulate_stride(parameters, STRIDE_START["w"], [0.0, z[1], z[0], z[2]], u)
+    if not stride.completed or np.max(np.abs(stride.state[[2, 1, 3]] - z)) > 1e-6:
+        raise GaitError(f"gait {name!r} does not return to its VLO state: {stride.outcome.reason}")
+    return WalkingGait(name, parameters, z, u, float(stride.state[0]), stride.duration)
+
+
+def _returns(step: ReturnMap, z: Array, u: Array) -> float:
+    """Vertical speed at the next VLO, NaN where there is none; zero for a symmetric gait."""
+    z_next, outcome = step.step(z, u)
+    return float(z_next[2]) if outcome is Outcome.SECTION else np.nan
+
+
+def _symmetric_roots(
+    parameters: SlipParameters,
+    make: Callable[[float], tuple[Array, Array]],
+    values: Array,
+) -> list[tuple[Array, Array]]:
+    """All (z, u) = make(value) on the grid ``values`` that return to themselves."""
+    step = ReturnMap(parameters)
+
+    def residual(value: float) -> float:
+        return _returns(step, *make(value))
+
+    found = []
+    samples = [residual(v) for v in values]
+    for lo, hi, f_lo, f_hi in zip(values, values[1:], samples, samples[1:], strict=False):
+        if not (np.isfinite(f_lo) and np.isfinite(f_hi)) or f_lo * f_hi > 0.0:
+            continue
+        z, u = make(brentq(residual, lo, hi, xtol=1e-14, rtol=1e-14))
+        z_next, outcome = step.step(z, u)
+        # A vertical speed that returns to zero need not be the symmetric step.
+        if outcome is Outcome.SECTION and np.max(np.abs(z_next - z)) < 1e-6:
+            found.append((z, u))
+    return found
+
+
+def gait_at(
+    parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
+) -> WalkingGait:
+    """The symmetric gait with this touchdown angle [rad] and speed at VLO [m/s].
+
+    Raises:
+        GaitError: if there is none.
+    """
+    k0, l0 = parameters.leg_stiffness, parameters.rest_length
+    u = controls(touchdown_angle, k0, k0)
+    heights = np.linspace(l0 * np.sin(touchdown_angle) + 1e-5 * l0, l0 * (1 - 1e-5), _SCAN)
+    roots = _symmetric_roots(parameters, lambda y: (np.array([vlo_speed, y, 0.0]), u), heights)
+    if not roots:
+        unit = np.sqrt(parameters.gravity * l0)
+        raise GaitError(
+            f"no walking gait with touchdown angle {np.degrees(touchdown_angle):.2f} deg"
+            f" and {vlo_speed:g} m/s at VLO: try an angle of 64 to 72 deg and"
+            f" {0.25 * unit:.2g} to {0.38 * unit:.2g} m/s"
+        )
+    return _gait(name, parameters, *roots[0])
+
+
+def gait_from_energy(
+    parameters: SlipParameters, height: float, energy: float, name: str = "paper"
+) -> WalkingGait:
+    """The symmetric gait with this VLO height [m] and energy [J] (as Section IV-D).
+
+    Raises:
+        GaitError: if there is none.
+    """
+    p = parameters
+    spring = 0.5 * p.leg_stiffness * (p.rest_length - height) ** 2
+    squared = 2.0 / p.mass * (energy - spring - p.mass * p.gravity * height)
+    top = np.arcsin(min(height / p.rest_length, 1.0))
+    if not squared > 0.0:
+        raise GaitError(f"energy {energy:g} J leaves no speed at a VLO height of {height:g} m")
+    z = np.array([np.sqrt(squared), height, 0.0])
+    k0 = p.leg_stiffness
+    roots = _symmetric_roots(
+        parameters, lambda a: (z, controls(a, k0, k0)), np.linspace(0.9, top - 1e-4, _SCAN)
+    )
+    if not roots:
+        raise GaitError(f"no walking gait with VLO height {height:g} m and energy {energy:g} J")
+    return _gait(name, parameters, *roots[-1])
+
+
+def _nominal_angle(mean_speed: float, rest_length: float, gravity: float) -> float:
+    """Touchdown angle [rad] at which a mean speed is walked: steeper when slower.
+
+    66 deg from 1.1 m/s up and 68 deg at 0.9 m/s (for l0 = 1 m), where the steps are long
+    enough in time for a swing leg to follow.
+    """
+    dimensionless = mean_speed / np.sqrt(gravity * rest_length)
+    return float(np.radians(np.interp(dimensionless, [0.255, 0.287, 0.351], [69.0, 68.0, 66.0])))
+
+
+def gait_for_speed(
+    parameters: SlipParameters, mean_speed: float, name: str = "walk"
+) -> WalkingGait:
+    """The symmetric gait with this mean forward speed [m/s].
+
+    Raises:
+        GaitError: if there is none.
+    """
+    p = parameters
+    if not (np.isfinite(mean_speed) and mean_speed > 0.0):
+        raise GaitError(f"speed is {mean_speed!r} m/s: give a positive number")
+    unit = np.sqrt(p.gravity * p.rest_length)
+    angle = _nominal_angle(mean_speed, p.rest_length, p.gravity)
+
+    def surplus(vlo_speed: float) -> float:
+        try:
+            return gait_at(p, angle, vlo_speed, name).mean_speed - mean_speed
+        except GaitError:
+            return np.nan
+
+    # The mean speed grows with the speed at VLO; find two neighbours around the wanted one.
+    speeds = unit * np.linspace(0.2, 0.45, 26)
+    values = np.array([surplus(s) for s in speeds])
+    for lo, hi, f_lo, f_hi in zip(speeds, speeds[1:], values, values[1:], strict=False):
+        if f_lo <= 0.0 <= f_hi:
+            return gait_at(p, angle, float(brentq(surplus, lo, hi, xtol=1e-10)), name)
+    reachable = values[np.isfinite(values)] + mean_speed
+    hint = (
+        f"between {reachable.min():.2f} and {reachable.max():.2f} m/s"
+        if reachable.size
+        else "another"
+    )
+    raise GaitError(f"no walking gait at a mean speed of {mean_speed:g} m/s: give one {hint}")

@@ -1,0 +1,139 @@
+"""Branches of passive periodic gaits.
+
+A point of a branch is X = (dx/dt, y, dy/dt, alpha, k) at VLO, or (dx/dt, y, alpha, k) at apex.
+The stride returns to its state, which a passive stride's conserved energy makes one equation
+fewer than there are states; two quantities are held fixed; one dimension is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import ParameterError
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
+from template_control.slip.gaits.branch import (
+    QUANTITIES,
+    Branch,
+    BranchPoint,
+    Equations,
+    null_vector,
+)
+from template_control.slip.gaits.stability import classify, shell_eigenvalues
+from template_control.slip.maps.return_map import Linearisation, ReturnMap
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+_COORDINATE = {"angle": -2, "stiffness": -1, "height": 1, "speed": 0}
+
+
+class Family(Branch):
+    """One-parameter family of passive gaits with two quantities held fixed.
+
+    Args:
+        parameters: the template; its stiffness only scales.
+        stride: "w" or "r".
+        fixed: two of :data:`~.branch.QUANTITIES` with their values (SI units, angle in radians).
+
+    Raises:
+        ParameterError: if ``fixed`` is anything else.
+    """
+
+    def __init__(self, parameters: SlipParameters, stride: str, fixed: Mapping[str, float]) -> None:
+        if stride not in ("w", "r"):
+            raise ParameterError(f"stride is {stride!r}: periodic gaits are 'w' or 'r'")
+        if len(fixed) != 2 or not set(fixed) <= set(QUANTITIES):
+            raise ParameterError(
+                f"fixed quantities are {', '.join(fixed) or 'none'}: give two of"
+                f" {', '.join(QUANTITIES)}"
+            )
+        for name, value in fixed.items():
+            if not np.isfinite(value):
+                raise ParameterError(f"{name} is {value!r}: give a finite number")
+        self.parameters = parameters
+        self.fixed = dict(fixed)
+        self.free = tuple(q for q in QUANTITIES if q not in fixed)
+        self.map = ReturnMap(parameters, stride)
+        self.n = self.map.dimensions[0]
+        p = parameters
+        speed = np.sqrt(p.gravity * p.rest_length)
+        self.scale = np.array([*[speed, p.rest_length, speed][: self.n], 1.0, p.leg_stiffness])
+        self._energy_scale = p.mass * p.gravity * p.rest_length
+
+    def point(self, x: Array) -> BranchPoint:
+        """The branch point at X (n + 2,); its tangent is oriented arbitrarily."""
+        equations, linear = self._linearised(x)
+        energy, gradient = self.quantity(x, "energy")
+        eigenvalues = shell_eigenvalues(linear.state_jacobian, gradient[: self.n])
+        return BranchPoint(
+            x=x.copy(),
+            state=x[: self.n].copy(),
+            controls=self._controls(x),
+            energy=energy,
+            target=None,
+            eigenvalues=eigenvalues,
+            kind=classify(eigenvalues),
+            tangent=null_vector(equations.jacobian),
+        )
+
+    def equations(self, x: Array) -> Equations:
+        """Residual (n + 1,) and Jacobian at X: the stride returns, two quantities are held."""
+        return self._linearised(x)[0]
+
+    def quantity(self, x: Array, name: str) -> tuple[float, Array]:
+        """One of :data:`~.branch.QUANTITIES`, and its (n + 2,) gradient in X."""
+        gradient = np.zeros(self.n + 2)
+        if name != "energy":
+            gradient[_COORDINATE[name]] = 1.0
+            return float(x[_COORDINATE[name]]), gradient
+        energy, by_state, by_stiffness = section_energy(self.parameters, x[: self.n], x[-1])
+        gradient[: self.n], gradient[-1] = by_state, by_stiffness
+        return energy, gradient
+
+    def _controls(self, x: Array) -> Array:
+        u = np.zeros(NUM_SLOTS)
+        u[Slot.TOUCHDOWN_ANGLE] = x[-2]
+        u[[Slot.K_SC, Slot.K_SD]] = x[-1]
+        return u
+
+    def _linearised(self, x: Array) -> tuple[Equations, Linearisation]:
+        n = self.n
+        linear = self.map.linearise(x[:n], self._controls(x))
+        stiffness = linear.control_jacobian[:, [Slot.K_SC, Slot.K_SD]].sum(axis=1)
+        full = np.column_stack(
+            (
+                linear.state_jacobian - np.eye(n),
+                linear.control_jacobian[:, Slot.TOUCHDOWN_ANGLE],
+                stiffness,
+            )
+        )
+        # dx/dt returns by itself: energy is conserved.
+        rows = full[1:] / self.scale[1:n, None]
+        residual = (linear.state - x[:n])[1:] / self.scale[1:n]
+        for name, value in self.fixed.items():
+            held, gradient = self.quantity(x, name)
+            size = self._energy_scale if name == "energy" else self.scale[_COORDINATE[name]]
+            residual = np.append(residual, (held - value) / size)
+            rows = np.vstack((rows, gradient / size))
+        valid = linear.outcome is Outcome.SECTION
+        return Equations(residual, rows * self.scale, valid), linear
+
+
+def section_energy(
+    parameters: SlipParameters, z: Array, stiffness: float
+) -> tuple[float, Array, float]:
+    """Energy at VLO (3,) or apex (2,) [J], and its derivatives by the state and the stiffness.
+
+    At VLO the stance leg is vertical and as long as the CoM is high, (8).
+    """
+    p = parameters
+    compression = p.rest_length - z[1] if len(z) == 3 else 0.0
+    kinetic = 0.5 * p.mass * (z[0] ** 2 + (z[2] ** 2 if len(z) == 3 else 0.0))
+    by_stiffness = 0.5 * compression**2
+    gradient = p.mass * np.array([z[0], p.gravity, *z[2:]])
+    gradient[1] -= stiffness * compression
+    energy = kinetic + p.mass * p.gravity * z[1] + stiffness * by_stiffness
+    return float(energy), gradient, float(by_stiffness)

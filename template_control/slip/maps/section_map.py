@@ -1,0 +1,127 @@
+"""Compiled return maps from section to section, exact or in closed form, and their Jacobians."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from template_control.slip.automaton.tables import Tables
+from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.dynamics.closed_form import closed_form_stride
+from template_control.slip.dynamics.compiled import inner
+from template_control.slip.dynamics.kernel import Model, Scratch, run_stride
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_EXACT = int(MapKind.EXACT)
+# Numba would compile the stride once more for a literal False.
+_LAST_ONLY = np.bool_(False)
+_STEP = 1e-20  # of a complex step: its square vanishes against 1
+
+RESULTS = 6
+"""Numbers a map yields: dx/dt, y, dy/dt, distance covered, legs' lengths at the bottom."""
+
+
+@inner
+def section_map(
+    tables: Tables,
+    model: Model,
+    kind: int,
+    node: int,
+    z: Array,
+    controls: Array,
+    scratch: Scratch,
+    result: Array,
+) -> int:
+    """One stride from section to section; returns the Outcome's value.
+
+    Args:
+        tables: the packed automaton.
+        model: the template.
+        kind: value of the MapKind.
+        node: index of the stride's first node.
+        z: (3,) dx/dt, y, dy/dt at the section [m/s, m, m/s]; dy/dt is 0 at apex.
+        controls: (NUM_SLOTS,) u by Slot.
+        scratch: overwritten.
+        result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance
+            covered [m], lengths of rear and front leg at the (virtual) bottom [m], NaN if
+            there was none.
+    """
+    state, toes, bottom = scratch.state, scratch.toes, scratch.bottom
+    state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
+    toes[0] = toes[1] = 0.0
+    bottom[0] = bottom[1] = np.nan
+    if kind == _EXACT:
+        outcome = run_stride(tables, model, node, state, toes, controls, _LAST_ONLY, scratch)[0]
+    else:
+        outcome = closed_form_stride(tables, model, kind, node, state, toes, controls, scratch)
+    result[0], result[1], result[2], result[3] = state[2], state[1], state[3], state[0]
+    result[4], result[5] = bottom[0], bottom[1]
+    return outcome
+
+
+@njit(cache=True)
+def map_many(
+    tables: Tables,
+    model: Model,
+    kind: int,
+    node: int,
+    z: Array,
+    controls: Array,
+    scratch: Scratch,
+    result: Array,
+    outcome: IntArray,
+) -> None:
+    """:func:`section_map` for rows of ``z`` (n, 3) and ``controls`` (n, NUM_SLOTS)."""
+    for i in range(z.shape[0]):
+        outcome[i] = section_map(tables, model, kind, node, z[i], controls[i], scratch, result[i])
+
+
+@njit(cache=True)
+def section_jacobian(
+    tables: Tables,
+    model: Model,
+    kind: int,
+    node: int,
+    z: Array,
+    controls: Array,
+    columns: IntArray,
+    scratch: Scratch,
+    result: Array,
+    jacobian: Array,
+) -> int:
+    """:func:`section_map` with its derivatives, exact to rounding, by complex steps.
+
+    The imaginary part of each event's time is the derivative that the saltation matrix
+    accounts for; nothing is differenced.
+
+    Args:
+        columns: (c,) what to differentiate by: 0 to 2 the state, 3 + slot the controls.
+        scratch: complex, from ``new_scratch(complex)``.
+        result: (RESULTS,) overwritten.
+        jacobian: (RESULTS, c) overwritten.
+        The rest as in :func:`section_map`.
+    """
+    zc, uc = z.astype(np.complex128), controls.astype(np.complex128)
+    out = np.empty(RESULTS, np.complex128)
+    outcome = 0
+    for c in range(columns.shape[0]):
+        j = columns[c]
+        # Scaled so that stiffnesses (1e4 N/m) move as much as speeds do.
+        h = _STEP * max(abs(z[j] if j < 3 else controls[j - 3]), 1.0)
+        if j < 3:
+            zc[j] += 1j * h
+        else:
+            uc[j - 3] += 1j * h
+        outcome = section_map(tables, model, kind, node, zc, uc, scratch, out)
+        if j < 3:
+            zc[j] = z[j]
+        else:
+            uc[j - 3] = controls[j - 3]
+        for i in range(RESULTS):
+            jacobian[i, c] = out[i].imag / h
+    for i in range(RESULTS):
+        result[i] = out[i].real
+    return outcome

@@ -1,0 +1,211 @@
+"""A scenario: a speed profile with gait switches, as data (Python or TOML)."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from template_control.errors import ScenarioError
+from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.parameters import SlipParameters
+
+Gait = Literal["walk", "run"]
+Walking = Literal["modified", "active"]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of the profile; it ends with whichever of its ends comes first.
+
+    Attributes:
+        gait: "walk" or "run". Where it differs from the segment before, the first stride is
+            the transition.
+        speed: wanted at the segment's start [m/s]; None goes on from the profile.
+        acceleration: of the wanted speed [m/s^2].
+        until_speed: ends when the wanted speed gets there, and the template's own is there
+            too if the profile slows down [m/s].
+        duration: [s].
+        steps: number of strides after the transition.
+    """
+
+    gait: Gait
+    speed: float | None = None
+    acceleration: float = 0.0
+    until_speed: float | None = None
+    duration: float | None = None
+    steps: int | None = None
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What the template is to do, from a VLO on; the defaults are Table IV's.
+
+    Attributes:
+        segments: the profile.
+        parameters: the template.
+        map_kind: return map of the controllers; the simulation is always exact.
+        start: (3,) dx/dt, y, dy/dt at the first VLO [m/s, m, m/s].
+        touchdown_angle: first guess of walking [deg].
+        vlo: (2,) y and dy/dt wanted at VLO [m, m/s]. The wanted dx/dt is a segment's speed.
+        apex_height: y wanted at apex [m].
+        walking: "modified" (38) or "active" (37) walking controller.
+        name: for titles and files.
+
+    Raises:
+        ScenarioError: naming the first thing that is wrong.
+    """
+
+    segments: tuple[Segment, ...]
+    parameters: SlipParameters = field(default_factory=SlipParameters)
+    map_kind: MapKind = MapKind.PAPER
+    start: tuple[float, float, float] = (1.1, 0.98, 0.0)
+    touchdown_angle: float = 70.0
+    vlo: tuple[float, float] = (0.98, 0.0)
+    apex_height: float = 0.98
+    walking: Walking = "modified"
+    name: str = "scenario"
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+
+def _number(where: str, value: Any, low: float = -math.inf, high: float = math.inf) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ScenarioError(f"{where} is {value!r}: give a number")
+    if not (math.isfinite(value) and low < value < high):
+        between = f"over {low:g}" if math.isinf(high) else f"between {low:g} and {high:g}"
+        raise ScenarioError(
+            f"{where} is {value:g}: give a finite number"
+            + ("" if math.isinf(low) else f" {between}")
+        )
+
+
+def _choice(where: str, value: Any, choices: tuple[Any, ...]) -> None:
+    if value not in choices:
+        raise ScenarioError(f"{where} is {value!r}: give one of {', '.join(map(str, choices))}")
+
+
+def _check(scenario: Scenario) -> None:
+    s = scenario
+    length = s.parameters.rest_length
+    _choice("walking", s.walking, get_args(Walking))
+    _number("touchdown_angle", s.touchdown_angle, 0.0, 90.0)
+    for name, values, size in (("start", s.start, 3), ("vlo", s.vlo, 2)):
+        if len(values) != size:
+            raise ScenarioError(f"{name} has {len(values)} numbers: give {size}")
+        for value in values:
+            _number(name, value)
+    _number("start speed", s.start[0], 0.0)
+    for name, height in (("start height", s.start[1]), ("vlo height", s.vlo[0])):
+        _number(name, height, 0.0, length)
+    _number("apex_height", s.apex_height, 0.0)
+    if not s.segments:
+        raise ScenarioError("the scenario has no segments: give at least one [[segment]]")
+    if s.segments[0].gait != "walk" or s.segments[0].speed is None:
+        raise ScenarioError("segment 1 must walk at a given speed: the start is a VLO")
+    for i, segment in enumerate(s.segments, 1):
+        _check_segment(f"segment {i}", segment)
+
+
+def _check_segment(where: str, segment: Segment) -> None:
+    _choice(f"{where} gait", segment.gait, get_args(Gait))
+    _number(f"{where} acceleration", segment.acceleration)
+    for name in ("speed", "until_speed", "duration"):
+        value = getattr(segment, name)
+        if value is not None:
+            _number(f"{where} {name}", value, 0.0)
+    if segment.steps is not None and (not isinstance(segment.steps, int) or segment.steps < 1):
+        raise ScenarioError(f"{where} steps is {segment.steps!r}: give a whole number from 1")
+    if segment.until_speed is None and segment.duration is None and segment.steps is None:
+        raise ScenarioError(f"{where} never ends: give it until_speed, duration or steps")
+    if segment.until_speed is not None and segment.acceleration == 0.0:
+        raise ScenarioError(f"{where} has until_speed but no acceleration: give one")
+
+
+def example_one(
+    map_kind: MapKind = MapKind.PAPER, steps_after: int = 20, acceleration: float = 1.05
+) -> Scenario:
+    """The paper's Example I (Section V-A): walk, run up to 5 m/s and down again, walk.
+
+    It starts at the VLO speed that is 1.17 m/s on average, as Section V-A tells it (Table IV
+    has 1.1 m/s there, which is 1.13 m/s on average); it ends at Table IV's 1.1 m/s.
+
+    Args:
+        map_kind: return map of the controllers.
+        steps_after: walking steps at the end.
+        acceleration: of the run, and its negative [m/s^2].
+    """
+    return Scenario(
+        segments=(
+            Segment("walk", speed=1.125, duration=0.8),
+            Segment("run", speed=1.9, acceleration=acceleration, until_speed=5.0),
+            Segment("run", duration=1.5),
+            Segment("run", acceleration=-acceleration, until_speed=2.0),
+            Segment("walk", speed=1.1, steps=steps_after),
+        ),
+        map_kind=map_kind,
+        start=(1.125, 0.98, 0.0),
+        name="Example I",
+    )
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Read a scenario from a TOML file with the attributes' names as keys.
+
+    ``[parameters]`` holds the template, each ``[[segment]]`` a :class:`Segment`; ``map`` is
+    the map's name in lower case.
+
+    Raises:
+        ScenarioError: naming the file and what is wrong in it.
+    """
+    path = Path(path)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"cannot read {path}: {error.strerror}; give a TOML file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path} is no TOML: {error}") from None
+    try:
+        return _scenario(data)
+    except ValueError as error:
+        raise ScenarioError(f"{path}: {error}") from None
+
+
+def _scenario(data: dict[str, Any]) -> Scenario:
+    known = {f.name for f in fields(Scenario)} - {"segments", "map_kind"} | {"segment", "map"}
+    _known_keys("the scenario", data, known)
+    arguments: dict[str, Any] = {k: v for k, v in data.items() if k not in ("segment", "map")}
+    if "map" in data:
+        names = {kind.name.lower(): kind for kind in MapKind}
+        _choice("map", data["map"], tuple(names))
+        arguments["map_kind"] = names[data["map"]]
+    for name in ("start", "vlo"):
+        if name in data:
+            if not isinstance(data[name], list):
+                raise ScenarioError(f"{name} is {data[name]!r}: give a list of numbers")
+            arguments[name] = tuple(data[name])
+    if "parameters" in data:
+        _known_keys("[parameters]", data["parameters"], {f.name for f in fields(SlipParameters)})
+        arguments["parameters"] = SlipParameters(**data["parameters"])
+    segments = data.get("segment", [])
+    if not isinstance(segments, list):
+        raise ScenarioError("segment is a single table: write [[segment]] with two brackets")
+    for i, segment in enumerate(segments, 1):
+        _known_keys(f"segment {i}", segment, {f.name for f in fields(Segment)})
+        for f in fields(Segment):
+            if f.default is MISSING and f.name not in segment:
+                raise ScenarioError(f"segment {i} has no {f.name}: give one")
+    return Scenario(segments=tuple(Segment(**segment) for segment in segments), **arguments)
+
+
+def _known_keys(where: str, table: Any, known: set[str]) -> None:
+    if not isinstance(table, dict):
+        raise ScenarioError(f"{where} is {table!r}: give a table")
+    for key in table:
+        if key not in known:
+            raise ScenarioError(
+                f"{where} has an unknown key {key!r}: known are {', '.join(sorted(known))}"
+            )

@@ -1,0 +1,191 @@
+"""Calls of one function on any executor that has ``submit`` like ``concurrent.futures``."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from itertools import islice
+from multiprocessing import parent_process
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from template_control.errors import SweepError
+from template_control.sweep.file import Outcome, plain
+
+_REFRESH = 0.2  # [s] between two looks of the progress bar
+
+
+class ExecutorLostError(Exception):
+    """The executor, not a call, failed."""
+
+
+def check_pickles(function: Callable[..., Any], executor: Executor | None) -> None:
+    """Find out before the first call whether worker processes can be sent the function.
+
+    Raises:
+        SweepError: if not.
+    """
+    # Dask sends what pickle cannot.
+    if executor is not None and not isinstance(executor, ProcessPoolExecutor):
+        return
+    try:
+        pickle.dumps(function)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise SweepError(
+            f"the function cannot go to worker processes ({error}):"
+            " define it at the top level of a module"
+        ) from None
+
+
+def run_calls(
+    function: Callable[..., Any],
+    calls: Iterator[tuple[int, dict[str, Any]]],
+    executor: Executor | None,
+    in_flight: int,
+    keep: Callable[[int, Outcome], None],
+    refresh: Callable[[], None],
+) -> None:
+    """Feed the executor and keep what comes back; at an error, what had finished by then too.
+
+    Args:
+        function: what to call.
+        calls: index and keyword arguments of each call.
+        executor: None for processes of this machine, ended before this returns.
+        in_flight: how many calls are with the executor at a time.
+        keep: called with index and outcome of each call as it finishes.
+        refresh: called a few times a second.
+
+    Raises:
+        ExecutorLostError: if the executor cannot go on.
+        SweepError: raised by ``keep``.
+    """
+    # Dask takes calls with equal arguments for one, whose outcome it may still hold.
+    token = uuid.uuid4().hex
+    done: SimpleQueue[Future[Outcome]] = SimpleQueue()
+    under_way: dict[Future[Outcome], int] = {}
+    due = time.monotonic()
+    try:
+        with _workers(executor) as pool:
+            while True:
+                for index, arguments in islice(calls, in_flight - len(under_way)):
+                    future = _submit(pool, token, function, arguments)
+                    under_way[future] = index
+                    future.add_done_callback(done.put)
+                if not under_way:
+                    return
+                if time.monotonic() >= due:
+                    refresh()
+                    due = time.monotonic() + _REFRESH
+                try:
+                    future = done.get(timeout=_REFRESH)
+                except Empty:
+                    continue
+                keep(under_way[future], _outcome(future))
+                del under_way[future]
+    except SweepError:
+        _cancel(under_way)
+        raise
+    except BaseException:
+        for future, index in _cancel(under_way):
+            keep(index, future.result())
+        raise
+
+
+def _submit(
+    pool: Executor, token: str, function: Callable[..., Any], arguments: dict[str, Any]
+) -> Future[Outcome]:
+    try:
+        return pool.submit(_call, token, function, arguments)
+    except RuntimeError as error:  # BrokenExecutor is one; so is a pool that was shut down
+        raise ExecutorLostError(str(error)) from None
+
+
+def _call(_: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Outcome:
+    """In the worker: one call, whatever comes of it."""
+    with _no_interrupt():
+        try:
+            return Outcome(plain(function(**arguments)), None)
+        except (Exception, SystemExit) as error:
+            return Outcome(None, _reason(error))
+
+
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """Ctrl-C reaches worker processes too, where a robot's run would end early, as if whole."""
+    if parent_process() is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _reason(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
+def _outcome(future: Future[Outcome]) -> Outcome:
+    if future.cancelled():
+        raise ExecutorLostError("it cancelled a call")
+    error = future.exception()
+    if error is None:
+        return future.result()
+    if isinstance(error, BrokenExecutor):
+        raise ExecutorLostError(str(error))
+    if isinstance(error, KeyboardInterrupt):
+        raise error
+    return Outcome(None, _reason(error))
+
+
+def _cancel(under_way: dict[Future[Outcome], int]) -> list[tuple[Future[Outcome], int]]:
+    """Give up what has not begun; the calls that had finished by themselves."""
+    finished = []
+    for future, index in under_way.items():
+        future.cancel()
+        if future.done() and not future.cancelled() and future.exception() is None:
+            finished.append((future, index))
+    return finished
+
+
+@contextmanager
+def _workers(executor: Executor | None) -> Iterator[Executor]:
+    """The user's executor as it is, or our own, ended with the sweep."""
+    if executor is not None:
+        yield executor
+        return
+    own = worker_processes(os.cpu_count())
+    try:
+        yield own
+    finally:
+        own.shutdown(cancel_futures=True)
+
+
+def worker_processes(count: int | None) -> ProcessPoolExecutor:
+    """Processes of this machine that leave Ctrl-C to the sweep and end with its process.
+
+    Args:
+        count: how many; None for one a core.
+    """
+    return ProcessPoolExecutor(count, initializer=_obey_parent_only)
+
+
+def _obey_parent_only() -> None:
+    """In a worker: leave Ctrl-C to the parent, and end when it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+
+        def watch() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()

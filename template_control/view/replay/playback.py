@@ -1,0 +1,164 @@
+"""What a replay shows of a run, frame by frame: samples, template legs, forces, footholds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import ParameterError, RecordError
+from template_control.run.record import Record
+
+Array = NDArray[np.float64]
+
+_ZIGZAGS = 12
+_CARRYING = 0.005  # of the weight: what the plant counts as a contact
+_STANCE = 0.03  # [s] a shorter contact is a scuff, no foothold
+_BOUNDS = {"speed": (0.01, 100.0), "fps": (1.0, 120.0)}
+_MOST_FRAMES = 100_000
+
+
+@dataclass(frozen=True)
+class Playback:
+    """Frames of a run; F of them.
+
+    Attributes:
+        record: the run.
+        rows: (F,) sample shown in each frame.
+        clock: (F,) seconds from the replay's beginning at which a frame is shown.
+    """
+
+    record: Record
+    rows: NDArray[np.int64]
+    clock: Array
+
+
+@dataclass(frozen=True)
+class Foothold:
+    """A place a foot stood on.
+
+    Attributes:
+        foot: 0 left, 1 right.
+        x: where [m].
+        time: from when on [s].
+    """
+
+    foot: int
+    x: float
+    time: float
+
+
+def playback(
+    record: Record,
+    *,
+    fps: float,
+    speed: float = 1.0,
+    start: float | None = None,
+    end: float | None = None,
+) -> Playback:
+    """Choose the frames of a replay.
+
+    Args:
+        record: the run.
+        fps: frames per second of the replay, 1 to 120.
+        speed: seconds of the run per second of the replay, 0.01 to 100.
+        start, end: part of the run to show [s]; None for its beginning and end. Negative
+            values count from the run's end.
+
+    Raises:
+        ParameterError: if a number is out of its range.
+        RecordError: if the run has fewer than two samples.
+    """
+    for name, value in (("speed", speed), ("fps", fps)):
+        low, high = _BOUNDS[name]
+        if not (math.isfinite(value) and low <= value <= high):
+            raise ParameterError(f"{name} is {value:g}: give a number from {low:g} to {high:g}")
+    if len(record.time) < 2:
+        raise RecordError("the run has fewer than two samples: there is nothing to replay")
+    first, last = float(record.time[0]), float(record.time[-1])
+    begin, stop = _moment(start, first, last), _moment(end, last, last)
+    if not (first <= begin < stop):
+        raise ParameterError(
+            f"nothing lies between start {begin:g} s and end {stop:g} s: the run goes from"
+            f" {first:g} to {last:g} s"
+        )
+    stop = min(stop, last)
+    duration = (stop - begin) / speed
+    if duration * fps > _MOST_FRAMES:
+        raise ParameterError(
+            f"the replay would have {duration * fps:.0f} frames, more than {_MOST_FRAMES}:"
+            " give a lower fps, a higher speed, or a shorter part by start and end"
+        )
+    clock = np.arange(max(int(duration * fps + 1e-9), 1) + 1) / fps
+    clock[-1] = min(clock[-1], max(duration, clock[-2] + 1e-3))
+    moments = begin + speed * clock
+    middles = 0.5 * (record.time[1:] + record.time[:-1])
+    return Playback(record, np.searchsorted(middles, moments), clock)
+
+
+def _moment(value: float | None, default: float, last: float) -> float:
+    if value is None:
+        return default
+    if not math.isfinite(value):
+        raise ParameterError(f"start and end are seconds of the run: {value} is none")
+    return max(last + value, 0.0) if value < 0.0 else value
+
+
+def weight(record: Record) -> float:
+    """The controlled robot's weight [N]."""
+    return float(record.metadata["mass"] * record.metadata["template"]["gravity"])
+
+
+def carrying(record: Record) -> NDArray[np.bool_]:
+    """(T, 2) whether the ground carries the left and the right foot."""
+    return np.asarray(record.contact_force[:, :, 1] > _CARRYING * weight(record))
+
+
+def template_legs(record: Record) -> tuple[Array, NDArray[np.bool_]]:
+    """The template's rear and front leg, which run from its CoM to the robot's feet.
+
+    Returns:
+        toes: (T, 2, 2) of the rear and the front leg [m].
+        loaded: (T, 2) whether the leg pushes.
+    """
+    samples = np.arange(len(record.time))
+    toes = np.stack(
+        (record.foot[samples, record.rear], record.foot[samples, 1 - record.rear]), axis=1
+    )
+    return toes, np.linalg.norm(record.template_force, axis=2) > _CARRYING * weight(record)
+
+
+def spring(radius: float) -> Array:
+    """(N, 2) a zigzag from (0, 0) to (0, 1), ``radius`` to either side: a leg, drawn."""
+    turns = np.arange(_ZIGZAGS)
+    inner = np.stack(
+        (radius * np.where(turns % 2, -1.0, 1.0), 0.15 + 0.7 * (turns + 0.5) / _ZIGZAGS), axis=1
+    )
+    return np.concatenate(([[0.0, 0.0], [0.0, 0.15]], inner, [[0.0, 0.85], [0.0, 1.0]]))
+
+
+def force_arrows(record: Record) -> Array:
+    """(T, 2, 2) the ground's force on each foot as an arrow, zero where it does not carry [m].
+
+    The weight is 0.4 rest lengths long. An arrow longer than two weights, at an impact, is
+    cut to that.
+    """
+    arrow = record.contact_force / weight(record)
+    size = np.linalg.norm(arrow, axis=2, keepdims=True)
+    arrow = arrow * np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))
+    arrow[~carrying(record)] = 0.0
+    return np.asarray(0.4 * record.metadata["template"]["rest_length"] * arrow)
+
+
+def footholds(record: Record) -> list[Foothold]:
+    """Where the feet stood, by time."""
+    found = []
+    for foot, on in enumerate(carrying(record).T):
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], on, [False])).astype(np.int8)))
+        for first, after in edges.reshape(-1, 2):
+            if record.time[after - 1] - record.time[first] >= _STANCE:
+                x = float(np.median(record.foot[first:after, foot, 0]))
+                found.append(Foothold(foot, x, float(record.time[first])))
+    return sorted(found, key=lambda foothold: foothold.time)

@@ -1,0 +1,296 @@
+"""The 3-D scene of a replay: what meshcat is told, objects first, then their animation.
+
+The run's x goes forward along meshcat's x, its y up along meshcat's z. The camera stands to
+the robot's right; the world moves backward past it, because meshcat's camera always looks at
+its origin.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import umsgpack
+from meshcat import geometry as mg
+from meshcat.animation import Animation, AnimationClip
+from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform
+from meshcat.path import Path as ScenePath
+from numpy.typing import NDArray
+
+from template_control.view.replay.playback import (
+    Playback,
+    carrying,
+    footholds,
+    force_arrows,
+    spring,
+    template_legs,
+)
+from template_control.view.replay.robot_visuals import foot_sides, load_visuals, placements
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
+
+Array = NDArray[np.float64]
+
+_FLOAT32 = 0x17  # the viewer's MessagePack extension for a Float32Array
+_FOREVER = 1_000_000
+
+
+class _Gradual(mg.TriangularMeshGeometry):
+    """A mesh that appears little by little: a dashed material draws up to its dash's length.
+
+    ``frame`` says in which frame each vertex appears.
+    """
+
+    def __init__(self, vertices: Array, faces: NDArray[np.int64], frame: Array) -> None:
+        super().__init__(vertices, faces)
+        self.frame = frame
+
+    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
+        lowered = super().lower(object_data)
+        frame = mg.pack_numpy_array(self.frame.astype(np.float32))
+        lowered["data"]["attributes"]["lineDistance"] = frame
+        return dict(lowered)
+
+
+class _Dashed(mg.GenericMaterial):
+    _type = "LineDashedMaterial"
+
+
+class _Track:
+    """Keyframes of one property as packed arrays, a tenth of meshcat's own in size."""
+
+    def __init__(self, name: str, kind: str, times: Array, values: Any) -> None:
+        self.name, self.kind, self.times, self.values = name, kind, times, values
+
+    def lower(self) -> dict[str, Any]:
+        packed = self.values
+        if not isinstance(packed, list):
+            packed = umsgpack.Ext(_FLOAT32, np.asarray(packed, np.float32).tobytes())
+        times = umsgpack.Ext(_FLOAT32, np.asarray(self.times, np.float32).tobytes())
+        return {"name": "." + self.name, "type": self.kind, "times": times, "values": packed}
+
+
+class _LastAnimation(SetAnimation):
+    """Filed under a path of its own: the server tells late browsers the root's first of all."""
+
+    def lower(self) -> dict[str, Any]:
+        return {**super().lower(), "path": "/animation"}
+
+
+class _Scene:
+    """Collects commands, and one clip an animated path; all clips last as long as the clock."""
+
+    def __init__(self, clock: Array) -> None:
+        self.clock = clock
+        self.commands: list[Any] = []
+        self._animation = Animation()
+
+    def add(self, path: str, geometry: mg.Geometry, material: mg.Material) -> None:
+        self.commands.append(SetObject(geometry, material, ScenePath().append(path)))
+
+    def place(self, path: str, matrix: Array) -> None:
+        self.commands.append(SetTransform(np.asarray(matrix, float), ScenePath().append(path)))
+
+    def set(self, path: str, name: str, value: Any) -> None:
+        self.commands.append(SetProperty(name, value, ScenePath().append(path)))
+
+    def animate(self, path: str, name: str, kind: str, values: Any) -> None:
+        self._track(path, _Track(name, kind, self.clock, values))
+
+    def show(self, path: str, visible: NDArray[np.bool_]) -> None:
+        """Keys only where it changes, and at both ends: a switch is not interpolated."""
+        keys = np.flatnonzero(np.diff(visible, prepend=~visible[:1]))
+        keys = np.unique(np.append(keys, len(visible) - 1))
+        self._track(path, _Track("visible", "bool", self.clock[keys], visible[keys].tolist()))
+
+    def reveal(self, path: str, mesh: _Gradual, color: str, **properties: Any) -> None:
+        """Let a mesh appear as its frames come."""
+        frames = np.arange(float(len(self.clock)))
+        dash = {"dashSize": 0.0, "gapSize": 10.0 * len(frames), "transparent": True}
+        self.add(path, mesh, _Dashed(_rgb(color), **dash, **properties))
+        self.animate(f"{path}/<object>", "material.dashSize", "number", frames)
+
+    def _track(self, path: str, track: _Track) -> None:
+        # One frame a second: the tracks carry seconds.
+        clips = self._animation.clips
+        clip = clips.setdefault(ScenePath().append(path), AnimationClip(fps=1))
+        clip.tracks[track.name] = track
+
+    def finished(self) -> list[Any]:
+        return [*self.commands, _LastAnimation(self._animation, True, _FOREVER)]
+
+
+def scene_commands(playback: Playback) -> list[Any]:
+    """Commands that build and animate the scene; each has meshcat's ``lower()``.
+
+    Raises:
+        RecordError: if the robot's visuals cannot be loaded.
+    """
+    scene = _Scene(playback.clock)
+    length = float(playback.record.metadata["template"]["rest_length"])
+    _surroundings(scene, playback, length)
+    sides = _robot(scene, playback)
+    _trail(scene, playback, length)
+    _template(scene, playback, length)
+    _forces(scene, playback, length, sides)
+    _footholds(scene, playback, length, sides)
+    return scene.finished()
+
+
+def _rgb(color: str) -> int:
+    return int(color.removeprefix("#"), 16)
+
+
+def _overlay(color: str) -> mg.Material:
+    """A flat colour in front of the robot, whose trunk would hide it otherwise."""
+    return mg.MeshBasicMaterial(color=_rgb(color), transparent=True, depthTest=False)
+
+
+def _in_space(points: Array) -> Array:
+    """(..., 2) of the run to (..., 3) of meshcat."""
+    return np.stack((points[..., 0], np.zeros(points.shape[:-1]), points[..., 1]), axis=-1)
+
+
+def _along(direction: Array) -> Array:
+    """(F, 4) quaternions that turn z into the direction (F, 2)."""
+    half = 0.5 * np.arctan2(direction[:, 0], direction[:, 1])
+    zero = np.zeros(len(half))
+    return np.stack((zero, np.sin(half), zero, np.cos(half)), axis=-1)
+
+
+def _ribbon(points: Array, width: float) -> mg.TriangularMeshGeometry:
+    """Two crossed strips along (N, 3) points; four blocks of N vertices."""
+    vertices, faces = [], []
+    steps = np.diff(points, axis=0, append=points[-1:])
+    steps[-1] = points[-1] - points[-2]
+    in_plane = np.stack((-steps[:, 2], 0.0 * steps[:, 1], steps[:, 0]), axis=-1)
+    in_plane /= np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), 1e-12)
+    across = np.broadcast_to([0.0, 1.0, 0.0], points.shape)
+    for side in (in_plane, across):
+        vertices += [points + 0.5 * width * side, points - 0.5 * width * side]
+    count = len(points)
+    for i in range(count - 1):
+        for strip in (0, 2 * count):
+            a, b = strip + i, strip + count + i
+            faces += [(a, b, a + 1), (b, b + 1, a + 1)]
+    return mg.TriangularMeshGeometry(np.concatenate(vertices), np.array(faces))
+
+
+def _plates(centres: Array, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (4 N, 3) and faces (2 N, 3) of rectangles on the ground around (N, 3) centres."""
+    corners = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*size, 0.0]
+    faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(centres))[:, None, None]
+    return (centres[:, None] + corners).reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def _surroundings(scene: _Scene, playback: Playback, length: float) -> None:
+    record, rows = playback.record, playback.rows
+    for end in ("top_color", "bottom_color"):
+        scene.set("/Background", end, [0.96, 0.97, 0.98])
+    for path in ("/Grid", "/Axes"):
+        scene.set(path, "visible", False)
+    x = record.com[rows, 0]
+    low, high = float(x.min()) - 6.0 * length, float(x.max()) + 6.0 * length
+    thick = 0.02 * length
+    middle = np.eye(4)
+    middle[:3, 3] = 0.5 * (low + high), 0.0, -0.5 * thick
+    ground = mg.Box([high - low, 3.0 * length, thick])
+    scene.add("/meshcat/ground", ground, mg.MeshBasicMaterial(color=0xDDE1E6))
+    scene.place("/meshcat/ground", middle)
+    # A line every rest length shows that the camera travels.
+    lines = np.arange(np.ceil(low / length), high / length)[:, None] * [length, 0.0, 0.0]
+    stripes = _plates(lines + np.array([0.0, 0.0, 0.001 * length]), (0.012 * length, 3.0 * length))
+    material = mg.MeshBasicMaterial(color=0xB4BAC2)
+    scene.add("/meshcat/ground_lines", mg.TriangularMeshGeometry(*stripes), material)
+    travel = np.stack((x, 0.0 * x, np.full(len(x), 0.72 * length)), axis=-1)
+    scene.animate("/meshcat", "position", "vector3", -travel)
+    # From afar with a narrow view: little perspective, so that lengths can be compared.
+    eye = [0.7 * length, 0.45 * length, 4.0 * length]
+    scene.set("/Cameras/default/rotated/<object>", "position", eye)
+    scene.set("/Cameras/default/rotated/<object>", "zoom", 2.4)
+
+
+def _robot(scene: _Scene, playback: Playback) -> Array:
+    """The robot; returns (2,) how far to the left its feet are."""
+    model, shapes, visuals = load_visuals(playback.record)
+    positions, quaternions = placements(model, shapes, playback.record.q[playback.rows])
+    for i, visual in enumerate(visuals):
+        path = f"/meshcat/robot/{visual.name}"
+        red, green, blue, opacity = visual.color
+        color = sum(round(255 * c) << s for c, s in ((red, 16), (green, 8), (blue, 0)))
+        material = mg.MeshPhongMaterial(color=color, opacity=opacity, flatShading=True)
+        scene.add(f"{path}/shape", visual.geometry, material)
+        scene.place(f"{path}/shape", visual.offset)
+        scene.animate(path, "position", "vector3", positions[:, i])
+        scene.animate(path, "quaternion", "quaternion", quaternions[:, i])
+    return foot_sides(model, playback.record.metadata["feet"])
+
+
+def _trail(scene: _Scene, playback: Playback, length: float) -> None:
+    com = _in_space(playback.record.com[playback.rows])
+    ribbon = _ribbon(com, 0.008 * length)
+    trail = _Gradual(ribbon.vertices, ribbon.faces, np.tile(np.arange(float(len(com))), 4))
+    scene.reveal("/meshcat/com_trail", trail, COM, depthTest=False)
+    scene.add("/meshcat/com", mg.Sphere(0.025 * length), _overlay(COM))
+    scene.animate("/meshcat/com", "position", "vector3", com)
+
+
+def _template(scene: _Scene, playback: Playback, length: float) -> None:
+    record, rows = playback.record, playback.rows
+    com = record.template_com[rows]
+    scene.add("/meshcat/template/com/dot", mg.Sphere(0.014 * length), _overlay(TEMPLATE))
+    # Nearer to the camera than the robot's CoM, or it would be drawn below that.
+    nearer = np.eye(4)
+    nearer[1, 3] = -0.03 * length
+    scene.place("/meshcat/template/com/dot", nearer)
+    scene.animate("/meshcat/template/com", "position", "vector3", _in_space(com))
+    toes, loaded = template_legs(record)
+    coil = _ribbon(_in_space(spring(0.03 * length)), 0.01 * length)
+    for leg, name in enumerate(("rear_leg", "front_leg")):
+        path = f"/meshcat/template/{name}"
+        direction = toes[rows, leg] - com
+        scene.add(path, coil, _overlay(TEMPLATE))
+        scene.animate(path, "position", "vector3", _in_space(com))
+        scene.animate(path, "quaternion", "quaternion", _along(direction))
+        size = np.ones((len(rows), 3))
+        size[:, 2] = np.linalg.norm(direction, axis=1)
+        scene.animate(path, "scale", "vector3", size)
+        scene.show(path, loaded[rows, leg])
+
+
+def _forces(scene: _Scene, playback: Playback, length: float, sides: Array) -> None:
+    record, rows = playback.record, playback.rows
+    arrows, on = force_arrows(record), carrying(record)
+    shaft, head = np.eye(4), np.eye(4)
+    upright = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    shaft[:3, :3] = head[:3, :3] = upright
+    shaft[2, 3], head[2, 3] = 0.425, 0.925
+    for foot, (name, color) in enumerate((("left", LEFT), ("right", RIGHT))):
+        path = f"/meshcat/ground_force/{name}"
+        radius = 0.013 * length
+        cone = mg.Cylinder(0.15, radiusTop=0.0, radiusBottom=3.0 * radius)
+        for part, geometry, offset in (
+            ("shaft", mg.Cylinder(0.85, radius), shaft),
+            ("head", cone, head),
+        ):
+            scene.add(f"{path}/{part}", geometry, _overlay(color))
+            scene.place(f"{path}/{part}", offset)
+        toe = _in_space(record.foot[rows, foot]) + np.array([0.0, sides[foot], 0.0])
+        scene.animate(path, "position", "vector3", toe)
+        scene.animate(path, "quaternion", "quaternion", _along(arrows[rows, foot]))
+        size = np.ones((len(rows), 3))
+        size[:, 2] = np.linalg.norm(arrows[rows, foot], axis=1)
+        scene.animate(path, "scale", "vector3", size)
+        scene.show(path, on[rows, foot])
+
+
+def _footholds(scene: _Scene, playback: Playback, length: float, sides: Array) -> None:
+    record, rows = playback.record, playback.rows
+    for foot, (name, color) in enumerate((("left", LEFT), ("right", RIGHT))):
+        stood = [f for f in footholds(record) if f.foot == foot and f.time <= record.time[rows[-1]]]
+        if not stood:
+            continue
+        centres = np.array([[f.x, sides[foot], 0.002 * length] for f in stood])
+        vertices, faces = _plates(centres, (0.05 * length, 0.1 * length))
+        frame = np.searchsorted(record.time[rows], [f.time for f in stood]).astype(float)
+        mesh = _Gradual(vertices, faces, np.repeat(frame, 4))
+        scene.reveal(f"/meshcat/footholds/{name}", mesh, color)
