@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -36,8 +36,23 @@ def save(record: Any, path: str | Path, kind: str) -> Path:
     return Path(path)
 
 
-def load(record_type: Callable[..., T], path: str | Path, kind: str) -> T:
-    """Read what :func:`save` wrote with the same ``kind``.
+Upgrade = Callable[[dict[str, Any]], dict[str, Any]]
+"""From the fields of an older format, by name, to those of today."""
+
+
+def load(
+    record_type: Callable[..., T],
+    path: str | Path,
+    kind: str,
+    older: Mapping[str, Upgrade] | None = None,
+) -> T:
+    """Read what :func:`save` wrote with the same ``kind``, or an older one.
+
+    Args:
+        record_type: the dataclass.
+        path: of the ``.npz``.
+        kind: format of today.
+        older: how formats of earlier versions are upgraded.
 
     Raises:
         RecordError: if the file is missing or is no such record.
@@ -46,6 +61,11 @@ def load(record_type: Callable[..., T], path: str | Path, kind: str) -> T:
         with np.load(path, allow_pickle=False) as data:
             metadata = json.loads(str(data["metadata"]))
             found = str(metadata.pop("format", ""))
+            upgrade = (older or {}).get(found)
+            if upgrade is not None:
+                names = [name for name in data.files if name != "metadata"]
+                values = {name: data[name] for name in names}
+                return record_type(**upgrade({**values, "metadata": metadata}))
             if found != kind:
                 if found.rpartition(" ")[0] == kind.rpartition(" ")[0]:
                     raise RecordError(

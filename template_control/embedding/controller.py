@@ -1,41 +1,77 @@
-"""The controller that makes the robot walk like the template (Fig. 11).
+"""The controller that makes the robot move like the template (Fig. 11).
 
-It stands in a node of the automaton, moves along the automaton's edges when the robot
-fires them, plans at VLO (and re-plans where a foot has landed), and turns the plan into
-references for the whole-body QP, parameterised by the direction from the rear stance foot
-to the CoM (beta of Section V-B).
+It stands in a node of the automaton, moves along the automaton's edges when the robot fires
+them, plans at every section (and plans again where a foot has landed), and turns the plan into
+references for the whole-body QP. What a phase needs, which tasks, which feet, which clock, is
+looked up in the table of phases: the controller knows no gait.
 
 The legs' swing makes the robot's CoM run ahead of the template and fall back behind it within
 a step, while its angular momentum about the foot, on which all forces depend, stays the
-template's. So beta is taken to the point that moves with dx/dt + L / (m y), L the angular
-momentum about the CoM: it starts in the CoM at every plan, and leads or lags it by centimetres.
+template's. So in stance the phase is that of a point that moves with dx/dt + L / (m y), L the
+angular momentum about the CoM: it starts in the CoM at every plan, and leads or lags it by
+centimetres.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.guards import Sensed, fired
+from template_control.embedding.feet import Feet
+from template_control.embedding.guards import PLACED, RobotGuards
 from template_control.embedding.load import LoadEstimate
 from template_control.embedding.momentum_trim import MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.plan import at_phase
-from template_control.embedding.planners.planner import Planner
-from template_control.embedding.references import leg_forces, pd, unloading_cap
-from template_control.embedding.scaling import Scale
-from template_control.embedding.step_planning import VLO_STATE, StepPlanning, StepReport
-from template_control.embedding.swing_foot import SwingFoot
+from template_control.embedding.phases import PhaseControl, phase_control
+from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.references import leg_forces
+from template_control.embedding.sensing import Sensed
+from template_control.embedding.stride_planning import (
+    Learnt,
+    SectionReport,
+    StridePlanning,
+)
+from template_control.embedding.template_path import LOCATE
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.hybrid import Node
-from template_control.slip.automaton.vocabulary import Phase, Reset
-from template_control.whole_body.solver import Solution, WholeBodyQp
-from template_control.whole_body.tasks import Row, TaskStack
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton, Edge, Node
+from template_control.slip.automaton.vocabulary import Event, Leg
+from template_control.slip.maps.section import Section, section_of
+from template_control.slip.scenario.route import Route
+from template_control.slip.similarity import Scale, scaled
+from template_control.whole_body.com_task import ComTask
+from template_control.whole_body.solver import Solution, Stance, WholeBodyQp
+from template_control.whole_body.task import TaskStack
+from template_control.whole_body.wanted import Wanted
 
 Array = NDArray[np.float64]
 
-_NO_CAP = np.full(1, np.inf)
+_PITCH = 2  # place of the trunk's pitch in q
+
+
+@dataclass(frozen=True)
+class _Station:
+    """A node of the automaton, with all that the controller looks up for it.
+
+    Attributes:
+        node: of the automaton.
+        control: the phase's entry in the table.
+        tasks: its rows.
+        com: the task that follows the template's CoM, None without.
+        ways: edges to other nodes, in order.
+        awaited: the leg that is to touch down, None where none is.
+        trimmed: the momentum trim acts somewhere in the stride.
+    """
+
+    node: Node
+    control: PhaseControl
+    tasks: TaskStack
+    com: ComTask | None
+    ways: tuple[Edge, ...]
+    awaited: Leg | None
+    trimmed: bool
 
 
 class EmbeddingController:
@@ -43,77 +79,99 @@ class EmbeddingController:
 
     Args:
         robot: the (nominal) model; every tick updates it.
-        planner: chooses each step's controls and owns the gait.
+        planners: one for each kind of stride of the route.
+        route: which stride comes next, and towards which state.
         options: tuning.
+        automaton: of the route's strides.
 
     Attributes:
-        node: the automaton's node the robot is in.
-        rear, front: indices of the feet; in single stance the rear one carries.
-        planning: the step's decision and the path that follows it.
+        station: where on the automaton the robot is, and what that asks for.
+        planning: the stride's decision and the path that follows it.
+        feet: roles and swings of the feet.
         reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
         ground: height of the template's ground: of the foot that landed last [m].
-        lead: of the point whose direction is the phase over the CoM [m].
+        phase_offset: the point whose direction is the phase is this far ahead of the CoM [m].
         template_forces: (2, 2) leg forces of the template at this phase [N], rear and front.
-        swing: reference of the swing foot.
     """
 
     def __init__(
-        self, robot: PlanarBiped, planner: Planner, options: EmbeddingOptions | None = None
+        self,
+        robot: PlanarBiped,
+        planners: Planners,
+        route: Route,
+        options: EmbeddingOptions | None = None,
+        automaton: Automaton = AUTOMATON,
     ) -> None:
         self.robot = robot
-        self.options = (options or EmbeddingOptions()).scaled(Scale.of(planner.gait.parameters))
+        self.parameters = route.parameters
+        self.options = scaled(options or EmbeddingOptions(), Scale.of(self.parameters))
         o = self.options
-        self.planning = StepPlanning(planner, o.replan)
-        self.parameters = planner.gait.parameters
-        self.qp = WholeBodyQp(robot, o.friction, o.torque_scale, o.contact_damping)
-        self.tasks = TaskStack(robot.nv)
-        self.swing = SwingFoot(o.swing)
+        self.planning = StridePlanning(route, planners, o.replan, automaton)
+        self.qp = WholeBodyQp(robot, o)
         self.load = LoadEstimate(o.load, robot.gravity)
-        self.trim = MomentumTrim(planner.gait, o.trim)
-        self.rear, self.front = 0, 1
-        self.node: Node = AUTOMATON.node(STRIDE_START["w"])
-        self.reference = np.zeros(6)
+        self.trim = MomentumTrim(self.parameters, o.trim)
+        self.wanted = Wanted(pitch=o.trunk_pitch)
+        self.feet = Feet(o.swing, self.wanted.foot)
+        self.reference = self.wanted.com
         self.template_forces = np.zeros((2, 2))
         self.phase_time = 0.0
-        self.lead = 0.0
+        self.phase_offset = 0.0
         self.ground = 0.0
-        self._rear_shift = 0.0
         self.time = 0.0
-        self._sensed = Sensed(np.zeros(4), np.zeros(2))
-        self._rows = {
-            Phase.SS: np.array(o.single_stance.rows),
-            Phase.DS: np.array(o.double_stance.rows),
-        }
+        self._rear_shift = 0.0
+        self._sensed = Sensed()
+        self._guards = RobotGuards(self.parameters, o.guards)
+        self._stations = _stations(automaton, robot.nv, o)
+        self.station = next(iter(self._stations.values()))
+
+    @property
+    def node(self) -> Node:
+        """The automaton's node the robot is in."""
+        return self.station.node
 
     @property
     def planner(self) -> Planner:
-        """Chooses each step's controls."""
+        """Chooses the present stride's controls."""
         return self.planning.planner
 
     @property
-    def steps(self) -> list[StepReport]:
-        """One report a VLO, the start's included."""
-        return self.planning.steps
+    def reports(self) -> list[SectionReport]:
+        """One report a section, the start's included."""
+        return self.planning.reports
 
     @property
     def template_com(self) -> tuple[float, float]:
         """The template's CoM at the robot's phase, in the world [m]."""
         x, y = self.reference[:2]
-        return float(self._sensed.toes[0] + x), float(self.ground + y)
+        return float(self._origin + x), float(self.ground + y)
 
-    def start(self, rear: int) -> None:
-        """Begin at a VLO over foot ``rear``; the robot's model must be up to date.
+    @property
+    def _origin(self) -> float:
+        """Where the template's rear toe is in the world: at the foot, if that stands [m]."""
+        return float(self._sensed.toes[0]) if self.node.stance else self.planning.toe
 
-        The other foot is taken to be in the middle of its swing.
+    def start(self, section: Section, rear: int = 0) -> None:
+        """Begin at a section; the robot's model must be up to date.
+
+        A foot in the air is taken to be in the middle of its swing.
+
+        Args:
+            section: that the route begins at.
+            rear: the foot that is the rear leg's.
+
+        Raises:
+            ParameterError: if the route begins with a stride for which there is no planner.
         """
-        self.rear, self.front = rear, 1 - rear
-        self.node = AUTOMATON.node(STRIDE_START["w"])
-        r = self.robot
-        swung = 0.5 * (self.planner.gait.step_duration)
-        self.swing.start(r.foot_position[self.front], r.foot_velocity[self.front], swung)
-        self._sensed.swing_time = swung
+        planning = self.planning
+        planner, node = planning.begin(section)
+        self.station = self._stations[node.name]
+        self.feet.begin(rear)
+        self._sensed.feet = self.feet.of
+        for leg in self.station.control.swings:
+            self.feet.lift(self.feet.of[leg], self.robot, 0.5 * planner.gait.step_duration)
+        self.ground = float(self.robot.foot_position[rear, 1]) if node.stance else 0.0
         self._sense(np.zeros(2, dtype=bool))
-        self._decide()
+        self._decide(section)
 
     def tick(self, q: Array, v: Array, contact: NDArray[np.bool_], dt: float) -> Solution:
         """Torques for the next ``dt`` seconds.
@@ -126,176 +184,212 @@ class EmbeddingController:
         Raises:
             ParameterError: if the state is not finite.
         """
-        r = self.robot
-        r.update(q, v)
-        self._sensed.swing_time += dt
+        self.robot.update(q, v)
+        self.feet.swing_time += dt
         self._sense(contact)
         self._advance()
+        self._plan_again()
+        self._locate(dt)
+        self._swing(q, v, dt)
+        self._track(q, v, dt)
+        self.time += dt
+        return self.qp.solve(self.station.tasks, self._stance(), self.load.factor)
+
+    # -- the automaton ----------------------------------------------------------------
+
+    def _sense(self, contact: NDArray[np.bool_]) -> None:
+        r, s, (rear, front) = self.robot, self._sensed, self.feet.of
+        if self.node.stance:
+            self.ground = float(r.foot_position[self.feet.landed, 1])
+        s.toes[Leg.REAR] = r.foot_position[rear, 0] + self._rear_shift
+        s.toes[Leg.FRONT] = r.foot_position[front, 0]
+        s.state[0], s.state[1] = r.com[0], r.com[1] - self.ground
+        s.state[3] = r.com_velocity[1]
+        for leg, foot in enumerate(self.feet.of):
+            s.contact[leg] = contact[foot]
+            s.swing_time[leg] = self.feet.swing_time[foot]
+        self._sense_speed()
+
+    def _sense_speed(self) -> None:
+        """Forward speed as the phase has it.
+
+        The swing leg's angular momentum makes dx/dt of the CoM swing within a step while the
+        momentum about the foot, which is what the template predicts, does not.
+        """
+        r, s = self.robot, self._sensed
+        s.state[2] = r.com_velocity[0]
+        if self.station.control.momentum_speed:
+            s.state[2] += r.angular_momentum / (r.mass * s.state[1])
+
+    def _advance(self) -> None:
+        """Take the first edge of the present node that the robot fires."""
+        for edge in self.station.ways:
+            due = self.planning.due(edge.event) - self.phase_time
+            if self._guards.fired(edge, self._sensed, due):
+                self._take(edge)
+                return
+
+    def _take(self, edge: Edge) -> None:
+        """Go along an edge: roles and swings of the feet, plan, node."""
+        before, stood = self.station, self._standing()
+        self.planning.pass_event(edge.event)
+        self.station = self._stations[str(edge.target)]
+        self.feet.apply(edge.reset)
+        self._sensed.feet = self.feet.of
+        lifted = stood - self._standing()
+        for foot in lifted:
+            self.feet.lift(foot, self.robot)
         s = self._sensed
-        if self.planning.overdue(self.node, self.phase_time):
-            self.planning.reach_on(self.node, s, self.time)
-            self._on_new_path()
-        elif self.planning.surprised(s.state[2] - self.reference[2], self.phase_time, self.time):
-            self.planning.reconsider(self.node, s, self.phase_time, self.time)
-            self._on_new_path()
-        x, y = s.state[0] + self.lead - s.toes[0], s.state[1]
-        path, toe = self.planning.path, self.planning.toe
-        self.phase_time, row = at_phase(
-            path.cx, path.cy, path.meta, toe, x, y, self.phase_time + dt, self.reference
+        if lifted:
+            self._rear_shift = 0.0
+            rear, front = self.feet.of
+            s.toes[:] = self.robot.foot_position[[rear, front], 0]
+            self.planning.toe = self.planning.toe_of(rear)
+        if self.station.control.momentum_speed is not before.control.momentum_speed:
+            self._sense_speed()
+        placed = PLACED.get(edge.reset)
+        if placed is not None:
+            self._land(placed)
+        if edge.section:
+            self._decide(section_of(edge.event))
+
+    def _standing(self) -> set[int]:
+        return {self.feet.of[leg] for leg in self.node.stance}
+
+    def _land(self, leg: Leg) -> None:
+        """The template's ground is now that of the foot which has landed.
+
+        Where that is higher or lower than the rear foot's, the template's rear toe is moved so
+        that its leg keeps its length, and with it its force.
+        """
+        s, foot = self._sensed, self.feet.of[leg]
+        self.feet.landed = foot
+        ground = float(self.robot.foot_position[foot, 1])
+        height = s.state[1] + self.ground - ground
+        if leg is not Leg.REAR:
+            back = s.state[0] - s.toes[Leg.REAR]
+            moved = np.sqrt(max(back**2 + s.state[1] ** 2 - height**2, 0.0))
+            self._rear_shift = float(back - moved)
+            s.toes[Leg.REAR] += self._rear_shift
+        self.ground, s.state[1] = ground, height
+        self.planning.follow(self.node, s, self.time)
+        self._on_new_path()
+
+    def _decide(self, section: Section) -> None:
+        s = self._sensed
+        if self.reports:
+            nominal = self.reports[-1].decision.nominal
+            self.load.end_stride(nominal)
+            self.trim.end_stride(section.padded(section.of(s.state)), nominal)
+        learnt = Learnt(self.load.factor, self.trim.acceleration)
+        node = self.planning.decide(section, s, self.time, learnt)
+        self.station = self._stations[node.name]
+        self.trim.expect(self.planning.path if self.station.trimmed else None, self.planner.gait)
+        self._on_new_path()
+
+    def _plan_again(self) -> None:
+        """Plan from here where a touchdown is overdue or the robot has left its path."""
+        s, planning = self._sensed, self.planning
+        if planning.overdue(self.node, self.phase_time):
+            planning.reach_on(self.node, s, self.time)
+        elif planning.surprised(s.state[2] - self.reference[2], self.phase_time, self.time):
+            planning.reconsider(self.node, s, self.phase_time, self.time)
+        else:
+            return
+        self._on_new_path()
+
+    def _on_new_path(self) -> None:
+        """The path starts where the robot is."""
+        self.phase_time = self.phase_offset = 0.0
+
+    # -- control ----------------------------------------------------------------------
+
+    def _locate(self, dt: float) -> None:
+        """The template's state and forces at the robot's phase."""
+        s, path, toe = self._sensed, self.planning.path, self.planning.toe
+        x, y = s.state[0] + self.phase_offset - s.toes[Leg.REAR], s.state[1]
+        locate = LOCATE[self.station.control.clock]
+        self.phase_time, row = locate(
+            path.curve, toe, x, y, self.phase_time + dt, self.reference
         )
-        self.lead += (s.state[2] - r.com_velocity[0]) * dt
-        self._track_com(s.state[0] - s.toes[0], y, dt)
-        trunk = self.options.gains.trunk
-        self.tasks.desired[Row.TRUNK] = pd(
-            0.0, self.options.trunk_pitch, 0.0, q[2], v[2], trunk[0], trunk[1]
-        )
+        self.phase_offset += (s.state[2] - self.robot.com_velocity[0]) * dt
+        segment = path.curve.meta[row]
         leg_forces(
-            path.meta[row],
+            segment,
             self.reference[0] + toe,
             self.reference[1],
             self.parameters.rest_length,
             self.template_forces,
         )
-        if path.meta[row, 3] != toe:
+        if segment[3] != toe:
             # Template and robot are on either side of liftoff: to each foot its own force.
             self.template_forces[:] = np.flipud(self.template_forces.copy())
-        self.time += dt
-        if self.node.phase is Phase.DS:
-            return self._solve_double()
-        return self._solve_single(q, v, dt)
 
-    # -- the automaton ----------------------------------------------------------------
+    def _swing(self, q: Array, v: Array, dt: float) -> None:
+        """Move the references of the feet in the air towards their footholds."""
+        station, planning, wanted = self.station, self.planning, self.wanted
+        for leg in station.control.swings:
+            foot = self.feet.of[leg]
+            swing = self.feet.swing[foot]
+            if planning.reaching and leg is station.awaited:
+                swing.drop(dt)
+            else:
+                landing = planning.landing(foot)
+                foothold, due = landing.x, landing.time - self.phase_time
+                if not np.isfinite(foothold):
+                    # The template cannot complete the stride; the gait's own foothold is the
+                    # best guess.
+                    gait = self.planner.gait
+                    foothold = self._sensed.toes[Leg.REAR] + gait.step_length
+                    due = gait.step_duration - self.feet.swing_time[foot]
+                swing.advance(foothold, due, dt, self.ground)
+            wanted.furthest[foot] = swing.furthest(q[:2], self.robot.leg_length)
+        wanted.hip_speed = v[0]
 
-    def _sense(self, contact: NDArray[np.bool_]) -> None:
-        r, s = self.robot, self._sensed
-        landed = self.front if self.node.phase is Phase.DS else self.rear
-        self.ground = float(r.foot_position[landed, 1])
-        height = r.com[1] - self.ground
-        s.toes[0] = r.foot_position[self.rear, 0] + self._rear_shift
-        s.toes[1] = r.foot_position[self.front, 0]
-        s.state[0], s.state[1] = r.com[0], height
-        # The swing leg's angular momentum makes dx/dt of the CoM swing within a step while
-        # the momentum about the foot, which is what the template predicts, does not.
-        s.state[2] = r.com_velocity[0] + r.angular_momentum / (r.mass * height)
-        s.state[3] = r.com_velocity[1]
-        s.front_contact = bool(contact[self.front])
+    def _track(self, q: Array, v: Array, dt: float) -> None:
+        """Let the phase's tasks write what they ask for."""
+        s, wanted, station = self._sensed, self.wanted, self.station
+        wanted.com_now[:] = s.state
+        wanted.com_now[0] -= s.toes[Leg.REAR]
+        wanted.com_push = self.trim.acceleration if station.control.trims else 0.0
+        wanted.pitch_now[0], wanted.pitch_now[1] = q[_PITCH], v[_PITCH]
+        wanted.feet = self.feet.of
+        station.tasks.write(self.robot, wanted)
+        if station.control.weighs and station.com is not None:
+            self.load.observe(station.com.lift(wanted), dt)
 
-    def _advance(self) -> None:
-        """Take the first edge of the present node that the robot fires."""
-        p = self.parameters
-        for edge in self.node.edges:
-            if not isinstance(edge.target, str):
-                continue
-            if not fired(
-                edge.event,
-                self._sensed,
-                self.phase_time,
-                self.planning.path.liftoff,
-                p.rest_length,
-                p.gravity,
-                self.options.liftoff_angle,
-            ):
-                continue
-            self.node = AUTOMATON.node(edge.target)
-            if edge.reset is Reset.SHIFT:
-                self._lift_off()
-            elif edge.reset is Reset.PLACE_FRONT:
-                self._touch_down()
-            if edge.section:
-                self._decide()
-            return
+    def _stance(self) -> Stance:
+        """The feet on the ground, the template's forces on them, and how far they unload."""
+        legs, forces = self.node.stance, self.template_forces
+        cap = np.full(len(legs), np.inf)
+        for leg in self.station.control.unloads:
+            weight = self.robot.mass * self.robot.gravity
+            cap[leg] = self.options.unload.cap(forces[leg, 1], weight)
+        feet = tuple(self.feet.of[leg] for leg in legs)
+        return Stance(feet, forces[: len(legs)].ravel(), cap)
 
-    def _touch_down(self) -> None:
-        """The template's ground is now the front foot's.
 
-        Where that is higher or lower than the rear foot's, the template's rear toe is moved so
-        that the leg keeps its length, and with it its force.
-        """
-        s = self._sensed
-        ground = float(self.robot.foot_position[self.front, 1])
-        back, height = s.state[0] - s.toes[0], s.state[1] + self.ground - ground
-        self._rear_shift = float(back - np.sqrt(max(back**2 + s.state[1] ** 2 - height**2, 0.0)))
-        s.toes[0] += self._rear_shift
-        self.ground, s.state[1] = ground, height
-        self.planning.follow(self.node, s, self.time)
-        self._on_new_path()
-
-    def _lift_off(self) -> None:
-        """The front foot becomes the rear one; the plan goes on from its toe."""
-        self._rear_shift = 0.0
-        self.planning.toe = self.planning.path.front_toe
-        self.rear, self.front = self.front, self.rear
-        r, s = self.robot, self._sensed
-        s.toes[0], s.toes[1] = s.toes[1], r.foot_position[self.front, 0]
-        s.swing_time = 0.0
-        self.swing.start(r.foot_position[self.front], r.foot_velocity[self.front])
-
-    def _decide(self) -> None:
-        if self.steps:
-            trusted = self.steps[-1].decision.reached
-            self.load.end_step(trusted)
-            self.trim.end_step(self._sensed.state[VLO_STATE], trusted)
-        learnt = (self.load.factor, self.trim.acceleration)
-        self.planning.decide(self.node, self._sensed, self.time, *learnt)
-        self.trim.expect(self.planning.path)
-        self._on_new_path()
-
-    def _on_new_path(self) -> None:
-        """The path starts where the robot is."""
-        self.phase_time = self.lead = 0.0
-
-    # -- control ----------------------------------------------------------------------
-
-    def _track_com(self, x: float, y: float, dt: float) -> None:
-        ref, s, d = self.reference, self._sensed, self.tasks.desired
-        kp, kd = self.options.gains.com
-        self.tasks.read(self.robot, self.front, y)
-        d[Row.COM_X] = pd(ref[4], ref[0], ref[2], x, s.state[2], kp, kd)
-        if self.node.phase is Phase.DS:
-            d[Row.COM_X] += self.trim.acceleration
-        d[Row.COM_Y] = pd(ref[5], ref[1], ref[3], y, s.state[3], kp, kd)
-        self.load.observe(d[Row.COM_Y] - ref[5], dt)
-
-    def _solve_double(self) -> Solution:
-        r, o = self.robot, self.options
-        forces = self.template_forces
-        cap = np.array([unloading_cap(forces[0, 1], r.mass * r.gravity), np.inf])
-        return self.qp.solve(
-            self.tasks,
-            o.double_stance,
-            self._rows[Phase.DS],
-            (self.rear, self.front),
-            forces.ravel(),
-            cap,
-            self.load.factor,
+def _stations(automaton: Automaton, nv: int, options: EmbeddingOptions) -> dict[str, _Station]:
+    """Everything that is looked up for a node, by its name."""
+    trimmed = {
+        node.name
+        for start in automaton.starts.values()
+        if any(
+            phase_control(options.phases, other).trims for other in automaton.stride(start)
         )
-
-    def _solve_single(self, q: Array, v: Array, dt: float) -> Solution:
-        r, o, swing, d = self.robot, self.options, self.swing, self.tasks.desired
-        path = self.planning.path
-        foothold, due = path.foothold, path.touchdown - self.phase_time
-        if not np.isfinite(foothold):
-            # The template cannot complete the step; the gait's own foothold is the best guess.
-            gait = self.planner.gait
-            foothold = self._sensed.toes[0] + gait.step_length
-            due = gait.step_duration - self._sensed.swing_time
-        if self.planning.reaching:
-            swing.reach_down(dt)
-        else:
-            swing.advance(foothold, due, dt, self.ground)
-        position, velocity = r.foot_position[self.front], r.foot_velocity[self.front]
-        kp, kd = o.gains.swing
-        for row, axis, i in ((Row.SWING_X, swing.x, 0), (Row.SWING_Y, swing.y, 1)):
-            d[row] = pd(axis[2], axis[0], axis[1], position[i], velocity[i], kp, kd)
-        limit = swing.furthest(q[:2], r.leg_length)
-        held = pd(0.0, limit, v[0], position[0], velocity[0], *o.gains.reach)
-        d[Row.SWING_X] = min(d[Row.SWING_X], held)
-        return self.qp.solve(
-            self.tasks,
-            o.single_stance,
-            self._rows[Phase.SS],
-            (self.rear,),
-            self.template_forces[0],
-            _NO_CAP,
-            self.load.factor,
+        for node in automaton.stride(start)
+    }
+    found = {}
+    for node in automaton.nodes:
+        control = phase_control(options.phases, node)
+        touchdown = node.edge(Event.TOUCHDOWN)
+        found[node.name] = _Station(
+            node=node,
+            control=control,
+            tasks=TaskStack(control.tasks, nv),
+            com=next((task for task in control.tasks if isinstance(task, ComTask)), None),
+            ways=tuple(edge for edge in node.edges if isinstance(edge.target, str)),
+            awaited=PLACED[touchdown.reset] if touchdown is not None else None,
+            trimmed=node.name in trimmed,
         )
+    return found

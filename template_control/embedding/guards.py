@@ -1,75 +1,106 @@
 """When the robot fires an event of the automaton.
 
-The geometric guards are the template's own functions, evaluated at the robot's CoM and
-feet; touchdown is felt, and liftoff happens where the template lifts off (its beta_l) or in
-a predefined direction (both of Section V-B).
+The geometric guards are the template's own functions, evaluated at the robot's CoM and feet.
+Touchdown is felt. Liftoff happens where the template lifts off (its beta_l) or in a predefined
+direction (both of Section V-B).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.automaton.vocabulary import Event
+from template_control.embedding.sensing import Sensed
+from template_control.errors import ParameterError
+from template_control.slip.automaton.hybrid import Edge
+from template_control.slip.automaton.vocabulary import Event, Leg, Reset
 from template_control.slip.dynamics.guards import guard
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import tuned
 
 Array = NDArray[np.float64]
 
-_MIN_SWING = 0.3  # of sqrt(l0 / g): earlier contacts are the foot scuffing at liftoff
-_OVERSTRETCH = 0.03  # of l0: the rear leg is let go here, whatever the plan says
+PLACED = {Reset.PLACE_REAR: Leg.REAR, Reset.PLACE_FRONT: Leg.FRONT}
+"""The leg that a reset puts on the ground."""
 
 
-@dataclass
-class Sensed:
-    """What the robot feels, in the template's terms; overwritten at every tick.
+@dataclass(frozen=True)
+class GuardOptions:
+    """When a touchdown or a liftoff is believed.
 
     Attributes:
-        state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s]; dx/dt includes the angular
-            momentum about the CoM as if it moved the CoM, so that m y dx/dt - m x dy/dt is
-            the robot's angular momentum about its stance foot.
-        toes: (2,) x of the rear and the front foot [m].
-        front_contact: the front (in single stance: the swing) foot touches the ground.
-        swing_time: time since the last liftoff [s].
+        shortest_swing: of sqrt(l0 / g): earlier contacts are the foot scuffing at liftoff.
+        overstretch: of l0: a rear leg longer than l0 by that is let go, whatever the path says.
+        liftoff_angle: direction beta from the rear foot to the CoM [rad, from forward
+            horizontal] at which that foot lifts off; beta decreases from pi to 0 as the robot
+            moves forward. None: "at the same configuration (namely, the same beta_l) as that
+            of SLIP", Fig. 13(b); an angle: "the leg lifts off at a predefined configuration",
+            whatever the template does, Fig. 13(c).
+
+    Raises:
+        ParameterError: if the angle is not between 0 and pi.
     """
 
-    state: Array
-    toes: Array
-    front_contact: bool = False
-    swing_time: float = np.inf
+    shortest_swing: float = tuned(0.3)
+    overstretch: float = tuned(0.03)
+    liftoff_angle: float | None = tuned(None)
+
+    def __post_init__(self) -> None:
+        if self.liftoff_angle is not None and not 0.0 < self.liftoff_angle < np.pi:
+            raise ParameterError(
+                f"liftoff_angle is {self.liftoff_angle!r} rad: give an angle between 0 and pi"
+            )
 
 
-def fired(
-    event: Event,
-    sensed: Sensed,
-    phase_time: float,
-    liftoff: float,
-    rest_length: float,
-    g: float,
-    liftoff_angle: float | None = None,
-) -> bool:
-    """Whether ``event`` has happened.
+@dataclass(frozen=True)
+class RobotGuards:
+    """The automaton's guards, as the robot feels them.
 
-    Args:
-        event: a guard of the automaton.
-        sensed: the robot now.
-        phase_time: template time of the robot's phase [s].
-        liftoff: template time of the plan's liftoff [s].
-        rest_length: l0 [m].
-        g: gravitational acceleration [m/s^2].
-        liftoff_angle: predefined direction from the rear foot to the CoM [rad] that takes the
-            place of the plan's liftoff; it decreases from pi to 0 as the robot walks forward.
+    Attributes:
+        parameters: the template.
+        options: tuning.
     """
-    if event is Event.TOUCHDOWN:
-        settled = sensed.swing_time > _MIN_SWING * np.sqrt(rest_length / g)
-        return sensed.front_contact and bool(settled)
-    if event is Event.REAR_LIFTOFF:
-        stretch = guard(int(event), sensed.state, sensed.toes, rest_length, 0.0)
-        if stretch > _OVERSTRETCH * rest_length:
+
+    parameters: SlipParameters
+    options: GuardOptions
+
+    def fired(self, edge: Edge, sensed: Sensed, due: float) -> bool:
+        """Whether the edge's event has happened.
+
+        Args:
+            edge: a way out of the present node.
+            sensed: the robot now.
+            due: time until the template's path comes to that event [s].
+        """
+        felt = _FELT.get(edge.event)
+        if felt is not None:
+            return felt(self, edge, sensed, due)
+        return self._value(edge.event, sensed) >= 0.0
+
+    def _value(self, event: Event, sensed: Sensed) -> float:
+        return float(guard(int(event), sensed.state, sensed.toes, self.parameters.rest_length, 0.0))
+
+    def _touchdown(self, edge: Edge, sensed: Sensed, due: float) -> bool:
+        p, leg = self.parameters, PLACED[edge.reset]
+        shortest = self.options.shortest_swing * np.sqrt(p.rest_length / p.gravity)
+        return bool(sensed.contact[leg]) and bool(sensed.swing_time[leg] > shortest)
+
+    def _rear_liftoff(self, edge: Edge, sensed: Sensed, due: float) -> bool:
+        stretch = self._value(edge.event, sensed)
+        if stretch > self.options.overstretch * self.parameters.rest_length:
             return True
-        if liftoff_angle is None:
-            return phase_time >= liftoff
+        angle = self.options.liftoff_angle
+        if angle is None:
+            return due <= 0.0
         beta = np.arctan2(sensed.state[1], sensed.state[0] - sensed.toes[0])
-        return bool(beta <= liftoff_angle)
-    return guard(int(event), sensed.state, sensed.toes, rest_length, 0.0) >= 0.0
+        return bool(beta <= angle)
+
+
+_FELT: dict[Event, Callable[[RobotGuards, Edge, Sensed, float], bool]] = {
+    Event.TOUCHDOWN: RobotGuards._touchdown,
+    Event.REAR_LIFTOFF: RobotGuards._rear_liftoff,
+}
+"""Events that the robot does not read off the template's geometry."""

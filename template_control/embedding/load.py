@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from template_control.slip.similarity import tuned
+
 
 @dataclass(frozen=True)
 class LoadOptions:
@@ -19,11 +21,11 @@ class LoadOptions:
         bounds: of the factor.
     """
 
-    gain: float = 0.7
-    dead_zone: float = 0.02
-    leak: float = 0.1
-    step_bound: float = 0.05
-    bounds: tuple[float, float] = (0.7, 1.4)
+    gain: float = tuned(0.7)
+    dead_zone: float = tuned(0.02)
+    leak: float = tuned(0.1)
+    step_bound: float = tuned(0.05)
+    bounds: tuple[float, float] = tuned((0.7, 1.4))
 
 
 class LoadEstimate:
@@ -49,16 +51,16 @@ class LoadEstimate:
         self._sum += feedback * dt
         self._time += dt
 
-    def end_step(self, trusted: bool) -> None:
-        """Learn from the step that just ended.
+    def end_stride(self, nominal: bool) -> None:
+        """Learn from the stride that just ended.
 
         Args:
-            trusted: it went near the gait; from others, a push's say, nothing is learnt.
+            nominal: it went near the gait; from others, a push's say, nothing is learnt.
         """
         if self._time == 0.0:
             return
         o = self.options
-        mean = self._sum / self._time / self._gravity if trusted else 0.0
+        mean = self._sum / self._time / self._gravity if nominal else 0.0
         change = min(o.gain * max(abs(mean) - o.dead_zone, 0.0), o.step_bound)
         factor = self.factor + (change if mean > 0.0 else -change)
         if change == 0.0:

@@ -14,8 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.plan import Plan
+from template_control.embedding.template_path import TemplatePath
+from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import WalkingGait, vlo_jacobians
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import tuned
 
 Array = NDArray[np.float64]
 
@@ -32,18 +35,18 @@ class TrimOptions:
         bound: of the acceleration over g.
     """
 
-    share: float = 0.2
-    gain: float = 0.1
-    dead_zone: float = 0.0008
-    largest: float = 0.01
-    bound: float = 0.03
+    share: float = tuned(0.2)
+    gain: float = tuned(0.1)
+    dead_zone: float = tuned(0.0008)
+    largest: float = tuned(0.01)
+    bound: float = tuned(0.03)
 
 
 class MomentumTrim:
     """Horizontal acceleration added in double stance, learnt from step to step.
 
     Args:
-        gait: the template's, about which the direction is taken that the controls leave alone.
+        parameters: the template.
         options: tuning.
 
     Attributes:
@@ -51,33 +54,44 @@ class MomentumTrim:
         acceleration: to add to the CoM's in double stance [m/s^2], 0 at first.
     """
 
-    def __init__(self, gait: WalkingGait, options: TrimOptions) -> None:
-        p = gait.parameters
+    def __init__(self, parameters: SlipParameters, options: TrimOptions) -> None:
+        p = parameters
         self.options = options
         self.acceleration = 0.0
-        self._left_alone = uncontrolled(gait)
         self.drift = 0.0
         self._speed = float(np.sqrt(p.gravity * p.rest_length))
         self._bound = options.bound * p.gravity
-        self._plan: Plan | None = None
+        self._path: TemplatePath | None = None
+        self._gait: WalkingGait | None = None
+        self._left_alone = np.zeros(3)
 
-    def expect(self, plan: Plan) -> None:
-        """Take note of the exact template's path for the step that begins."""
-        self._plan = plan
+    def expect(self, path: TemplatePath | None, gait: WalkingGait) -> None:
+        """Take note of the exact template's path for the step that begins.
 
-    def end_step(self, z: Array, trusted: bool) -> None:
+        Args:
+            path: from this VLO to the next; None where nothing is to be learnt from it.
+            gait: about which the direction is taken that the controls leave alone.
+        """
+        self._path = path
+        if path is not None and gait is not self._gait:
+            self._gait, self._left_alone = gait, uncontrolled(gait)
+
+    def end_stride(self, z: Array, nominal: bool) -> None:
         """Learn from the step that ended in VLO state ``z`` (3,).
 
         Args:
             z: dx/dt, y, dy/dt.
-            trusted: it went near the gait; from others, a push's say, nothing is learnt.
+            nominal: it went near the gait; from others, a push's say, nothing is learnt.
         """
-        plan = self._plan
-        if plan is None or not trusted or not np.isfinite(plan.liftoff - plan.touchdown):
+        path = self._path
+        if path is None or not nominal:
             return
-        o, duration = self.options, plan.liftoff - plan.touchdown
+        duration = path.due(Event.REAR_LIFTOFF) - path.due(Event.TOUCHDOWN)
+        if not np.isfinite(duration):
+            return
+        o = self.options
         largest = o.largest * self._speed
-        drift = min(max(float(self._left_alone @ (z - plan.vlo_state)), -largest), largest)
+        drift = min(max(float(self._left_alone @ (z - path.section_state)), -largest), largest)
         self.drift += o.share * (drift - self.drift)
         beyond = max(abs(self.drift) - o.dead_zone * self._speed, 0.0)
         wanted = self.acceleration - o.gain * np.copysign(beyond, self.drift) / duration

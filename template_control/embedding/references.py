@@ -1,29 +1,34 @@
-"""From a plan and a phase to what the whole-body QP is asked for: equation (45)."""
+"""The template's leg forces, and how a foot is unloaded before it lifts off."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from template_control.slip.similarity import tuned
+
 Array = NDArray[np.float64]
 
-_CAP_SHARE = 1.3
-_CAP_FLOOR = 0.025  # of the weight
 
+@dataclass(frozen=True)
+class UnloadOptions:
+    """Largest normal force of a foot that is about to lift off: near the template's.
 
-@njit(cache=True)
-def pd(
-    acceleration: float,
-    position: float,
-    velocity: float,
-    measured: float,
-    rate: float,
-    kp: float,
-    kd: float,
-) -> float:
-    """Wanted acceleration of one coordinate: feedforward and PD feedback."""
-    return acceleration + kp * (position - measured) + kd * (velocity - rate)
+    Attributes:
+        share: of the template's force. Over 1, as the robot's forces are not exactly the
+            template's.
+        floor: of the weight. It leaves a foot no load to lift off with, and the QP some room.
+    """
+
+    share: float = tuned(1.3)
+    floor: float = tuned(0.025)
+
+    def cap(self, template_force: float, weight: float) -> float:
+        """Largest normal force [N] where the template's leg has ``template_force`` [N]."""
+        return self.share * template_force + self.floor * weight
 
 
 @njit(cache=True)
@@ -33,7 +38,7 @@ def leg_forces(
     """The template's leg forces (2, 2) [N], rows rear and front, columns x and y.
 
     Args:
-        meta_row: (7,) toes and stiffnesses of the plan's segment.
+        meta_row: (7,) toes and stiffnesses of the path's segment.
         com_x, com_y: the template's CoM in the world [m].
         rest_length: l0 [m].
         forces: overwritten; zero for a leg in the air.
@@ -44,11 +49,3 @@ def leg_forces(
         length = np.sqrt(dx * dx + com_y * com_y)
         size = max(0.0, k * (rest_length - length)) / length
         forces[leg, 0], forces[leg, 1] = size * dx, size * com_y
-
-
-def unloading_cap(template_force: float, weight: float) -> float:
-    """Largest normal force of the rear foot in double stance [N]: near the template's.
-
-    It leaves the foot no load to lift off with.
-    """
-    return _CAP_SHARE * template_force + _CAP_FLOOR * weight

@@ -1,4 +1,4 @@
-"""Swing foot: a quintic to the next foothold, re-aimed at every tick.
+"""A foot in the air: a quintic to the next foothold, re-aimed at every tick.
 
 At each tick the path is the quintic from the present reference (position, velocity,
 acceleration) to the foothold in the time the template still needs to get there, so a
@@ -15,6 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, tuned
+
 Array = NDArray[np.float64]
 
 
@@ -24,21 +26,23 @@ class SwingOptions:
 
     Attributes:
         clearance: height of the foot at mid-swing [m].
-        landing_speed: downward speed at touchdown [m/s].
-        horizon: below this time to go [s] the path is no longer re-aimed.
-        lead: the foot is above its foothold this long before touchdown [s], so that it
+        landing_speed: downward speed at touchdown [m/s]. The foot meets the ground for certain
+            and not hard.
+        horizon: below this time to go [s] the path is no longer re-aimed; the quintic's
+            accelerations would grow beyond bounds.
+        early: the foot is above its foothold this long before touchdown [s], so that it
             comes down at rest relative to the ground.
-        reach_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
-        reach: the foot is kept within this share of the leg's length from the hip; a knee
+        drop_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
+        leg_share: the foot is kept within this share of the leg's length from the hip; a knee
             that goes straight hits its stop with tens of kilonewtons.
     """
 
-    clearance: float = 0.05
-    landing_speed: float = 0.2
-    horizon: float = 0.02
-    lead: float = 0.01
-    reach_acceleration: float = 10.0
-    reach: float = 0.98
+    clearance: float = tuned(0.05, LENGTH)
+    landing_speed: float = tuned(0.2, SPEED)
+    horizon: float = tuned(0.02, TIME)
+    early: float = tuned(0.01, TIME)
+    drop_acceleration: float = tuned(10.0, ACCELERATION)
+    leg_share: float = tuned(0.98)
 
 
 @njit(cache=True)
@@ -65,16 +69,19 @@ def quintic_step(state: Array, target: float, speed: float, time: float, dt: flo
 
 
 class SwingFoot:
-    """Reference of the swing foot; it persists from liftoff to touchdown.
+    """Reference of a foot in the air; it persists from liftoff to touchdown.
+
+    Args:
+        options: shape of the swing.
+        reference: (2, 3) where it is kept; own memory if not given.
 
     Attributes:
         x, y: (3,) position, velocity, acceleration [m, m/s, m/s^2] in the world.
     """
 
-    def __init__(self, options: SwingOptions) -> None:
+    def __init__(self, options: SwingOptions, reference: Array | None = None) -> None:
         self.options = options
-        self.x = np.zeros(3)
-        self.y = np.zeros(3)
+        self.x, self.y = np.zeros((2, 3)) if reference is None else reference
         self._elapsed = 0.0
 
     def start(self, position: Array, velocity: Array, elapsed: float = 0.0) -> None:
@@ -96,7 +103,7 @@ class SwingFoot:
         if time_to_go <= o.horizon or not np.isfinite(foothold):
             self._coast(dt)
         else:
-            quintic_step(self.x, foothold, 0.0, max(time_to_go - o.lead, o.horizon), dt)
+            quintic_step(self.x, foothold, 0.0, max(time_to_go - o.early, o.horizon), dt)
             # Rising while less than half of the swing is over.
             rising = 0.5 * (time_to_go - self._elapsed)
             if rising > o.horizon:
@@ -105,10 +112,10 @@ class SwingFoot:
                 quintic_step(self.y, ground, -o.landing_speed, time_to_go, dt)
         self._elapsed += dt
 
-    def reach_down(self, dt: float) -> None:
+    def drop(self, dt: float) -> None:
         """Overdue: the ground is lower than was thought; fall to it."""
         self.x[1], self.x[2] = 0.0, 0.0
-        self.y[2] = -self.options.reach_acceleration
+        self.y[2] = -self.options.drop_acceleration
         self.y[0] += (self.y[1] + 0.5 * self.y[2] * dt) * dt
         self.y[1] += self.y[2] * dt
 
@@ -120,7 +127,7 @@ class SwingFoot:
             leg_length: of the straight leg [m].
         """
         height = hip[1] - self.y[0]
-        reach = self.options.reach * leg_length
+        reach = self.options.leg_share * leg_length
         return float(hip[0] + np.sqrt(max(reach**2 - height**2, 0.0)))
 
     def _coast(self, dt: float) -> None:

@@ -1,6 +1,8 @@
-"""The robot's state at a VLO of the template: where a run begins."""
+"""The robot's state where a run begins: CoM, trunk and feet as wanted."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,30 +16,44 @@ Array = NDArray[np.float64]
 _OUTPUTS = 7  # CoM (2), trunk (1), both feet (4)
 
 
-def state_at_vlo(
-    robot: PlanarBiped,
-    z: Array,
-    stance: int,
-    swing_position: Array,
-    swing_velocity: Array,
-    pitch: float = 0.0,
-) -> tuple[Array, Array]:
-    """(q, v) with the CoM over the stance foot at x = 0 and the VLO state ``z``.
+@dataclass(frozen=True)
+class Pose:
+    """Where the CoM and the feet are, and how they move.
+
+    Attributes:
+        com, com_velocity: (2,) of the CoM [m, m/s].
+        feet: (2, 2) lowest points of rear and front foot [m].
+        feet_velocity: (2, 2) [m/s].
+        rear: the foot that is the rear leg's.
+        pitch: of the trunk, at rest [rad].
+        momentum_speed: dx/dt of the CoM is meant to include the angular momentum about the
+            CoM: it is the momentum about the foot below, over m y.
+    """
+
+    com: Array
+    com_velocity: Array
+    feet: Array
+    feet_velocity: Array
+    rear: int = 0
+    pitch: float = 0.0
+    momentum_speed: bool = False
+
+
+def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
+    """(q, v) of a pose.
 
     Args:
         robot: the model; its last update is overwritten.
-        z: (3,) dx/dt, y, dy/dt; dx/dt is the angular momentum about the foot over m y.
-        stance: index of the stance foot.
-        swing_position, swing_velocity: (2,) of the swing foot [m, m/s].
-        pitch: of the trunk, at rest [rad].
+        pose: what is wanted.
 
     Raises:
-        RobotError: if the legs do not reach.
+        RobotError: if the legs do not reach, or joints would be beyond their limits.
     """
-    swing = 1 - stance
+    stance, swing = pose.rear, 1 - pose.rear
+    height = pose.com[1]
     q = np.zeros(robot.nv)
-    q[1] = 0.8 * z[1]
-    q[2] = pitch
+    q[0], q[1] = pose.com[0], 0.8 * height
+    q[2] = pose.pitch
     for leg in robot.legs:
         # Knees forward, unless the knee's range says otherwise.
         hip, knee = (BASE_DOF + joint for joint in leg)
@@ -53,10 +69,10 @@ def state_at_vlo(
     def residual() -> Array:
         return np.concatenate(
             (
-                robot.com - [0.0, z[1]],
-                [q[2] - pitch],
-                robot.foot_position[stance],
-                robot.foot_position[swing] - swing_position,
+                robot.com - pose.com,
+                [q[2] - pose.pitch],
+                robot.foot_position[stance] - pose.feet[0],
+                robot.foot_position[swing] - pose.feet[1],
             )
         )
 
@@ -81,21 +97,54 @@ def state_at_vlo(
             break
         q -= np.linalg.solve(jacobian(), error)
     else:
-        raise RobotError(f"{robot.name}: the legs do not reach a CoM height of {z[1]:g} m")
+        raise RobotError(f"{robot.name}: the legs do not reach a CoM height of {height:g} m")
     limits = robot.model
     if np.any(q < limits.lowerPositionLimit) or np.any(q > limits.upperPositionLimit):
-        raise RobotError(f"{robot.name}: a VLO at height {z[1]:g} m needs joints beyond limits")
+        raise RobotError(f"{robot.name}: a start at height {height:g} m needs joints beyond limits")
 
-    # Velocities: dx/dt of the CoM follows from the angular momentum about the stance foot.
     rows = np.zeros((_OUTPUTS, robot.nv))
     rows[0:2] = robot.com_jacobian
-    rows[0] += _angular_momentum_row(robot, q) / (robot.mass * z[1])
+    if pose.momentum_speed:
+        rows[0] += _angular_momentum_row(robot, q) / (robot.mass * height)
     rows[2, 2] = 1.0
     rows[3:5] = robot.foot_jacobian[stance]
     rows[5:7] = robot.foot_jacobian[swing]
-    v = np.linalg.solve(rows, [z[0], z[2], 0.0, 0.0, 0.0, *swing_velocity])
+    wanted = [*pose.com_velocity, 0.0, *pose.feet_velocity.ravel()]
+    v = np.linalg.solve(rows, wanted)
     robot.update(q, v)
     return q, v
+
+
+def state_at_vlo(
+    robot: PlanarBiped,
+    z: Array,
+    stance: int,
+    swing_position: Array,
+    swing_velocity: Array,
+    pitch: float = 0.0,
+) -> tuple[Array, Array]:
+    """(q, v) with the CoM over the stance foot at x = 0 and the VLO state ``z``.
+
+    Args:
+        robot: the model; its last update is overwritten.
+        z: (3,) dx/dt, y, dy/dt; dx/dt is the angular momentum about the foot over m y.
+        stance: index of the stance foot.
+        swing_position, swing_velocity: (2,) of the swing foot [m, m/s].
+        pitch: of the trunk, at rest [rad].
+
+    Raises:
+        RobotError: as :func:`state_in`.
+    """
+    pose = Pose(
+        com=np.array([0.0, z[1]]),
+        com_velocity=np.array([z[0], z[2]]),
+        feet=np.array([np.zeros(2), swing_position]),
+        feet_velocity=np.array([np.zeros(2), swing_velocity]),
+        rear=stance,
+        pitch=pitch,
+        momentum_speed=True,
+    )
+    return state_in(robot, pose)
 
 
 def _angular_momentum_row(robot: PlanarBiped, q: Array) -> Array:

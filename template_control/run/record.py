@@ -13,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control import storage
+from template_control.run.old_record import from_walk
 
 Array = NDArray[np.float64]
 
-FORMAT = "template-control run 2"
+FORMAT = "template-control run 3"
+_WALKS = "template-control run 2"  # which knew VLO and walking steps only
 
 
 @dataclass(frozen=True)
 class Record:
-    """A run of a robot; T samples, S VLO states, SI units, world frame with y up.
+    """A run of a robot; T samples, S sections, SI units, world frame with y up.
 
     Attributes:
         time: (T,) [s].
@@ -39,18 +41,22 @@ class Record:
         node: (T,) index into ``metadata["nodes"]``.
         rear: (T,) index of the rear stance foot.
         solved: (T,) False where the QP was not solved.
-        swing_reference: (T, 2) position of the swing foot's reference.
+        swing_reference: (T, 2, 2) position of each foot's reference, NaN where it has none.
         push: (T,) disturbance on the trunk [N].
-        vlo_time: (S,) time of each VLO, the start's included.
-        vlo_state: (S, 3) dx/dt (angular-momentum based), y over the stance foot, dy/dt, as
-            measured.
-        vlo_predicted: (S, 3) state the planner expected at the next VLO.
-        vlo_controls: (S, 5) controls of the step that begins, by Slot.
-        vlo_offset: (S, 3) the planner's offset estimate.
-        vlo_reached: (S,) False where the planner took the best reachable step instead.
-        vlo_feasible: (S,) False where the template cannot complete the step at all.
-        vlo_load: (S,) load factor.
-        vlo_trim: (S,) momentum trim [m/s^2].
+        section: (S,) index into ``metadata["sections"]`` of each section reached, the start's
+            included.
+        section_time: (S,) of each.
+        section_state: (S, 3) dx/dt (angular-momentum based where the phase before it is), y
+            over the stance foot's ground, dy/dt, as measured.
+        stride: (S,) index into ``metadata["strides"]`` of the kind of stride that begins there.
+        section_target: (S, 3) state that the stride is to end in.
+        section_predicted: (S, 3) state the planner expected it to end in.
+        section_controls: (S, 5) controls of the stride, by Slot.
+        section_offset: (S, 3) the planner's offset estimate.
+        section_nominal: (S,) False where the planner left its own law.
+        section_feasible: (S,) False where the template cannot complete the stride at all.
+        section_load: (S,) load factor.
+        section_trim: (S,) momentum trim [m/s^2].
         tick_seconds, solve_seconds: (ticks,) wall-clock time of every control tick and QP.
         plan_seconds: (S,) wall-clock time of every plan.
         metadata: robot, gait, options, joint names, limits, outcome and summary figures.
@@ -74,15 +80,18 @@ class Record:
     solved: NDArray[np.bool_]
     swing_reference: Array
     push: Array
-    vlo_time: Array
-    vlo_state: Array
-    vlo_predicted: Array
-    vlo_controls: Array
-    vlo_offset: Array
-    vlo_reached: NDArray[np.bool_]
-    vlo_feasible: NDArray[np.bool_]
-    vlo_load: Array
-    vlo_trim: Array
+    section: NDArray[np.int64]
+    section_time: Array
+    section_state: Array
+    stride: NDArray[np.int64]
+    section_target: Array
+    section_predicted: Array
+    section_controls: Array
+    section_offset: Array
+    section_nominal: NDArray[np.bool_]
+    section_feasible: NDArray[np.bool_]
+    section_load: Array
+    section_trim: Array
     tick_seconds: Array
     solve_seconds: Array
     plan_seconds: Array
@@ -90,8 +99,8 @@ class Record:
 
     @property
     def steps(self) -> int:
-        """Completed steps."""
-        return len(self.vlo_time) - 1
+        """Completed steps: strides from one section to the next."""
+        return len(self.section_time) - 1
 
     @property
     def fell(self) -> bool:
@@ -113,9 +122,9 @@ class Record:
 
     @classmethod
     def load(cls, path: str | Path) -> Record:
-        """Read a run that :meth:`save` wrote.
+        """Read a run that :meth:`save` wrote, now or in an earlier version.
 
         Raises:
             RecordError: if the file is missing or is no recorded run.
         """
-        return storage.load(cls, path, FORMAT)
+        return storage.load(cls, path, FORMAT, {_WALKS: from_walk})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,29 @@ from numpy.typing import NDArray
 from template_control.embedding.controller import EmbeddingController
 from template_control.robot.requirements import BASE_DOF
 from template_control.run.record import Record
-from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.solver import Solution
 
 Array = NDArray[np.float64]
 
 _FIRST_CAPACITY = 4096
-_NODE_INDEX = {node.name: i for i, node in enumerate(AUTOMATON.nodes)}
+
+
+class Truth(NamedTuple):
+    """The robot and what acts on it at a tick.
+
+    Attributes:
+        time: [s].
+        q, v: (nv,) true configuration and velocity.
+        contact_force: (2, 2) the ground's force on each foot [N].
+        push: disturbance on the trunk [N].
+    """
+
+    time: float
+    q: Array
+    v: Array
+    contact_force: Array
+    push: float
 
 
 class Recorder:
@@ -49,7 +65,7 @@ class Recorder:
             "node": 1,
             "rear": 1,
             "solved": 1,
-            "swing_reference": 2,
+            "swing_reference": 4,
             "push": 1,
         }
         ends = np.cumsum(list(widths.values()))
@@ -60,6 +76,8 @@ class Recorder:
         self._table = np.empty((_FIRST_CAPACITY, int(ends[-1])))
         self._times = np.empty((_FIRST_CAPACITY, 2))
         self._joint = np.zeros((nu, 2))
+        self._swing = np.empty((2, 2))
+        self._node_index = controller.planning.automaton.index
         self.rows = 0
         self.ticks = 0
         self.peak_torque = np.zeros(nu)
@@ -69,17 +87,15 @@ class Recorder:
         self.saturated = 0
         self.failures = 0
 
-    def tick(
-        self,
-        time: float,
-        q: Array,
-        v: Array,
-        contact_force: Array,
-        solution: Solution,
-        push: float,
-        seconds: float,
-    ) -> None:
-        """Record one tick; the controller must just have computed ``solution``."""
+    def tick(self, true: Truth, solution: Solution, seconds: float) -> None:
+        """Record one tick.
+
+        Args:
+            true: the robot as it is, without the noise of the sensors.
+            solution: that the controller has just computed.
+            seconds: wall-clock time of the controller's tick.
+        """
+        time, q, v, contact_force, push = true
         c, r = self.controller, self.controller.robot
         torque = solution.torque
         size = np.abs(torque)
@@ -99,7 +115,10 @@ class Recorder:
                 self._table = np.concatenate((self._table, np.empty_like(self._table)))
             foot = r.foot_position
             r.joint_positions(self._joint)
-            swing = c.swing
+            swing = self._swing
+            swing[:] = np.nan
+            for leg in c.station.control.swings:
+                swing[c.feet.of[leg]] = c.wanted.foot[c.feet.of[leg], :, 0]
             self._table[self.rows] = (
                 time,
                 *q,
@@ -119,11 +138,11 @@ class Recorder:
                 *contact_force[1],
                 *c.template_forces[0],
                 *c.template_forces[1],
-                _NODE_INDEX[c.node.name],
-                c.rear,
+                self._node_index[c.node.name],
+                c.feet.of[Leg.REAR],
                 solution.solved,
-                swing.x[0],
-                swing.y[0],
+                *swing[0],
+                *swing[1],
                 push,
             )
             self.rows += 1
@@ -155,25 +174,44 @@ class Recorder:
         data = {name: table[:, columns].copy() for name, columns in self._columns.items()}
         for name in ("time", "angular_momentum", "node", "rear", "solved", "push"):
             data[name] = data[name][:, 0]
-        for name in ("foot", "joint", "contact_force", "template_force"):
+        for name in ("foot", "joint", "contact_force", "template_force", "swing_reference"):
             data[name] = data[name].reshape(len(data[name]), -1, 2)
-        steps = self.controller.steps
+        reports = self.controller.reports
+        sections, strides = self.section_names(), self.stride_names()
         return Record(
             **{k: x for k, x in data.items() if k not in ("node", "rear", "solved")},
             node=data["node"].astype(np.int64),
             rear=data["rear"].astype(np.int64),
             solved=data["solved"].astype(bool),
-            vlo_time=np.array([s.time for s in steps]),
-            vlo_state=np.array([s.state for s in steps]),
-            vlo_predicted=np.array([s.decision.predicted for s in steps]),
-            vlo_controls=np.array([s.decision.controls for s in steps]),
-            vlo_offset=np.array([s.offset for s in steps]),
-            vlo_reached=np.array([s.decision.reached for s in steps]),
-            vlo_feasible=np.array([s.decision.feasible for s in steps]),
-            vlo_load=np.array([s.load for s in steps]),
-            vlo_trim=np.array([s.trim for s in steps]),
+            section=np.array([sections.index(r.section.name) for r in reports], dtype=np.int64),
+            section_time=np.array([r.time for r in reports]),
+            section_state=np.array([r.state for r in reports]),
+            stride=np.array([strides.index(r.goal.stride) for r in reports], dtype=np.int64),
+            section_target=np.array([_padded(r.goal.target) for r in reports]),
+            section_predicted=np.array([_padded(r.decision.predicted) for r in reports]),
+            section_controls=np.array([r.decision.controls for r in reports]),
+            section_offset=np.array([_padded(r.offset) for r in reports]),
+            section_nominal=np.array([r.decision.nominal for r in reports]),
+            section_feasible=np.array([r.decision.feasible for r in reports]),
+            section_load=np.array([r.learnt.load for r in reports]),
+            section_trim=np.array([r.learnt.trim for r in reports]),
             tick_seconds=self._times[: self.ticks, 0].copy(),
             solve_seconds=self._times[: self.ticks, 1].copy(),
-            plan_seconds=np.array([s.plan_seconds for s in steps]),
-            metadata=metadata,
+            plan_seconds=np.array([r.plan_seconds for r in reports]),
+            metadata={**metadata, "sections": sections, "strides": strides},
         )
+
+    def section_names(self) -> list[str]:
+        """Sections of the run, each once."""
+        return list(dict.fromkeys(r.section.name for r in self.controller.reports))
+
+    def stride_names(self) -> list[str]:
+        """Kinds of stride of the run, each once."""
+        return list(dict.fromkeys(r.goal.stride for r in self.controller.reports))
+
+
+def _padded(z: Array) -> Array:
+    """A section's state as records keep it: dy/dt is 0 where the section has none."""
+    full = np.zeros(3)
+    full[: len(z)] = z
+    return full

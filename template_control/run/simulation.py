@@ -1,4 +1,4 @@
-"""Walk a robot: plant, controller and recorder in one loop."""
+"""Run a robot: plant, controller and recorder in one loop."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from numpy.typing import NDArray
 
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.planner import Planner
+from template_control.embedding.planners.default import default_planners
+from template_control.embedding.planners.planner import Planner, Planners
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.start import state_at_vlo
+from template_control.robot.start import Pose, state_at_vlo, state_in
 from template_control.run.record import Record
-from template_control.run.recorder import Recorder
+from template_control.run.recorder import Recorder, Truth
 from template_control.run.sensing import SensorOptions, Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.maps.section import VLO
+from template_control.slip.scenario.route import Route, SteadyRoute
 
 Array = NDArray[np.float64]
 
-_CONTACT_FORCE = 0.005  # of the weight: what a foot must carry to count as touching
-_FALL_HEIGHT = 0.35  # of the template's rest length: hip nearer to the ground than that
-_FALL_PITCH = np.radians(60.0)
-_PATIENCE = 4.0  # step durations without a VLO
+_STEPS = 50  # of a run on a route that does not end, where the options do not say
 _LONGEST_DELAY = 1.0  # [s]
 
 
@@ -53,33 +54,57 @@ class Push:
 
 
 @dataclass(frozen=True)
+class FallOptions:
+    """When a foot touches the ground, and when a robot counts as fallen.
+
+    Attributes:
+        contact_force: of the weight: what a foot must carry to count as touching. Less is the
+            rattle of a contact solver.
+        height: of the template's rest length: the hips nearer to the ground than that.
+        pitch: of the trunk [rad].
+        patience: durations of the gait's step without a section.
+    """
+
+    contact_force: float = 0.005
+    height: float = 0.35
+    pitch: float = float(np.radians(60.0))
+    patience: float = 4.0
+
+
+@dataclass(frozen=True)
 class SimulationOptions:
     """How a run goes.
 
     Attributes:
-        steps: VLO to VLO, how many to walk.
+        steps: from section to section, how many at most; None: to the end of the route, or 50
+            where it has none.
         plant: the world; the type of its options says which.
         embedding: the controller's tuning.
-        start: (3,) VLO state to start in; None for the gait's.
+        start: (3,) VLO state to start in; None for the route's.
+        pose: CoM and feet to start with; None: over the stance foot at VLO. A route that
+            begins at another section needs it.
         pushes: disturbances.
         sensors: noise on the state the controller gets; the plant and the record have the
             true one.
         delay: from a measurement to the torques computed from it [s], a whole number of
             physics steps.
         record_every: keep every n-th sample.
+        falls: when the robot counts as fallen.
     """
 
-    steps: int = 50
+    steps: int | None = None
     plant: PlantOptions | IdealOptions = field(default_factory=PlantOptions)
     embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
     start: tuple[float, float, float] | None = None
+    pose: Pose | None = None
     pushes: tuple[Push, ...] = ()
     sensors: SensorOptions = field(default_factory=SensorOptions)
     delay: float = 0.0
     record_every: int = 1
+    falls: FallOptions = field(default_factory=FallOptions)
 
     def __post_init__(self) -> None:
-        if self.steps < 1:
+        if self.steps is not None and self.steps < 1:
             raise ParameterError(f"steps is {self.steps}: give at least 1")
         if self.record_every < 1:
             raise ParameterError(f"record_every is {self.record_every}: give at least 1")
@@ -107,39 +132,42 @@ def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:
 
 def simulate(
     robot: PlanarBiped,
-    planner: Planner,
+    route: Route | Planner,
     options: SimulationOptions | None = None,
     progress: Callable[[int], None] | None = None,
+    planners: Planners | None = None,
+    automaton: Automaton = AUTOMATON,
 ) -> Record:
-    """Walk ``robot`` and record it; a fall ends the run, is recorded and raises nothing.
+    """Run ``robot`` along a route and record it; a fall ends the run and raises nothing.
 
-    Ctrl-C ends the run too; what was walked by then is returned, marked ``interrupted``.
+    Ctrl-C ends the run too; what was done by then is returned, marked ``interrupted``.
 
     Args:
         robot: model of the controller, and whose URDF the plant loads.
-        planner: chooses the steps; owns the gait.
+        route: which stride comes next and towards which state; or a planner, whose gait the
+            robot then keeps.
         options: how the run goes.
         progress: called with the number of completed steps after each.
+        planners: one for each kind of stride of the route; by default
+            :func:`~template_control.embedding.planners.default.default_planners`.
+        automaton: of the route's strides.
 
     Raises:
-        RobotError: if the robot's legs do not reach the gait's VLO.
+        RobotError: if the robot's legs do not reach the start.
+        ParameterError: if there is no planner for a stride of the route, or no pose to start in.
     """
     o = options or SimulationOptions()
-    gait = planner.gait
-    controller = EmbeddingController(robot, planner, o.embedding)
+    run = _Run.of(route, planners)
+    controller = EmbeddingController(robot, run.planners, run.route, o.embedding, automaton)
     recorder = Recorder(controller, o.record_every)
-    z = np.array(o.start) if o.start is not None else gait.vlo
-    length = gait.parameters.rest_length
-    # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
-    swing = np.array([0.0, controller.options.swing.clearance])
-    q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), o.embedding.trunk_pitch)
-    controller.start(0)
+    q, v = _start(robot, controller, run.route, o)
+    controller.start(run.route.section, 0 if o.pose is None else o.pose.rear)
     begin = time.perf_counter()
     interrupted = False
     with open_plant(robot, o.plant) as plant:
         plant.reset(q, v)
         try:
-            reason = _loop(plant, controller, recorder, o, length, progress)
+            reason = _loop(plant, controller, recorder, o, progress)
         except KeyboardInterrupt:
             if not recorder.rows:
                 raise
@@ -150,23 +178,62 @@ def simulate(
     return recorder.record(metadata)
 
 
+@dataclass(frozen=True)
+class _Run:
+    """A route, and planners for its strides."""
+
+    route: Route
+    planners: Planners
+
+    @classmethod
+    def of(cls, route: Route | Planner, planners: Planners | None) -> _Run:
+        """The route that was given, or the steady one of a planner's gait."""
+        if isinstance(route, Planner):
+            gait = route.gait
+            steady = SteadyRoute(gait.parameters, gait.stride, gait.state)
+            return cls(steady, {gait.stride: route})
+        return cls(route, planners or default_planners(route))
+
+
+def _start(
+    robot: PlanarBiped, controller: EmbeddingController, route: Route, o: SimulationOptions
+) -> tuple[Array, Array]:
+    """(q, v) that the run begins in.
+
+    Raises:
+        ParameterError: if the route does not begin at VLO and no pose is given.
+    """
+    if o.pose is not None:
+        return state_in(robot, o.pose)
+    if route.section != VLO:
+        raise ParameterError(
+            f"the route begins at {route.section.name}, and only at VLO it is clear where the"
+            " feet are: give SimulationOptions a pose"
+        )
+    z = np.array(o.start) if o.start is not None else route.start
+    # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
+    swing = np.array([0.0, controller.options.swing.clearance])
+    pitch = controller.options.trunk_pitch
+    return state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
+
+
 def _loop(
     plant: Plant,
     controller: EmbeddingController,
     recorder: Recorder,
     o: SimulationOptions,
-    length: float,
     progress: Callable[[int], None] | None,
 ) -> str:
     """Run until the steps are done ("") or the robot falls (why)."""
-    robot, gait = controller.robot, controller.planner.gait
+    robot, planning = controller.robot, controller.planning
     dt = o.plant.time_step
+    length = controller.parameters.rest_length
     sensors, delay = Sensors(o.sensors, robot, length), TorqueDelay(o.delay_ticks)
     q, v, forces = np.zeros(robot.nv), np.zeros(robot.nv), np.zeros((2, 2))
-    threshold = _CONTACT_FORCE * robot.mass * robot.gravity
-    patience = _PATIENCE * gait.step_duration
-    done, now, tick = 0, 0.0, 0
-    while done < o.steps:
+    threshold = o.falls.contact_force * robot.mass * robot.gravity
+    last = o.steps if o.steps is not None else (_STEPS if planning.route.endless else np.inf)
+    done, tick = 0, 0
+    while done < last and not planning.arrived:
         now = tick * dt
         plant.read(q, v)
         plant.contact_forces(forces)
@@ -178,13 +245,13 @@ def _loop(
         seconds = time.perf_counter() - start
         if sensors.noisy:
             robot.update(q, v)  # what is recorded is true
-        push = _push(o.pushes, controller, gait.step_duration, now)
-        recorder.tick(now, q, v, forces, solution, push, seconds)
-        reason = _fallen(plant, controller, q, o.plant.ground_height(q[0]), length, patience, now)
+        push = _push(o.pushes, controller, now)
+        recorder.tick(Truth(now, q, v, forces, push), solution, seconds)
+        reason = _fallen(plant, controller, q, o, now)
         if reason:
             return f"{reason} at {now:.3f} s, in step {done + 1}"
-        if len(controller.steps) - 1 > done:
-            done = len(controller.steps) - 1
+        if len(controller.reports) - 1 > done:
+            done = len(controller.reports) - 1
             if progress is not None:
                 progress(done)
         try:
@@ -195,34 +262,29 @@ def _loop(
     return ""
 
 
-def _push(
-    pushes: tuple[Push, ...], controller: EmbeddingController, duration: float, now: float
-) -> float:
+def _push(pushes: tuple[Push, ...], controller: EmbeddingController, now: float) -> float:
     """Force of the pushes that act at time ``now`` [N]."""
     total = 0.0
     for push in pushes:
-        if push.step < len(controller.steps):
-            begin = controller.steps[push.step].time + push.phase * duration
+        if push.step < len(controller.reports):
+            duration = controller.planner.gait.step_duration
+            begin = controller.reports[push.step].time + push.phase * duration
             if begin <= now < begin + push.duration:
                 total += push.impulse / push.duration
     return total
 
 
 def _fallen(
-    plant: Plant,
-    controller: EmbeddingController,
-    q: Array,
-    ground: float,
-    length: float,
-    patience: float,
-    now: float,
+    plant: Plant, controller: EmbeddingController, q: Array, o: SimulationOptions, now: float
 ) -> str:
-    hip = controller.robot.hip_height(q) - ground
-    if hip < _FALL_HEIGHT * length:
+    falls, length = o.falls, controller.parameters.rest_length
+    hip = controller.robot.hip_height(q) - o.plant.ground_height(q[0])
+    if hip < falls.height * length:
         return f"the hip was {hip:.2f} m above the ground"
-    if abs(q[2]) > _FALL_PITCH:
+    if abs(q[2]) > falls.pitch:
         return f"the trunk pitched to {np.degrees(q[2]):.0f} degrees"
-    if now - controller.steps[-1].time > patience:
+    patience = falls.patience * controller.planner.gait.step_duration
+    if now - controller.reports[-1].time > patience:
         return "the robot stopped walking"
     if plant.trunk_touches_ground():
         return "the trunk touched the ground"
@@ -247,13 +309,14 @@ def _metadata(
         "feet": list(robot.feet),
         "legs": [list(leg) for leg in robot.legs],
         "trunk_com": robot.trunk_com,
-        "nodes": [node.name for node in AUTOMATON.nodes],
+        "nodes": [node.name for node in controller.planning.automaton.nodes],
         "gait": gait.name,
         "template": parameters,
-        "gait_vlo": gait.vlo.tolist(),
+        "gait_state": gait.state.tolist(),
         "gait_controls": gait.controls.tolist(),
-        "gait_mean_speed": gait.mean_speed,
+        "gait_mean_speed": gait.step_length / gait.step_duration,
         "planner": type(controller.planner).__name__,
+        "friction": controller.qp.friction,
         "plant": plant_name(o.plant),
         "options": asdict(o),
         "fall_reason": reason,

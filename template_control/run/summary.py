@@ -30,10 +30,10 @@ def summarise(record: Record, path: str) -> dict[str, Any]:
 
     Returns:
         robot, gait, steps, fell, fall_reason, duration, mean_speed, vlo_target and
-        vlo_mean_last_50 (speed, height, vertical_speed), com_error_rms and com_error_max
+        vlo_mean_last_50 (speed, height, vertical_speed; of the states at VLO), com_error_rms and com_error_max
         (x, y), joint_torque (per joint peak, rms, limit), saturated_share, qp_failures,
         control_tick_seconds and qp_solve_seconds (median, p99), plan_seconds (median, p99),
-        real_time_factor, steps_not_reached (plans that took the best reachable step), record.
+        real_time_factor, steps_not_nominal (plans that left the planner's own law), record.
     """
     m = record.metadata
     duration = m["duration"]
@@ -46,8 +46,8 @@ def summarise(record: Record, path: str) -> dict[str, Any]:
         "fall_reason": m["fall_reason"] or None,
         "duration": duration,
         "mean_speed": walked / max(float(record.time[-1]), 1e-9),
-        "vlo_target": _state(np.array(m["gait_vlo"])),
-        "vlo_mean_last_50": _state(record.vlo_state[1:][-50:].mean(axis=0))
+        "vlo_target": _state(record.section_target[-1]),
+        "vlo_mean_last_50": _state(record.section_state[1:][-50:].mean(axis=0))
         if record.steps
         else None,
         **m["summary"],
@@ -55,6 +55,6 @@ def summarise(record: Record, path: str) -> dict[str, Any]:
         "qp_solve_seconds": _quantiles(record.solve_seconds),
         "plan_seconds": _quantiles(record.plan_seconds),
         "real_time_factor": duration / m["wall_seconds"],
-        "steps_not_reached": int(np.sum(~record.vlo_reached)),
+        "steps_not_nominal": int(np.sum(~record.section_nominal)),
         "record": path,
     }

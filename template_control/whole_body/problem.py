@@ -14,11 +14,14 @@ Hessian is the identity, and constraint rows of unit length.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from template_control.whole_body.elimination import cholesky, eliminate
+from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
 Array = NDArray[np.float64]
 
@@ -27,77 +30,98 @@ _FAR = 1e20  # ProxQP's infinity
 _GRID = 2.0**24  # steps of a torque up to its limit
 
 
+class Limits(NamedTuple):
+    """What a solution must respect.
+
+    Attributes:
+        torque: (nu,) largest joint torques [N m].
+        cap: (c,) largest normal force of each stance foot [N] (inf: none).
+        friction: coefficient of the cones.
+        weight: m g, the unit of forces [N].
+    """
+
+    torque: Array
+    cap: Array
+    friction: float
+    weight: float
+
+
+class Matrices(NamedTuple):
+    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all.
+
+    Attributes:
+        a_map: (nv, nu + 1) accelerations as an affine function of the torques.
+        f_map: (2 c, nu + 1) contact forces.
+        factor: (nu, nu) L in its lower triangle.
+        gradient: (nu,) L^-1 g.
+        constraint: (nu + 3 c, nu) rows of unit length.
+        lower, upper: (nu + 3 c,).
+    """
+
+    a_map: Array
+    f_map: Array
+    factor: Array
+    gradient: Array
+    constraint: Array
+    lower: Array
+    upper: Array
+
+
 @njit(cache=True)
 def assemble(
     mass_matrix: Array,
     nonlinear_effects: Array,
-    jacobian: Array,
-    bias: Array,
-    task_jacobian: Array,
-    task_bias: Array,
-    task_desired: Array,
-    task_weight: Array,
-    force_reference: Array,
-    force_weight: float,
-    torque_weight: float,
-    torque_limit: Array,
-    friction: float,
-    force_cap: Array,
-    weight: float,
-    a_map: Array,
-    f_map: Array,
-    factor: Array,
-    gradient: Array,
-    constraint: Array,
-    lower: Array,
-    upper: Array,
+    contact: Array,
+    tasks: Array,
+    costs: Array,
+    limits: Limits,
+    out: Matrices,
 ) -> bool:
     """Fill the QP's matrices in place.
 
     Args:
-        mass_matrix, nonlinear_effects, jacobian, bias: as in
-            :func:`~.elimination.eliminate`; ``jacobian`` is (2 c, nv) for c stance feet,
-            rows x, y of each.
-        task_jacobian, task_bias, task_desired, task_weight: (t, nv), (t,), (t,), (t,).
-        force_reference: (2 c,) wanted contact forces [N].
-        force_weight, torque_weight: regularisers, dimensionless.
-        torque_limit: (nu,) [N m].
-        friction: coefficient of the cone.
-        force_cap: (c,) largest normal force [N] (inf: none).
-        weight: m g [N].
-        a_map, f_map: (nv, nu + 1), (2 c, nu + 1) overwritten with the affine maps.
-        factor: (nu, nu) overwritten with L in its lower triangle.
-        gradient: (nu,) overwritten with L^-1 g.
-        constraint, lower, upper: (nu + 3 c, nu), (nu + 3 c,) twice, overwritten, in w.
+        mass_matrix, nonlinear_effects: (nv, nv) M and (nv,) h.
+        contact: (2 c, nv + 2) a row for x and y of each stance foot: Jacobian J, bias dJ/dt v,
+            wanted force [N].
+        tasks: (t, nv + 3), the table of a :class:`~.task.TaskStack`.
+        costs: (2,) of the contact forces' distance from the wanted ones, per (m g)^2, and of
+            the joint torques, per squared limit.
+        limits: torques, friction, caps.
+        out: overwritten.
 
     Returns:
         False where the elimination is singular.
     """
+    a_map, f_map, factor, gradient = out.a_map, out.f_map, out.factor, out.gradient
+    constraint, lower, upper = out.constraint, out.lower, out.upper
+    torque_limit, force_cap, weight = limits.torque, limits.cap, limits.weight
+    friction = limits.friction
     nv = mass_matrix.shape[0]
     nu = torque_limit.shape[0]
     feet = force_cap.shape[0]
+    jacobian, bias = contact[:, :nv], contact[:, nv]
     if not eliminate(mass_matrix, nonlinear_effects, jacobian, bias, nv - nu, a_map, f_map):
         return False
     factor[:] = 0.0
     gradient[:] = 0.0
     row = np.empty(nu + 1)
     for i in range(nu):
-        factor[i, i] = torque_weight
-    for t in range(task_weight.shape[0]):
-        if task_weight[t] == 0.0:
+        factor[i, i] = costs[1]
+    for t in range(tasks.shape[0]):
+        if tasks[t, nv + WEIGHT] == 0.0:
             continue
         for j in range(nu + 1):
             total = 0.0
             for k in range(nv):
-                total += task_jacobian[t, k] * a_map[k, j]
+                total += tasks[t, k] * a_map[k, j]
             row[j] = total
-        row[nu] += task_bias[t] - task_desired[t]
-        _add_square(row, task_weight[t], torque_limit, factor, gradient)
+        row[nu] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
+        _add_square(row, tasks[t, nv + WEIGHT], torque_limit, factor, gradient)
     for i in range(2 * feet):
         for j in range(nu + 1):
             row[j] = f_map[i, j] / weight
-        row[nu] -= force_reference[i] / weight
-        _add_square(row, force_weight, torque_limit, factor, gradient)
+        row[nu] -= contact[i, nv + 1] / weight
+        _add_square(row, costs[0], torque_limit, factor, gradient)
 
     constraint[:] = 0.0
     for i in range(nu):
@@ -148,8 +172,9 @@ def _forward(factor: Array, vector: Array) -> None:
 def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
     """Joint torques [N m] of the QP's solution: tau_max * (L^-T w), kept within tau_max.
 
-    Rounded to 2^-24 of tau_max, near ProxQP's tolerance: its last digits depend on where its
-    workspace happens to lie in memory, and a walk near a fall would not be the same twice.
+    They are rounded to 2^-24 of tau_max, near ProxQP's tolerance: its last digits depend on
+    where its workspace happens to lie in memory, and a walk near a fall would not be the same
+    twice.
     """
     n = w.shape[0]
     for i in range(n - 1, -1, -1):
@@ -177,7 +202,14 @@ def _add_square(
 
 
 @njit(cache=True)
-def affine(matrix: Array, tau: Array, out: Array) -> None:
+def follow(maps: Matrices, tau: Array, acceleration: Array, force: Array) -> None:
+    """Accelerations (nv,) and contact forces (2 c,) that the torques ``tau`` (nu,) bring about."""
+    _affine(maps.a_map, tau, acceleration)
+    _affine(maps.f_map, tau, force)
+
+
+@njit(cache=True)
+def _affine(matrix: Array, tau: Array, out: Array) -> None:
     """out = matrix[:, :-1] tau + matrix[:, -1]."""
     n = tau.shape[0]
     for i in range(out.shape[0]):

@@ -4,20 +4,65 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import proxsuite
 from numpy.typing import NDArray
 
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.whole_body.problem import ROWS_PER_FOOT, affine, assemble, torques
-from template_control.whole_body.tasks import TaskStack, Weights
+from template_control.slip.similarity import RATE, tuned
+from template_control.whole_body.problem import (
+    ROWS_PER_FOOT,
+    Limits,
+    Matrices,
+    assemble,
+    follow,
+    torques,
+)
+from template_control.whole_body.task import TaskStack
 
 Array = NDArray[np.float64]
 
 _proxqp = proxsuite.proxqp
 _SOLVED = _proxqp.QPSolverOutput.PROXQP_SOLVED
+
+
+@dataclass(frozen=True)
+class QpOptions:
+    """What the QP knows of motors and ground, and how it regularises.
+
+    Attributes:
+        friction: Coulomb coefficient of the ground, as far as the controller knows it.
+        friction_margin: share of it that the cones use; a foot slides before the QP knows.
+        torque_scale: share of the URDF's torque limits that may be used.
+        contact_damping: brings a foot that landed sliding to rest [1/s].
+        force_cost: of the contact forces' distance from the template's, per (m g)^2. Small:
+            in double stance it chooses between forces that serve the tasks alike.
+        torque_cost: of the joint torques, per squared limit. Smaller: it only makes the
+            optimum unique.
+    """
+
+    friction: float = tuned(0.7)
+    friction_margin: float = tuned(0.9)
+    torque_scale: float = tuned(1.0)
+    contact_damping: float = tuned(40.0, RATE)
+    force_cost: float = tuned(1e-3)
+    torque_cost: float = tuned(1e-4)
+
+
+class Stance(NamedTuple):
+    """The feet on the ground and what they should do there.
+
+    Attributes:
+        feet: indices of the feet, none to two.
+        force: (2 c,) contact forces to stay near, x and y of each foot [N].
+        cap: (c,) largest normal force of each foot [N] (inf: none).
+    """
+
+    feet: tuple[int, ...]
+    force: Array
+    cap: Array
 
 
 @dataclass(frozen=True)
@@ -46,23 +91,26 @@ class _Workspace:
 
     def __init__(self, nv: int, nu: int, feet: int) -> None:
         rows = nu + ROWS_PER_FOOT * feet
-        self.a_map = np.zeros((nv, nu + 1))
-        self.f_map = np.zeros((2 * feet, nu + 1))
-        self.factor = np.zeros((nu, nu))
         self._identity = np.eye(nu)
-        self.gradient = np.zeros(nu)
-        self.constraint = np.zeros((rows, nu))
-        self.lower = np.zeros(rows)
-        self.upper = np.zeros(rows)
-        self.jacobian = np.zeros((2 * feet, nv))
-        self.bias = np.zeros(2 * feet)
+        self.matrices = Matrices(
+            a_map=np.zeros((nv, nu + 1)),
+            f_map=np.zeros((2 * feet, nu + 1)),
+            factor=np.zeros((nu, nu)),
+            gradient=np.zeros(nu),
+            constraint=np.zeros((rows, nu)),
+            lower=np.zeros(rows),
+            upper=np.zeros(rows),
+        )
+        self.contact = np.zeros((2 * feet, nv + 2))
+        self.jacobian = self.contact[:, :nv]
+        self.bias, self.force = self.contact[:, nv], self.contact[:, nv + 1]
         self.rows = rows
         self.qp = self._new()
         self.ready = False
 
     def _new(self) -> Any:
         qp = _proxqp.dense.QP(
-            len(self.gradient),
+            len(self._identity),
             0,
             self.rows,
             False,
@@ -81,12 +129,8 @@ class _Workspace:
     def solve(self) -> bool:
         """Solve for the current matrices; warm, and once more from scratch if that fails."""
         if self.ready:
-            self.qp.update(
-                g=self.gradient,
-                C=self.constraint,
-                l=self.lower,
-                u=self.upper,
-            )
+            m = self.matrices
+            self.qp.update(g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
             self.qp.solve()
             if self.qp.results.info.status == _SOLVED:
                 return True
@@ -95,7 +139,8 @@ class _Workspace:
             self.qp = self._new()
         qp = self.qp
         qp.settings.initial_guess = _proxqp.InitialGuess.NO_INITIAL_GUESS
-        qp.init(self._identity, self.gradient, None, None, self.constraint, self.lower, self.upper)
+        m = self.matrices
+        qp.init(H=self._identity, g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
         qp.solve()
         self.ready = bool(qp.results.info.status == _SOLVED)
         if self.ready:
@@ -110,89 +155,61 @@ class WholeBodyQp:
 
     Args:
         robot: the model; :meth:`solve` reads its last update.
+        options: motors, ground, regularisers.
+
+    Attributes:
+        torque_limit: (nu,) that may be used [N m].
         friction: coefficient the cones are built with.
-        torque_scale: fraction of the URDF's torque limits that may be used.
-        contact_damping: brings a foot that landed sliding to rest [1/s].
     """
 
-    def __init__(
-        self,
-        robot: PlanarBiped,
-        friction: float,
-        torque_scale: float = 1.0,
-        contact_damping: float = 40.0,
-    ) -> None:
+    def __init__(self, robot: PlanarBiped, options: QpOptions | None = None) -> None:
+        o = options or QpOptions()
         self.robot = robot
-        self.friction = friction
-        self.torque_limit: Array = robot.torque_limit * torque_scale
+        self.friction = o.friction_margin * o.friction
+        self.torque_limit: Array = robot.torque_limit * o.torque_scale
+        self._contact_damping = o.contact_damping
+        self._costs = np.array([o.force_cost, o.torque_cost])
+        self._weight = robot.mass * robot.gravity
         nu = len(self.torque_limit)
-        self._workspaces = {n: _Workspace(robot.nv, nu, n) for n in (1, 2)}
+        self._workspaces = [_Workspace(robot.nv, nu, feet) for feet in range(3)]
         self._torque = np.zeros(nu)
-        self.contact_damping = contact_damping
 
-    def solve(
-        self,
-        tasks: TaskStack,
-        weights: Weights,
-        row_weights: Array,
-        stance: tuple[int, ...],
-        force_reference: Array,
-        force_cap: Array,
-        load: float = 1.0,
-    ) -> Solution:
+    def solve(self, tasks: TaskStack, stance: Stance, load: float = 1.0) -> Solution:
         """Solve one tick.
 
         Args:
-            tasks: rows and desired accelerations.
-            weights: regularisers.
-            row_weights: (5,) weights of the task rows.
-            stance: indices of the feet on the ground, one or two.
-            force_reference: (2 c,) contact forces to stay near [N].
-            force_cap: (c,) largest normal forces [N].
+            tasks: rows, desired accelerations and weights.
+            stance: the feet on the ground.
             load: ratio of the real to the modelled inertia; the torques are scaled by it
                 and stay within their limits.
         """
         robot = self.robot
-        w = self._workspaces[len(stance)]
+        w = self._workspaces[len(stance.feet)]
         limit = self.torque_limit / load
-        for i, foot in enumerate(stance):
-            w.jacobian[2 * i : 2 * i + 2] = robot.foot_jacobian[foot]
-            w.bias[2 * i : 2 * i + 2] = (
-                robot.foot_bias[foot] + self.contact_damping * robot.foot_velocity[foot]
+        for i, foot in enumerate(stance.feet):
+            rows = slice(2 * i, 2 * i + 2)
+            w.jacobian[rows] = robot.foot_jacobian[foot]
+            w.bias[rows] = (
+                robot.foot_bias[foot] + self._contact_damping * robot.foot_velocity[foot]
             )
+        w.force[:] = stance.force
         regular = assemble(
             robot.mass_matrix,
             robot.nonlinear_effects,
-            w.jacobian,
-            w.bias,
-            tasks.jacobian,
-            tasks.bias,
-            tasks.desired,
-            row_weights,
-            force_reference,
-            weights.force,
-            weights.torque,
-            limit,
-            self.friction,
-            force_cap,
-            robot.mass * robot.gravity,
-            w.a_map,
-            w.f_map,
-            w.factor,
-            w.gradient,
-            w.constraint,
-            w.lower,
-            w.upper,
+            w.contact,
+            tasks.table,
+            self._costs,
+            Limits(limit, stance.cap, self.friction, self._weight),
+            w.matrices,
         )
         start = time.perf_counter()
         solved = regular and w.solve()
         seconds = time.perf_counter() - start
         if solved:
-            torques(w.factor, w.qp.results.x, limit, self._torque)
+            torques(w.matrices.factor, w.qp.results.x, limit, self._torque)
         else:
             np.clip(self._torque, -limit, limit, out=self._torque)
-        force = np.empty(2 * len(stance))
+        force = np.empty(2 * len(stance.feet))
         acceleration = np.empty(robot.nv)
-        affine(w.f_map, self._torque, force)
-        affine(w.a_map, self._torque, acceleration)
+        follow(w.matrices, self._torque, acceleration, force)
         return Solution(load * self._torque, force, acceleration, solved, seconds)

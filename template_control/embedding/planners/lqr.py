@@ -8,7 +8,7 @@ gait and not beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,18 +16,30 @@ from scipy.linalg import solve_discrete_are
 
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.step_search import FALL_PRICE, Law, linear, price, search
-from template_control.embedding.scaling import Scale
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.tables import TABLES
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.stride import kernel_model
 from template_control.slip.gaits.gait import WALKING_SLOTS, WalkingGait, vlo_jacobians
+from template_control.slip.gaits.walking_family import WalkingFamily
+from template_control.slip.similarity import (
+    LENGTH,
+    PER_LENGTH_SQUARED,
+    PER_SPEED_SQUARED,
+    SPEED,
+    Scale,
+    scaled,
+    tuned,
+)
 
 Array = NDArray[np.float64]
 
 _EXACT = int(MapKind.EXACT)
 _NODE = AUTOMATON.index[STRIDE_START["w"]]
+
+
+_VLO_STATE = (SPEED, LENGTH, SPEED)
 
 
 @dataclass(frozen=True)
@@ -45,6 +57,8 @@ class LqrOptions:
         surprise_bound: a larger surprise counts as this much: a push is no offset.
         tolerance: errors of the settled state that count as equally bad; decides which
             part of an offset that the controls cannot cancel shows up where.
+        control_weight: of the settled controls' squared changes [rad, share of k0], where
+            an error of ``tolerance`` in a state counts as 1.
         stiffness_range: kappa_1 and kappa_2 over k0.
         angle_range: touchdown angle relative to the gait's [rad]; steeper ones make steps
             too short in time for the swing leg, flatter ones let the CoM sink lower than the
@@ -58,36 +72,31 @@ class LqrOptions:
             virtual bottom than after takes energy out, the reverse puts some in.
     """
 
-    state_cost: tuple[float, float, float] = (10.0, 100.0, 10.0)
-    control_cost: tuple[float, float, float] = (5.0, 2.0, 2.0)
-    offset_gain: float = 0.2
-    offset_bound: tuple[float, float, float] = (0.06, 0.015, 0.12)
-    surprise_bound: tuple[float, float, float] = (0.03, 0.008, 0.06)
-    tolerance: tuple[float, float, float] = (0.011, 0.005, 0.03)
-    stiffness_range: tuple[float, float] = (0.5, 1.5)
-    angle_range: tuple[float, float] = (-0.12, 0.065)
-    top_margin: float = 0.01
-    trusted_price: float = 1.0
-    spread: tuple[float, float] = (0.16, 0.25)
-    second_steps: tuple[tuple[float, float, float], ...] = (
-        (0.0, 1.5, 1.0),
-        (-0.058, 1.0, 0.75),
-        (0.025, 1.5, 1.0),
-        (-0.058, 1.25, 0.75),
-        (-0.03, 0.75, 1.0),
-        (0.0, 1.0, 1.5),
-        (0.045, 0.5, 0.75),
+    state_cost: tuple[float, float, float] = tuned(
+        (10.0, 100.0, 10.0), PER_SPEED_SQUARED, PER_LENGTH_SQUARED, PER_SPEED_SQUARED
     )
-
-    def scaled(self, scale: Scale) -> LqrOptions:
-        """The same tuning for a template of another size."""
-        return replace(
-            self,
-            state_cost=scale.state_cost(self.state_cost),
-            offset_bound=scale.state(self.offset_bound),
-            surprise_bound=scale.state(self.surprise_bound),
-            tolerance=scale.state(self.tolerance),
+    control_cost: tuple[float, float, float] = tuned((5.0, 2.0, 2.0))
+    offset_gain: float = tuned(0.2)
+    offset_bound: tuple[float, float, float] = tuned((0.06, 0.015, 0.12), *_VLO_STATE)
+    surprise_bound: tuple[float, float, float] = tuned((0.03, 0.008, 0.06), *_VLO_STATE)
+    tolerance: tuple[float, float, float] = tuned((0.011, 0.005, 0.03), *_VLO_STATE)
+    control_weight: float = tuned(100.0)
+    stiffness_range: tuple[float, float] = tuned((0.5, 1.5))
+    angle_range: tuple[float, float] = tuned((-0.12, 0.065))
+    top_margin: float = tuned(0.01)
+    trusted_price: float = tuned(1.0)
+    spread: tuple[float, float] = tuned((0.16, 0.25))
+    second_steps: tuple[tuple[float, float, float], ...] = tuned(
+        (
+            (0.0, 1.5, 1.0),
+            (-0.058, 1.0, 0.75),
+            (0.025, 1.5, 1.0),
+            (-0.058, 1.25, 0.75),
+            (-0.03, 0.75, 1.0),
+            (0.0, 1.0, 1.5),
+            (0.045, 0.5, 0.75),
         )
+    )
 
 
 class LqrPlanner:
@@ -98,14 +107,25 @@ class LqrPlanner:
         options: tuning.
 
     Attributes:
+        gait: the one of the last target.
         offset: (3,) the estimate of d.
         a, b: (3, 3) state and control Jacobians of the VLO map at the gait.
     """
 
     def __init__(self, gait: WalkingGait, options: LqrOptions | None = None) -> None:
-        self.gait = gait
-        self.options = (options or LqrOptions()).scaled(Scale.of(gait.parameters))
+        self.options = scaled(options or LqrOptions(), Scale.of(gait.parameters))
         self.offset: Array = np.zeros(3)
+        self._family = WalkingFamily(gait)
+        self._scratch = new_scratch()
+        self._spread = np.array(self.options.spread)
+        self._settle_on(gait)
+        # Compile now what a step would otherwise wait for.
+        linear(self._law, gait.vlo, u := np.empty(3))
+        search(TABLES, _NODE, self._law, self._scratch, gait.vlo, self._spread, u, np.empty(3))
+
+    def _settle_on(self, gait: WalkingGait) -> None:
+        """Make ``gait`` the one that the law leads to."""
+        self.gait = gait
         self.a, self.b = vlo_jacobians(gait)
         o = self.options
         q, r = np.diag(o.state_cost), np.diag(o.control_cost)
@@ -113,13 +133,13 @@ class LqrPlanner:
         self._gain = np.linalg.solve(
             r + self.b.T @ self._cost @ self.b, self.b.T @ self._cost @ self.a
         )
-        self._settling = _settling_map(self.a, self.b, np.array(o.tolerance))
-        self._scratch = new_scratch()
-        self._spread = np.array(o.spread)
+        self._settling = _settling_map(self.a, self.b, np.array(o.tolerance), o.control_weight)
         self._law = self._aim()
-        # Compile now what a step would otherwise wait for.
-        linear(self._law, gait.vlo, u := np.empty(3))
-        search(TABLES, _NODE, self._law, self._scratch, gait.vlo, self._spread, u, np.empty(3))
+
+    def reset(self) -> None:
+        """See :class:`~.planner.Planner`."""
+        self.offset = np.zeros(3)
+        self._law = self._aim()
 
     def _aim(self) -> Law:
         """The linear law about the fixed point the robot has with the present offset."""
@@ -141,8 +161,17 @@ class LqrPlanner:
             model=kernel_model(p),
         )
 
-    def decide(self, z: Array, angles: tuple[float, float] = ANY_ANGLE) -> Decision:
-        """Controls for a step from VLO state ``z`` (3,); see :class:`Planner`."""
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """Controls for a step from VLO state ``z`` (3,); see :class:`~.planner.Planner`.
+
+        The law leads to the symmetric gait with the target's speed; the target's height is
+        that gait's.
+        """
+        gait = self._family.towards(self.gait, target)
+        if gait is not self.gait:
+            self._settle_on(gait)
         law, s = self._law, self._scratch
         if angles != ANY_ANGLE:
             lower, upper = law.lower.copy(), law.upper.copy()
@@ -152,16 +181,16 @@ class LqrPlanner:
         u, first = np.empty(3), np.empty(3)
         linear(law, z, u)
         cost = price(TABLES, _NODE, _EXACT, law, s, z, u, np.inf, first)
-        trusted = cost < self.options.trusted_price
-        if not trusted:
+        nominal = cost < self.options.trusted_price
+        if not nominal:
             cost = search(TABLES, _NODE, law, s, z, self._spread, u, first)
         controls = self.gait.controls.copy()
         controls[WALKING_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
-        return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, trusted)
+        return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """Learn from the VLO state ``z`` (3,) in which the step of ``decision`` ended."""
-        if not (decision.feasible and decision.reached):
+        if not (decision.feasible and decision.nominal):
             return  # far from the gait the surprise says little about it
         o = self.options
         limit = np.array(o.surprise_bound)
@@ -171,13 +200,13 @@ class LqrPlanner:
         self._law = self._aim()
 
 
-def _settling_map(a: Array, b: Array, tolerance: Array) -> Array:
+def _settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:
     """(6, 3) map from an offset d to the shift (dz, du) of the fixed point.
 
-    Minimises |dz / tolerance|^2 + |du / 0.1|^2 subject to (I - A) dz = B du + d. The three
+    Minimises |dz / tolerance|^2 + control_weight |du|^2 subject to (I - A) dz = B du + d. The three
     controls act in two directions only, so not every offset can be cancelled with dz = 0.
     """
-    weight = np.concatenate((1.0 / tolerance**2, np.full(3, 1e2)))
+    weight = np.concatenate((1.0 / tolerance**2, np.full(3, control_weight)))
     constraint = np.hstack((np.eye(3) - a, -b))
     kkt = np.zeros((9, 9))
     kkt[:6, :6] = np.diag(weight)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.embedding.scaling import Scale
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.tables import TABLES
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
@@ -16,6 +15,8 @@ from template_control.slip.control.modified_walking import search_angle
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.stride import kernel_model
 from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.walking_family import WalkingFamily
+from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
 
@@ -30,15 +31,15 @@ class ModifiedOptions:
         angle_range: touchdown angle relative to the gait's [rad].
         stiffness_range: kappa_2 over k0.
         top_margin: alpha stays this far [rad] below asin(y / l0).
-        tolerance: distance from the gait's VLO state, in SI units, that counts as reached; of
-            the reference template, scaled with speeds.
+        tolerance: distance from the gait's VLO state, in SI units, up to which a step counts as
+            nominal; scaled with speeds.
         map_kind: the return map that steps are tried on.
     """
 
-    angle_range: tuple[float, float] = (-0.14, 0.08)
-    stiffness_range: tuple[float, float] = (0.5, 1.5)
-    top_margin: float = 0.01
-    tolerance: float = 0.05
+    angle_range: tuple[float, float] = tuned((-0.14, 0.08))
+    stiffness_range: tuple[float, float] = tuned((0.5, 1.5))
+    top_margin: float = tuned(0.01)
+    tolerance: float = tuned(0.05, SPEED)
     map_kind: MapKind = MapKind.EXACT
 
 
@@ -55,16 +56,22 @@ class ModifiedPlanner:
 
     def __init__(self, gait: WalkingGait, options: ModifiedOptions | None = None) -> None:
         self.gait = gait
-        self.options = options or ModifiedOptions()
+        self.options = scaled(options or ModifiedOptions(), Scale.of(gait.parameters))
         self.offset: Array = np.zeros(3)
-        self._tolerance = self.options.tolerance * Scale.of(gait.parameters).speed
+        self._family = WalkingFamily(gait)
         self._scratch = new_scratch()
         self._model = kernel_model(gait.parameters)
         k0 = gait.parameters.leg_stiffness
         self._stiffness = np.array(self.options.stiffness_range) * k0
 
-    def decide(self, z: Array, angles: tuple[float, float] = ANY_ANGLE) -> Decision:
-        """Controls for a step from VLO state ``z`` (3,); see :class:`Planner`."""
+    def reset(self) -> None:
+        """The paper's planner learns nothing."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """Controls for a step from VLO state ``z`` (3,); see :class:`~.planner.Planner`."""
+        self.gait = self._family.towards(self.gait, target)
         p, o = self.gait.parameters, self.options
         predicted = np.empty(3)
         nominal = float(self.gait.controls[Slot.TOUCHDOWN_ANGLE])
@@ -88,8 +95,8 @@ class ModifiedPlanner:
         controls = self.gait.controls.copy()
         controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2
         feasible = outcome == Outcome.SECTION
-        reached = feasible and residual < self._tolerance**2
-        return Decision(controls, predicted, feasible, feasible, reached)
+        nominal = feasible and residual < o.tolerance**2
+        return Decision(controls, predicted, feasible, feasible, nominal)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """The paper's planner plans every step afresh."""

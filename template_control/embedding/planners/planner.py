@@ -1,60 +1,72 @@
-"""What a planner is: VLO state in, controls of the coming step out."""
+"""What a planner is: section state and target in, controls of the coming stride out."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.gait import Gait
 
 Array = NDArray[np.float64]
 
 
 ANY_ANGLE = (-np.inf, np.inf)
-"""Of a step whose touchdown angle is free."""
+"""Of a stride whose touchdown angle is free."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """Controls for the step that begins at a VLO.
+    """Controls for the stride that begins at a section.
 
     Attributes:
         controls: (5,) u by Slot.
-        predicted: (3,) VLO state the step should end in, offset included.
-        feasible: the template completes the step with these controls.
-        lasting: and a step after it, as far as the planner looks.
-        reached: the planner's first choice was feasible; otherwise ``controls`` are the best
-            reachable ones.
+        predicted: (3,) dx/dt, y, dy/dt that the stride should end in, offset included.
+        feasible: the template completes the stride with these controls.
+        lasting: and a stride after it, as far as the planner looks.
+        nominal: the planner follows its own law, near its gait. Otherwise ``controls`` are the
+            best that a search has found, and nothing is learnt from the stride.
     """
 
     controls: Array
     predicted: Array
     feasible: bool
     lasting: bool
-    reached: bool
+    nominal: bool
 
 
+@runtime_checkable
 class Planner(Protocol):
-    """Chooses the controls of a step at VLO."""
+    """Chooses the controls of one kind of stride at its section."""
 
     @property
-    def gait(self) -> WalkingGait:
-        """The gait to settle on."""
+    def gait(self) -> Gait:
+        """The gait to settle on, the last target's."""
 
     @property
     def offset(self) -> Array:
-        """(3,) estimate of the robot's VLO state less the template's after one step."""
+        """(3,) estimate of the robot's section state less the template's after one stride."""
 
-    def decide(self, z: Array, angles: tuple[float, float] = ANY_ANGLE) -> Decision:
-        """Controls for a step from VLO state ``z`` (3,) dx/dt, y, dy/dt.
+    def reset(self) -> None:
+        """Forget what was learnt; a run calls it before its first stride."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """Controls for a stride from section state ``z``.
 
         Args:
-            z: the state.
+            z: (n,) the state: dx/dt, y and, at VLO, dy/dt.
+            target: (n,) wanted at the section where the stride ends; None: the gait's own.
             angles: touchdown angles [rad] the swing foot can still reach.
         """
 
     def observe(self, decision: Decision, z: Array) -> None:
-        """Learn that the step planned by ``decision`` ended in VLO state ``z``."""
+        """Learn that the stride planned by ``decision`` ended in section state ``z``."""
+
+
+Planners = Mapping[str, Planner]
+"""By the kind of stride they plan."""

@@ -1,0 +1,342 @@
+"""From one section to the next: the planner's decision, and the template's path that follows it.
+
+The path is planned at a section, again where a foot has landed, and again when a disturbance
+has carried the robot away from it.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import Decision, Planner, Planners
+from template_control.embedding.sensing import Sensed
+from template_control.embedding.template_path import Landing, TemplatePath, join
+from template_control.errors import ParameterError
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton, Node
+from template_control.slip.automaton.vocabulary import Event, Leg, Slot
+from template_control.slip.dynamics.stride import StrideSimulator
+from template_control.slip.maps.section import Section, section_of
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import Route, StrideGoal
+from template_control.slip.similarity import LENGTH, RATE_SQUARED, SPEED, TIME, tuned
+
+Array = NDArray[np.float64]
+
+@dataclass(frozen=True)
+class ReplanOptions:
+    """When a stride is planned anew between two sections, and from where.
+
+    Attributes:
+        speed: deviation of the forward speed from the path's [m/s].
+        interval: shortest time between such plans [s].
+        patience: a touchdown that is later than this [s] is not waited for on the same path.
+        angle_drop: the touchdown angle is then taken to be lower by this [rad].
+        agility: a touchdown in t seconds can still be planned anew with an angle that differs
+            from the old one by this times t^2 [rad/s^2]; the swing foot cannot do more.
+        calmer: shares of dy/dt, tried in turn, of the states that a path starts from where the
+            template cannot go on from the robot's: its leg cannot pull, the robot's can.
+        highest: height over l0 above which no such path starts.
+    """
+
+    speed: float = tuned(0.05, SPEED)
+    interval: float = tuned(0.02, TIME)
+    patience: float = tuned(0.01, TIME)
+    angle_drop: float = tuned(0.15)
+    agility: float = tuned(8.0, RATE_SQUARED)
+    calmer: tuple[float, ...] = tuned((0.5, 0.0))
+    highest: float = tuned(0.99)
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What the controller's learners know at a section.
+
+    Attributes:
+        load: the load factor.
+        trim: the momentum trim [m/s^2].
+    """
+
+    load: float
+    trim: float
+
+
+@dataclass(frozen=True)
+class SectionReport:
+    """What the controller knew and chose at a section.
+
+    Attributes:
+        time: of the section [s].
+        section: which.
+        state: (3,) dx/dt (as the phase before senses it), y, dy/dt.
+        goal: the stride that begins, and where it is to lead.
+        decision: the planner's choice for it.
+        offset: (3,) the planner's offset estimate.
+        learnt: what the learners knew.
+        plan_seconds: wall-clock time of the plan.
+    """
+
+    time: float
+    section: Section
+    state: Array
+    goal: StrideGoal
+    decision: Decision
+    offset: Array
+    learnt: Learnt
+    plan_seconds: float
+
+
+class StridePlanning:
+    """Keeps the present stride's decision and the path the robot follows.
+
+    Args:
+        route: which stride comes next, and towards which state.
+        planners: one for each kind of stride of the route.
+        options: when to plan again.
+        automaton: of the strides.
+
+    Attributes:
+        reports: one a section, the start's included.
+        path: the template's, from the last plan on.
+        toe: x of the template's rear toe [m].
+        reaching: the swing foot is overdue, and the path goes on without it.
+        arrived: the route has ended.
+    """
+
+    def __init__(
+        self,
+        route: Route,
+        planners: Planners,
+        options: ReplanOptions,
+        automaton: Automaton = AUTOMATON,
+    ) -> None:
+        self.route = route
+        self.planners = planners
+        self.options = options
+        self.automaton = automaton
+        self.parameters: SlipParameters = route.parameters
+        self.reports: list[SectionReport] = []
+        self.path: TemplatePath
+        self.toe = 0.0
+        self.reaching = False
+        self.arrived = False
+        self._planned_at = 0.0
+        self._passed = 0  # so many of the path's events are over
+        self._due: dict[Event, float] = {}
+        self._feet = (0, 1)  # rear and front leg's at the start of the path
+        self._simulator = StrideSimulator(route.parameters, automaton)
+
+    def begin(self, section: Section) -> tuple[Planner, Node]:
+        """Planner and first node of the stride that the route begins with, at ``section``.
+
+        Everything of an earlier run is forgotten.
+
+        Raises:
+            ParameterError: if the route is empty, or there is no planner for that stride.
+        """
+        self.route.reset()
+        for planner in self.planners.values():
+            planner.reset()
+        self.reports.clear()
+        self.arrived = False
+        goal = self.route.ahead(section, self.route.start, 0.0)
+        if goal is None:
+            raise ParameterError("the route ends where it begins: give one with a stride")
+        return self.planner_of(goal), self.automaton.start(goal.stride)
+
+    @property
+    def planner(self) -> Planner:
+        """Of the present stride."""
+        return self.planner_of(self.reports[-1].goal)
+
+    def planner_of(self, goal: StrideGoal) -> Planner:
+        """The planner of a goal's stride.
+
+        Raises:
+            ParameterError: if there is none.
+        """
+        if goal.stride not in self.planners:
+            raise ParameterError(
+                f"the route asks for a stride {goal.stride!r}, and there are planners for"
+                f" {', '.join(self.planners)}: give one for it too, or another route"
+            )
+        return self.planners[goal.stride]
+
+    def decide(self, section: Section, sensed: Sensed, now: float, learnt: Learnt) -> Node:
+        """At a section: learn from the stride that ended, choose the next one's controls.
+
+        Args:
+            section: that was reached.
+            sensed: the robot's state.
+            now: time [s].
+            learnt: what the controller has learnt, for the report.
+
+        Returns:
+            The node that the stride begins in.
+        """
+        z = section.of(sensed.state)
+        begin = time.perf_counter()
+        if self.reports:
+            last = self.reports[-1]
+            self.planner_of(last.goal).observe(last.decision, z)
+        goal = self.route.next(section, z, now)
+        if goal is None:
+            # The last stride goes on until whoever drives the robot ends the run.
+            self.arrived, goal = True, self.reports[-1].goal
+        decision, start = self._plan(section, z, goal)
+        seconds = time.perf_counter() - begin
+        offset = self.planner_of(goal).offset.copy()
+        self.reports.append(
+            SectionReport(
+                now, section, section.padded(z), goal, decision, offset, learnt, seconds
+            )
+        )
+        node = self.automaton.start(goal.stride)
+        state = sensed.state.copy()
+        if start is not z:
+            state[:4] = section.state(start, state[0])
+        self._follow(node, state, sensed, now)
+        return node
+
+    def _plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
+        """A decision at ``z``, and the section state from which its path starts.
+
+        The template's leg ends at l0, cannot pull, and pushes as its spring does; the robot's
+        need not. Where the template would leave the ground or come to no second stride, the
+        path starts from a state that does, and the robot is let down or pushed up to it.
+        """
+        o, planner = self.options, self.planner_of(goal)
+        decision = planner.decide(z, goal.target)
+        if decision.lasting:
+            return decision, z
+        for share in o.calmer:
+            start = section.calmer(z, share, o.highest * self.parameters.rest_length)
+            calmer = planner.decide(start, goal.target)
+            if calmer.lasting:
+                return replace(calmer, feasible=decision.feasible, nominal=False), start
+        return decision, z
+
+    def follow(self, node: Node, sensed: Sensed, now: float, angle_drop: float = 0.0) -> None:
+        """Template path from here to the touchdown after the next section.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            now: time [s].
+            angle_drop: how much lower the touchdown angle is than decided [rad].
+        """
+        self._follow(node, sensed.state, sensed, now, angle_drop)
+
+    def _follow(
+        self, node: Node, state: Array, sensed: Sensed, now: float, angle_drop: float = 0.0
+    ) -> None:
+        toes = (float(sensed.toes[0]), float(sensed.toes[1]))
+        report = self.reports[-1]
+        u = report.decision.controls.copy()
+        u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
+        self.reaching = angle_drop > 0.0
+        first = self._simulator.run(node.name, state, u, toes)
+        strides = [first]
+        if first.completed:
+            # The next foothold must be known when the swing begins, before the next section.
+            section = section_of(self.automaton.sections(node.name)[1])
+            z = section.of(first.state)
+            goal = self.route.ahead(section, z, now + first.duration) or report.goal
+            ahead = self.planner_of(goal).decide(z, goal.target)
+            start = self.automaton.start(goal.stride).name
+            toes = (float(first.toes[0]), float(first.toes[1]))
+            strides.append(self._simulator.run(start, first.state, ahead.controls, toes))
+        self.path = join(strides)
+        self.toe = self.path.toes[Leg.REAR]
+        self._feet = sensed.feet
+        self._planned_at = now
+        self._passed = 0
+        self._due.clear()
+
+    def due(self, event: Event) -> float:
+        """Time on the path at which ``event`` comes next [s], inf if it does not."""
+        if event not in self._due:
+            self._due[event] = self.path.due(event, self._passed)
+        return self._due[event]
+
+    def pass_event(self, event: Event) -> None:
+        """The robot has fired ``event``."""
+        self._passed = self.path.after(event, self._passed)
+        self._due.clear()
+
+    def landing(self, foot: int) -> Landing:
+        """Where and when on the path a foot next touches down."""
+        return self.path.landings[self._feet.index(foot)]
+
+    def toe_of(self, foot: int) -> float:
+        """x of the template's toe that was this foot's at the start of the path [m]."""
+        return self.path.toes[self._feet.index(foot)]
+
+    def overdue(self, node: Node, phase_time: float) -> bool:
+        """Whether the swing foot should have found the ground by now.
+
+        Args:
+            node: of the automaton, the robot's.
+            phase_time: time along the path [s].
+        """
+        awaited = node.edge(Event.TOUCHDOWN) is not None
+        late = phase_time > self.due(Event.TOUCHDOWN) + self.options.patience
+        return awaited and late and not self.reaching
+
+    def reach_on(self, node: Node, sensed: Sensed, now: float) -> None:
+        """The ground is lower than was thought: the template goes on without a touchdown."""
+        self.follow(node, sensed, now, self.options.angle_drop)
+
+    def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
+        """Whether a disturbance has carried the robot away from its path.
+
+        Args:
+            deviation: of the forward speed from the path's [m/s].
+            phase_time: time along the path [s].
+            now: time [s].
+        """
+        o = self.options
+        return (
+            not self.reaching
+            and abs(deviation) > o.speed
+            and phase_time > o.interval
+            and now - self._planned_at > o.interval
+        )
+
+    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> None:
+        """Plan again from here; until a leg lands, the stride's controls are still free."""
+        report = self.reports[-1]
+        if node.name == self.automaton.starts[report.goal.stride]:
+            z = self._back_to_section(node, report, sensed)
+            if z is not None:
+                left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
+                change = self.options.agility * min(left, 1.0) ** 2
+                angle = float(report.decision.controls[Slot.TOUCHDOWN_ANGLE])
+                decision = self.planner.decide(
+                    z, report.goal.target, (angle - change, angle + change)
+                )
+                self.reports[-1] = replace(report, decision=decision)
+        self.follow(node, sensed, now)
+
+    def _back_to_section(
+        self, node: Node, report: SectionReport, sensed: Sensed
+    ) -> Array | None:
+        """The section state from which the template would have come to where the robot is.
+
+        The template's dynamics are the same forward and backward: its past is the mirror
+        image of the future of the mirrored state.
+        """
+        x, y, dx, dy = sensed.state
+        before = self.automaton.before(node.name)
+        u = report.decision.controls.copy()
+        if before.rear is not None and node.rear is not None:
+            u[before.rear] = u[node.rear]
+        mirrored = [sensed.toes[0] - x, y, dx, -dy]
+        past = self._simulator.run(before.name, mirrored, u)
+        if not past.completed:
+            return None
+        return report.section.mirror(report.section.of(past.state))

@@ -1,0 +1,209 @@
+"""The template's path from now on, as far as it is planned, and where the robot is on it.
+
+World frame. The path is kept as the kernel's Taylor polynomials, so references of any order
+come from it exactly. In stance it is looked up by phase, the direction from the rear stance
+foot to the CoM (the angle beta of Section V-B); in flight, where nothing but time passes, by
+time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from template_control.embedding.phases import Clock
+from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Reset
+from template_control.slip.dynamics.stride import Stride
+from template_control.slip.dynamics.taylor import ORDER
+
+Array = NDArray[np.float64]
+
+_NEWTON = 12
+_OVERRUN = 0.02  # [s] how far a segment's polynomial is followed past its ends
+_LEAP = 0.05  # [s] longest step of the search for a phase
+
+
+class Curve(NamedTuple):
+    """The segments of a path.
+
+    Attributes:
+        cx, cy: (n, ORDER + 1) polynomials.
+        meta: (n, 7) start time, duration, node, toes, stiffnesses.
+    """
+
+    cx: Array
+    cy: Array
+    meta: Array
+
+
+class Landing(NamedTuple):
+    """Where and when a leg next touches down: x of its toe [m] and time on the path [s].
+
+    A leg that does not land on this path has (nan, inf).
+    """
+
+    x: float
+    time: float
+
+
+@dataclass(frozen=True)
+class TemplatePath:
+    """Consecutive strides of the template, in one time and one world frame.
+
+    Attributes:
+        curve: the segments.
+        events: time on the path [s] and guard of each event.
+        landings: next touchdown of the leg that is rear, and of the one that is front, at the
+            start of the path.
+        toes: x of the rear and the front toe at the start [m].
+        section_state: (3,) dx/dt, y, dy/dt where the first stride ends.
+        outcome: how it ends.
+        duration: end of the last segment [s].
+    """
+
+    curve: Curve
+    events: tuple[tuple[float, Event], ...]
+    landings: tuple[Landing, Landing]
+    toes: tuple[float, float]
+    section_state: Array
+    outcome: Outcome
+    duration: float
+
+    def due(self, event: Event, passed: int = 0) -> float:
+        """Time of the next ``event`` [s], inf if there is none.
+
+        Args:
+            event: the guard.
+            passed: so many of the path's events are over.
+        """
+        return next((time for time, found in self.events[passed:] if found is event), np.inf)
+
+    def after(self, event: Event, passed: int) -> int:
+        """How many of the path's events are over once ``event`` is."""
+        for i in range(passed, len(self.events)):
+            if self.events[i][1] is event:
+                return i + 1
+        return passed
+
+
+def join(strides: Sequence[Stride]) -> TemplatePath:
+    """Join strides, each of which starts where the one before ended.
+
+    Args:
+        strides: at least one; the path's section is the first one's.
+    """
+    metas, offset = [], 0.0
+    events, resets = [], []
+    for stride in strides:
+        meta = stride.meta.copy()
+        meta[:, 0] += offset
+        metas.append(meta)
+        events += [(offset + e.time, e.event) for e in stride.events]
+        resets += [(offset + e.time, e.reset) for e in stride.events]
+        offset += stride.duration
+    meta = np.concatenate(metas)
+    return TemplatePath(
+        curve=Curve(
+            np.concatenate([s.cx for s in strides]), np.concatenate([s.cy for s in strides]), meta
+        ),
+        events=tuple(events),
+        landings=_landings(meta, resets),
+        toes=(float(meta[0, 3]), float(meta[0, 4])),
+        section_state=strides[0].state[[2, 1, 3]],
+        outcome=strides[0].outcome,
+        duration=offset,
+    )
+
+
+def _landings(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[Landing, Landing]:
+    """Next touchdowns of the legs by the roles they have at the start."""
+    found: dict[int, Landing] = {}
+    legs = [Leg.REAR, Leg.FRONT]  # by present role, the role at the start
+    for time, reset in resets:
+        if reset in (Reset.SHIFT, Reset.SWAP):
+            legs.reverse()
+        elif reset in (Reset.PLACE_REAR, Reset.PLACE_FRONT):
+            role = Leg.REAR if reset is Reset.PLACE_REAR else Leg.FRONT
+            later = np.flatnonzero(meta[:, 0] >= time - 1e-12)
+            x = float(meta[later[0], 3 + role]) if later.size else np.nan
+            found.setdefault(legs[role], Landing(x, time))
+    never = Landing(np.nan, np.inf)
+    return found.get(Leg.REAR, never), found.get(Leg.FRONT, never)
+
+
+@njit(cache=True)
+def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
+    """Value, first and second derivative at ``t`` into out[first], out[first+2], ..."""
+    p = d = dd = 0.0
+    for n in range(ORDER, -1, -1):
+        dd = dd * t + d
+        d = d * t + p
+        p = p * t + c[n]
+    out[first], out[first + 2], out[first + 4] = p, d, 2.0 * dd
+
+
+@njit(cache=True)
+def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
+    """Path at ``time`` into out (6,): x from ``toe``, y, and their two derivatives.
+
+    Returns:
+        The segment.
+    """
+    meta = curve.meta
+    row = 0
+    while row + 1 < meta.shape[0] and meta[row + 1, 0] <= time:
+        row += 1
+    # Past either end the path goes on along its last polynomial for a moment, then stops.
+    local = min(max(time - meta[row, 0], -_OVERRUN), meta[row, 1] + _OVERRUN)
+    _polynomial(curve.cx[row], local, out, 0)
+    _polynomial(curve.cy[row], local, out, 1)
+    out[0] -= toe
+    return row
+
+
+@njit(cache=True)
+def at_direction(
+    curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
+) -> tuple[float, int]:
+    """Time at which the template sees its CoM in the direction of (x, y), and its path there.
+
+    Args:
+        curve: the path.
+        toe: x of the template's rear toe, from which the direction is taken [m].
+        x, y: the robot's CoM relative to its rear stance foot [m].
+        guess: a time close to the answer [s].
+        out: (6,) overwritten with the path there, x relative to that toe.
+
+    Returns:
+        Template time [s], and its segment.
+    """
+    last = curve.meta[curve.meta.shape[0] - 1]
+    end = last[0] + last[1]
+    t = guess
+    for _ in range(_NEWTON):
+        sample(curve, toe, t, out)
+        slope = out[2] * y - out[3] * x
+        if slope < 1e-6:
+            break
+        step = (out[1] * x - out[0] * y) / slope
+        t = min(max(t + min(max(step, -_LEAP), _LEAP), 0.0), end)
+        if abs(step) < 1e-10:
+            break
+    return t, sample(curve, toe, t, out)
+
+
+@njit(cache=True)
+def at_time(
+    curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
+) -> tuple[float, int]:
+    """As :func:`at_direction`, but the time is ``guess`` itself, wherever the robot is."""
+    return guess, sample(curve, toe, guess, out)
+
+
+LOCATE = {Clock.DIRECTION: at_direction, Clock.TIME: at_time}
+"""How a phase's clock finds the robot's place on the path."""

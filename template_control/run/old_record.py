@@ -1,0 +1,43 @@
+"""Records of an earlier version, which knew one section, VLO, and one stride, the walking step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+_RENAMED = {
+    "vlo_time": "section_time",
+    "vlo_state": "section_state",
+    "vlo_predicted": "section_predicted",
+    "vlo_controls": "section_controls",
+    "vlo_offset": "section_offset",
+    "vlo_reached": "section_nominal",
+    "vlo_feasible": "section_feasible",
+    "vlo_load": "section_load",
+    "vlo_trim": "section_trim",
+}
+
+
+def from_walk(fields: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a record as they are now, from those of format 2.
+
+    Args:
+        fields: arrays and the metadata by the names of format 2.
+
+    Raises:
+        KeyError: if one of them is missing.
+    """
+    now = {_RENAMED.get(name, name): value for name, value in fields.items()}
+    metadata = dict(now["metadata"])
+    count = len(now["section_time"])
+    target = np.array(metadata["gait_vlo"])
+    metadata["gait_state"] = metadata.pop("gait_vlo")
+    metadata["sections"], metadata["strides"] = ["VLO"], ["w"]
+    both = np.full((len(now["time"]), 2, 2), np.nan)
+    both[np.arange(len(both)), 1 - now["rear"]] = now["swing_reference"]
+    now["swing_reference"] = both
+    now["metadata"] = metadata
+    now["section"] = now["stride"] = np.zeros(count, dtype=np.int64)
+    now["section_target"] = np.tile(target, (count, 1))
+    return now

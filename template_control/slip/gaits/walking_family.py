@@ -1,0 +1,79 @@
+"""Walking gaits that vary continuously with speed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import GaitError
+from template_control.slip.gaits.gait import WalkingGait, gait_at
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+_SPEEDS = (0.195, 0.225, 0.29, 0.35, 0.395)  # at VLO, over sqrt(g l0)
+_ANGLES = (70.0, 69.5, 68.0, 66.0, 66.0)  # [deg]
+_SAME = 1e-9  # of sqrt(g l0): speeds that are one
+
+
+def speed_range(parameters: SlipParameters) -> tuple[float, float]:
+    """Slowest and fastest dx/dt at VLO of the family [m/s]."""
+    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    return float(_SPEEDS[0] * unit), float(_SPEEDS[-1] * unit)
+
+
+def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
+    """The family's gait with this speed at VLO.
+
+    The touchdown angle falls with the speed, along a line inside the region of angles and
+    speeds at VLO in which symmetric gaits of the default stiffness exist.
+
+    Args:
+        parameters: the template, with k0 l0 / (m g) of the reference template.
+        vlo_speed: dx/dt at VLO [m/s].
+
+    Raises:
+        GaitError: naming the range, if the speed is out of it.
+    """
+    low, high = speed_range(parameters)
+    if not low <= vlo_speed <= high:
+        raise GaitError(
+            f"no walking gait has {vlo_speed:g} m/s at VLO: give a speed from {low:.3g} to"
+            f" {high:.3g} m/s"
+        )
+    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    angle = np.radians(np.interp(vlo_speed / unit, _SPEEDS, _ANGLES))
+    return gait_at(parameters, float(angle), vlo_speed)
+
+
+class WalkingFamily:
+    """The gaits that a planner's targets stand for.
+
+    Args:
+        gait: the planner's own; its target is its VLO state.
+    """
+
+    def __init__(self, gait: WalkingGait) -> None:
+        self._known = [gait]
+
+    def towards(self, present: WalkingGait, target: Array | None) -> WalkingGait:
+        """The gait with the target's speed at VLO.
+
+        Args:
+            present: is kept where it has that speed.
+            target: (3,) dx/dt, y, dy/dt; None: the present gait's.
+
+        Raises:
+            GaitError: if the speed is out of the family's range.
+        """
+        if target is None:
+            return present
+        p = present.parameters
+        same = _SAME * np.sqrt(p.gravity * p.rest_length)
+        speed = float(target[0])
+        for gait in (present, *self._known):
+            if abs(gait.vlo[0] - speed) <= same:
+                return gait
+        gait = walking_gait(p, speed)
+        self._known.append(gait)
+        return gait

@@ -1,0 +1,139 @@
+"""Dynamic similarity: one tuning for robots of any size.
+
+Every tuned number is given for the reference template (80 kg, 1 m, 9.81 m/s^2) and knows its
+dimension. For another template lengths, times and speeds are scaled so that the dimensionless
+robot moves the same; masses and forces follow from the robot's own model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from template_control.slip.parameters import SlipParameters
+
+T = TypeVar("T")
+
+REFERENCE = SlipParameters()
+"""The template that all tuning is given for."""
+
+
+class Dimension(NamedTuple):
+    """What a number is measured in: metres to the power ``length``, seconds to ``time``.
+
+    Angles, shares and counts have no dimension.
+    """
+
+    length: int = 0
+    time: int = 0
+
+
+NUMBER = Dimension()
+LENGTH = Dimension(1, 0)
+TIME = Dimension(0, 1)
+SPEED = Dimension(1, -1)
+ACCELERATION = Dimension(1, -2)
+RATE = Dimension(0, -1)
+"""Of a damping or a bandwidth [1/s]."""
+RATE_SQUARED = Dimension(0, -2)
+"""Of a stiffness over a mass, and of angular accelerations [1/s^2]."""
+PER_LENGTH_SQUARED = Dimension(-2, 0)
+"""Of the weight of a squared length."""
+PER_SPEED_SQUARED = Dimension(-2, 2)
+"""Of the weight of a squared speed."""
+PER_ACCELERATION_SQUARED = Dimension(-2, 4)
+"""Of the weight of a squared acceleration."""
+PER_RATE_TO_THE_FOURTH = Dimension(0, 4)
+"""Of the weight of a squared angular acceleration."""
+
+_KEY = "dimension"
+
+
+def tuned(default: T, *dimensions: Dimension) -> T:
+    """A field of an options class, with its dimension.
+
+    Args:
+        default: value for the reference template, a number or a tuple.
+        dimensions: of the number; of a tuple one for all its entries, or one each. An entry
+            that is a tuple itself has the dimension of its place in the outer one.
+    """
+    found: T = field(default=default, metadata={_KEY: dimensions or (NUMBER,)})
+    return found
+
+
+def dimensions_of(options: Any) -> dict[str, tuple[Dimension, ...]]:
+    """Dimensions of an options object's fields by name; fields without one are left out."""
+    return {f.name: f.metadata[_KEY] for f in fields(options) if _KEY in f.metadata}
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Units of a template over those of the reference.
+
+    Attributes:
+        length: l0 over l0.
+        time: sqrt(l0 / g) over sqrt(l0 / g).
+    """
+
+    length: float
+    time: float
+
+    @classmethod
+    def of(cls, parameters: SlipParameters) -> Scale:
+        """The units of a template."""
+        length = parameters.rest_length / REFERENCE.rest_length
+        return cls(length, float(np.sqrt(length * REFERENCE.gravity / parameters.gravity)))
+
+    @property
+    def speed(self) -> float:
+        """The unit of speeds."""
+        return self.factor(SPEED)
+
+    def factor(self, dimension: Dimension) -> float:
+        """What a number of this dimension is multiplied by."""
+        return float(self.length**dimension.length * self.time**dimension.time)
+
+
+def scaled(options: T, scale: Scale) -> T:
+    """The same tuning for a template of another size.
+
+    Args:
+        options: a dataclass whose tuned fields come from :func:`tuned`. Fields that are
+            dataclasses, or tuples or mappings of such, are scaled too.
+        scale: of that template.
+    """
+    changes: dict[str, Any] = {}
+    for f in fields(options):  # type: ignore[arg-type]
+        value = getattr(options, f.name)
+        if _KEY in f.metadata:
+            changes[f.name] = _scaled_number(value, f.metadata[_KEY], scale)
+        else:
+            changes[f.name] = _scaled_inside(value, scale)
+    return replace(options, **changes)  # type: ignore[type-var]
+
+
+def _scaled_number(value: Any, dimensions: tuple[Dimension, ...], scale: Scale) -> Any:
+    if value is None:
+        return None
+    if not isinstance(value, tuple):
+        return value if dimensions[0] == NUMBER else value * scale.factor(dimensions[0])
+    each = dimensions * len(value) if len(dimensions) == 1 else dimensions
+    if value and isinstance(value[0], tuple):
+        return tuple(_scaled_number(entry, dimensions, scale) for entry in value)
+    return tuple(
+        _scaled_number(entry, (dimension,), scale)
+        for entry, dimension in zip(value, each, strict=True)
+    )
+
+
+def _scaled_inside(value: Any, scale: Scale) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return scaled(value, scale)
+    if isinstance(value, tuple):
+        return tuple(_scaled_inside(entry, scale) for entry in value)
+    if isinstance(value, Mapping):
+        return {key: _scaled_inside(entry, scale) for key, entry in value.items()}
+    return value

@@ -1,0 +1,44 @@
+"""Task: the angular momentum about the CoM turns the trunk back to its pitch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.similarity import PER_RATE_TO_THE_FOURTH, RATE, tuned
+from template_control.whole_body.task import Rows
+from template_control.whole_body.wanted import Wanted
+
+
+@dataclass(frozen=True)
+class MomentumTask:
+    """One row: the rate of the angular momentum L = A_L v about the CoM, over m h^2.
+
+        (A_L a + dA_L/dt v) / (m h^2) = k (w (theta_ref - theta) - L / (m h^2))
+
+    h is the CoM's height. A trunk that leans too far back gets a forward momentum, and with it
+    turns forward. Ground forces of several kilonewtons then do not have to pass the hips' PD
+    feedback, as they must where :class:`~.posture_task.PostureTask` holds the trunk in stance.
+
+    Attributes:
+        weight: of the row, an angular acceleration [s^4/rad^2].
+        bandwidth: k [1/s].
+        turning: w, angular momentum over m h^2 for each radian of error [1/s].
+    """
+
+    weight: float = tuned(1.0, PER_RATE_TO_THE_FOURTH)
+    bandwidth: float = tuned(20.0, RATE)
+    turning: float = tuned(1.35, RATE)
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """See :class:`~.task.Task`."""
+        return (self.weight,)
+
+    def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
+        """See :class:`~.task.Task`."""
+        inertia = robot.mass * wanted.com_now[1] ** 2
+        rows.jacobian[0] = robot.angular_momentum_jacobian / inertia
+        rows.bias[0] = robot.angular_momentum_bias / inertia
+        turning = self.turning * (wanted.pitch - wanted.pitch_now[0])
+        rows.desired[0] = self.bandwidth * (turning - robot.angular_momentum / inertia)

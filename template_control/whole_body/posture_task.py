@@ -1,0 +1,39 @@
+"""Task: the trunk keeps its pitch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.similarity import PER_RATE_TO_THE_FOURTH, RATE, RATE_SQUARED, tuned
+from template_control.whole_body.task import Rows
+from template_control.whole_body.wanted import Wanted
+
+_PITCH = 2  # place of the trunk's pitch in q
+
+
+@dataclass(frozen=True)
+class PostureTask:
+    """One row: theta'' = kp (theta_ref - theta) - kd theta', theta the trunk's pitch.
+
+    Pitch is a coordinate of the robot, so T is a unit row and there is no bias.
+
+    Attributes:
+        weight: [s^4/rad^2].
+        gains: kp [1/s^2] and kd [1/s].
+    """
+
+    weight: float = tuned(1.0, PER_RATE_TO_THE_FOURTH)
+    gains: tuple[float, float] = tuned((100.0, 20.0), RATE_SQUARED, RATE)
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """See :class:`~.task.Task`."""
+        return (self.weight,)
+
+    def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
+        """See :class:`~.task.Task`."""
+        kp, kd = self.gains
+        angle, rate = wanted.pitch_now
+        rows.jacobian[0, _PITCH] = 1.0
+        rows.desired[0] = kp * (wanted.pitch - angle) - kd * rate

@@ -1,0 +1,82 @@
+"""What a task is, and the stack of rows that several of them write.
+
+A task asks for accelerations of some quantities y(q), one row each: with the Jacobian T of y,
+the QP minimises weight * (T a + dT/dt v - desired)^2, equation (45), where ``desired`` holds the
+feedforward and the PD feedback.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.whole_body.wanted import Wanted
+
+Array = NDArray[np.float64]
+
+BIAS, DESIRED, WEIGHT = 0, 1, 2
+"""Columns of a row behind its (nv,) Jacobian."""
+
+
+class Rows(NamedTuple):
+    """Where a task writes its r rows; views into the stack.
+
+    Attributes:
+        jacobian: (r, nv) T.
+        bias: (r,) dT/dt v.
+        desired: (r,) wanted accelerations.
+    """
+
+    jacobian: Array
+    bias: Array
+    desired: Array
+
+
+class Task(Protocol):
+    """Rows of the whole-body QP; a small frozen dataclass of weight and gains."""
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """One weight a row."""
+
+    def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
+        """Fill the task's rows.
+
+        Args:
+            robot: updated.
+            wanted: references and measurements of this tick.
+            rows: overwritten.
+        """
+
+
+class TaskStack:
+    """The rows of a phase's tasks, one below the other.
+
+    Args:
+        tasks: in order.
+        nv: degrees of freedom of the robot.
+
+    Attributes:
+        table: (r, nv + 3) one row of T, bias, desired and weight each.
+    """
+
+    def __init__(self, tasks: Sequence[Task], nv: int) -> None:
+        weights = [weight for task in tasks for weight in task.weights]
+        self.table: Array = np.zeros((len(weights), nv + 3))
+        self.table[:, nv + WEIGHT] = weights
+        self._parts: list[tuple[Task, Rows]] = []
+        first = 0
+        for task in tasks:
+            part = self.table[first : first + len(task.weights)]
+            first += len(part)
+            rows = Rows(part[:, :nv], part[:, nv + BIAS], part[:, nv + DESIRED])
+            self._parts.append((task, rows))
+
+    def write(self, robot: PlanarBiped, wanted: Wanted) -> None:
+        """Let every task fill its rows for the updated ``robot``."""
+        for task, rows in self._parts:
+            task.write(robot, wanted, rows)
