@@ -18,8 +18,7 @@ from template_control.embedding.planners.planner import Decision, Planner
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Event, Slot
-from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.dynamics.stride import StrideSimulator
 
 Array = NDArray[np.float64]
 
@@ -96,7 +95,7 @@ class StepPlanning:
         self.toe = 0.0
         self.reaching = False
         self._planned_at = 0.0
-        self._scratch = new_scratch()
+        self._template = StrideSimulator(self.parameters)
 
     def decide(self, node: Node, sensed: Sensed, now: float, load: float, trim: float) -> None:
         """At VLO: learn from the step that ended, choose the next one's controls.
@@ -157,21 +156,12 @@ class StepPlanning:
         u = self.steps[-1].decision.controls.copy()
         u[Slot.TOUCHDOWN_ANGLE] -= reach
         self.reaching = reach > 0.0
-        first = simulate_stride(self.parameters, node.name, state, u, toes, scratch=self._scratch)
+        first = self._template.run(node.name, state, u, toes)
         strides = [first]
         if first.completed:
             # The next foothold must be known when the swing begins, before the next VLO.
             ahead = self.planner.decide(first.state[VLO_STATE])
-            strides.append(
-                simulate_stride(
-                    self.parameters,
-                    first.node,
-                    first.state,
-                    ahead.controls,
-                    (float(first.toes[0]), float(first.toes[1])),
-                    scratch=self._scratch,
-                )
-            )
+            strides.append(self._template.run(first.node, first.state, ahead.controls, first.toes))
         self.path = chain(strides)
         self.toe = toes[0]
         self._planned_at = now
@@ -230,5 +220,5 @@ class StepPlanning:
         u[Slot.K_SD] = u[Slot.K_SC]
         before_vlo = AUTOMATON.node("SS_bv^w").name
         mirrored = [sensed.toes[0] - x, y, dx, -dy]
-        past = simulate_stride(self.parameters, before_vlo, mirrored, u, scratch=self._scratch)
+        past = self._template.run(before_vlo, mirrored, u)
         return past.state[VLO_STATE] * [1.0, 1.0, -1.0] if past.completed else None

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, MapKind, Outcome, Slot
 from template_control.slip.control.step_solver import StepProblem, Unknowns
-from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.basin import steps_to_fall
 from template_control.slip.gaits.branch import BranchPoint
 from template_control.slip.gaits.gait import WalkingGait
@@ -60,13 +59,13 @@ def backward_set(
     p = gait.parameters
     start = VLO.state(VLO.mirror(gait.vlo))
     forward = ReturnMap(p)
-    scratch = new_scratch()
+    walk = StrideSimulator(p)
     states, controls = [], []
     for kappa in np.linspace(*stiffness_range, counts[0]) * p.leg_stiffness:
         for angle in np.radians(np.linspace(0.0, 90.0, counts[1] + 2)[1:-1]):
             u = np.zeros(NUM_SLOTS)
             u[[Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]] = angle, kappa, p.leg_stiffness
-            back = simulate_stride(p, STRIDE_START["w"], start, u, scratch=scratch)
+            back = walk.run(STRIDE_START["w"], start, u)
             if not back.completed:
                 continue
             liftoff = next(e.state for e in back.events if e.event is Event.REAR_LIFTOFF)

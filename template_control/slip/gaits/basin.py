@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import TABLES, Tables
+from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.dynamics.compiled import inner
 from template_control.slip.dynamics.kernel import Model, Scratch, new_scratch
@@ -139,7 +139,7 @@ def steps_to_fall(
     count = len(states)
     steps, converges = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.bool_)
     _many(
-        TABLES,
+        AUTOMATON.tables,
         kernel_model(parameters),
         AUTOMATON.index[STRIDE_START["w"]],
         states,

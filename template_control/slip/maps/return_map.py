@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import TABLES
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.stride import kernel_model
@@ -59,10 +59,11 @@ class ReturnMap:
 
     Args:
         parameters: the template.
-        stride: key of ``STRIDE_START``: "w" (VLO to VLO), "r" (apex to
-            apex), "wr" (VLO to apex), "rw" (apex to VLO), or "wr*", the walk-to-run stride
-            as its controller simplifies it.
+        stride: key of the automaton's ``starts``: "w" (VLO to VLO), "r" (apex to apex), "wr"
+            (VLO to apex), "rw" (apex to VLO), or "wr*", the walk-to-run stride as its
+            controller simplifies it.
         kind: exact, or one of the closed forms.
+        automaton: that the stride is of.
 
     Attributes:
         sections: that it starts from and ends at.
@@ -75,18 +76,21 @@ class ReturnMap:
     """
 
     def __init__(
-        self, parameters: SlipParameters, stride: str = "w", kind: MapKind = MapKind.EXACT
+        self,
+        parameters: SlipParameters,
+        stride: str = "w",
+        kind: MapKind = MapKind.EXACT,
+        automaton: Automaton = AUTOMATON,
     ) -> None:
-        if stride not in STRIDE_START:
-            raise ParameterError(f"no stride {stride!r}: give one of {', '.join(STRIDE_START)}")
+        start = automaton.start(stride).name
         self.parameters = parameters
         self.stride = stride
         self.kind = MapKind(kind)
-        begin, end = AUTOMATON.sections(STRIDE_START[stride])
+        begin, end = automaton.sections(start)
         self.sections = section_of(begin), section_of(end)
         self.dimensions = self.sections[0].dimension, self.sections[1].dimension
-        node = AUTOMATON.index[STRIDE_START[stride]]
-        self._kernel = TABLES, kernel_model(parameters), int(self.kind), node
+        node = automaton.index[start]
+        self._kernel = automaton.tables, kernel_model(parameters), int(self.kind), node
         self._scratch = new_scratch()
         self._complex_scratch = new_scratch(complex)
 

@@ -21,8 +21,7 @@ from template_control.slip.control.controllers import (
     WalkToRun,
 )
 from template_control.slip.control.step_solver import StepSolution
-from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
+from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
 from template_control.slip.maps.section import VLO, section_of
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.scenario import Scenario, Segment
@@ -118,7 +117,7 @@ def simulate_scenario(
     profile = _Profile(scenario.segments, speed=scenario.segments[0].speed or 0.0)
     log = _Log()
     state, now, section, failure = VLO.state(scenario.start), 0.0, VLO, ""
-    scratch = new_scratch()
+    simulator = StrideSimulator(p)
     walking_target = np.array([profile.speed, *scenario.vlo])
     log.sections.append((now, VLO.of(state)))
     while profile.advance(now, float(state[2])) and len(log.strides) < _LIMIT:
@@ -141,9 +140,7 @@ def simulate_scenario(
         if kind == "w":
             walking_target = target
         toe = float(state[0])
-        stride = simulate_stride(
-            p, STRIDE_START[kind], state, solution.controls, (toe, toe), scratch=scratch
-        )
+        stride = simulator.run(STRIDE_START[kind], state, solution.controls, (toe, toe))
         _note(log, kind, stride, now, speed, target, solution, p.rest_length)
         now += stride.duration
         if kind in ("wr", "rw"):
