@@ -34,6 +34,7 @@ from template_control.slip.dynamics.kernel import apply_reset
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import section_of
 from template_control.slip.parameters import SlipParameters
 
 try:
@@ -151,20 +152,17 @@ def taylor(stride: str, spent: list[float]) -> Flow:
     return flow
 
 
-def _start(z: Array) -> Array:
-    return np.array([0.0, z[1], z[0], z[2] if len(z) == 3 else 0.0])
-
-
 def _stride(flow: Flow, case: Case, z: Array) -> Passages:
     node = AUTOMATON.node(STRIDE_START[case.stride])
-    state, toes, durations = _start(z), np.zeros(2), []
+    begin, end = (section_of(event) for event in AUTOMATON.sections(node.name))
+    state, toes, durations = begin.state(z), np.zeros(2), []
     while True:
         duration, state, edge = flow(node, state, toes, case.controls)
         durations.append(duration)
         apply_reset(int(edge.reset), state, toes, _L0, case.controls[0])
         successor = AUTOMATON.successor(node.name, edge.event)
         if edge.section:
-            return np.cumsum(durations), state[[0, 2, 1, 3]][: 1 + len(z)]
+            return np.cumsum(durations), np.append(state[0], end.of(state))
         node = AUTOMATON.node(successor)
 
 
@@ -180,9 +178,9 @@ def mapped(kind: MapKind, case: Case, states: Array) -> Passages:
     ends = np.column_stack((result.advance, result.state))
     if kind is not MapKind.EXACT:
         return np.empty(0), ends
-    strides = [
-        simulate_stride(_P, STRIDE_START[case.stride], _start(z), case.controls) for z in states
-    ]
+    start = STRIDE_START[case.stride]
+    begin = section_of(AUTOMATON.sections(start)[0])
+    strides = [simulate_stride(_P, start, begin.state(z), case.controls) for z in states]
     return np.array([[e.time for e in stride.events] for stride in strides]), ends
 
 

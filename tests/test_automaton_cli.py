@@ -42,7 +42,8 @@ HOPPER = Automaton(
             Edge(Event.FALL, Outcome.FALL),
         ),
         node("SS_y^s", Edge(Event.VLO, "SS_y^s", guard="G_v^s", section=True)),
-    )
+    ),
+    starts={"h": "F_x^h", "s": "SS_y^s"},
 )
 
 
@@ -67,7 +68,8 @@ def read(description):
                 ),
             )
             for n in description["nodes"]
-        )
+        ),
+        description["starts"],
     )
 
 
@@ -84,7 +86,8 @@ def with_edge(name, event, **changes):
             if n.name == name
             else n
             for n in AUTOMATON.nodes
-        )
+        ),
+        STRIDE_START,
     )
 
 
@@ -233,8 +236,8 @@ def test_section_edges_stand_out():
 def test_the_data_make_the_figure():
     before = automaton_figure(AUTOMATON)
     renamed = automaton_figure(with_edge("SS_sd^r", Event.REAR_LIFTOFF, guard="G_q^r"))
-    assert mathtext("G_q^r") in labels(renamed)
-    assert mathtext("G_l^r") not in labels(renamed)
+    assert mathtext("G_q^r") + "\nswap" in labels(renamed)
+    assert not any(text.startswith(mathtext("G_l^r")) for text in labels(renamed))
     sent = automaton_figure(with_edge("SS_sd^rw", Event.VLO, target="SS_bv^w"))
     assert labels(sent) == labels(before)
     moved = np.any(arrows(sent) != arrows(before), axis=1)

@@ -9,9 +9,10 @@ from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.basin import margin, steps_to_fall, velocity_angle, vlo_state
-from template_control.slip.gaits.gait import gait_from_energy, vlo_energy
+from template_control.slip.gaits.gait import gait_from_energy
 from template_control.slip.gaits.stability import Kind
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -22,7 +23,7 @@ def test_vlo_states_and_energies_belong_together():
     y, phi = np.meshgrid(np.linspace(0.95, 0.99, 5), np.radians([-5.0, 0.0, 5.0]))
     z = vlo_state(P, y, phi, 826.0)
     for state, angle in zip(z.reshape(-1, 3), phi.ravel(), strict=True):
-        assert vlo_energy(P, state) == pytest.approx(826.0, rel=1e-12)
+        assert VLO.energy(P, state) == pytest.approx(826.0, rel=1e-12)
         assert velocity_angle(state) == pytest.approx(angle)
         assert np.sign(state[2]) == -np.sign(angle), "downward is positive"
     assert np.isnan(vlo_state(P, 0.98, 0.0, 700.0)[0])
@@ -66,8 +67,8 @@ def test_deadbeat_set_and_what_the_maps_make_of_it(paper_gait):
     found = backward_set(paper_gait, counts=(20, 120))
     assert len(found.state) > 200
     for z, u in zip(found.state[::20], found.controls[::20], strict=True):
-        stride = simulate_stride(P, STRIDE_START["w"], [0.0, z[1], z[0], z[2]], u)
-        np.testing.assert_allclose(stride.state[[2, 1, 3]], paper_gait.vlo, atol=1e-7)
+        stride = simulate_stride(P, STRIDE_START["w"], VLO.state(z), u)
+        np.testing.assert_allclose(VLO.of(stride.state), paper_gait.vlo, atol=1e-7)
         assert 0.5 * K0 <= u[Slot.K_SD] <= 1.5 * K0
         assert u[Slot.K_SC] == K0
     stable = [p for p in branch(0.001) if p.kind is Kind.STABLE]

@@ -5,7 +5,7 @@ import pytest
 
 from template_control.errors import ParameterError
 from template_control.paper.stability import branch
-from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome
+from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.control.controllers import ActiveRunning, ModifiedWalking
 from template_control.slip.control.section_target import section_target, targeted
 from template_control.slip.dynamics.stride import controls
@@ -13,6 +13,7 @@ from template_control.slip.gaits.branch import Special
 from template_control.slip.gaits.controlled_branch import ControlledFamily, controlled_fixed_point
 from template_control.slip.gaits.stability import Kind
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -47,9 +48,9 @@ def test_papers_map_settles_walking_beside_its_target():
 def modified_branch():
     """Modified walking on the exact map, its target moved along 0.9818 m."""
     guess, held = controls(np.radians(70.0), K0, K0), {"height": 0.9818}
-    policy = targeted(ModifiedWalking(P), P, Event.VLO, held, "energy", guess)
+    policy = targeted(ModifiedWalking(P), P, VLO, held, "energy", guess)
     family = ControlledFamily(ReturnMap(P), policy, "energy")
-    start = section_target(P, Event.VLO, {"height": 0.9818, "energy": 826.0})
+    start = section_target(P, VLO, {"height": 0.9818, "energy": 826.0})
     return policy, family.trace(np.append(start, 826.0), "target", (815.0, 830.0), step=0.004)
 
 
@@ -104,7 +105,7 @@ def test_what_a_robot_adds_to_a_step_makes_modified_walking_circle():
 
 def test_controlled_running_has_no_memory_at_any_speed():
     guess, held = controls(np.radians(70.0), K0, K0), {"height": 0.98}
-    policy = targeted(ActiveRunning(P), P, Event.APEX, held, "speed", guess)
+    policy = targeted(ActiveRunning(P), P, APEX, held, "speed", guess)
     family = ControlledFamily(ReturnMap(P, "r"), policy, "speed")
     found = family.trace(np.array([4.0, 0.98, 4.0]), "target", (2.0, 6.0), step=0.2)
     assert len(found) > 5
@@ -116,27 +117,27 @@ def test_controlled_running_has_no_memory_at_any_speed():
 @pytest.mark.parametrize(
     ("section", "quantities"),
     [
-        (Event.VLO, {"energy": 826.0, "height": 0.9818}),
-        (Event.VLO, {"speed": 1.1, "height": 0.98}),
-        (Event.VLO, {"energy": 826.0, "speed": 1.1}),
-        (Event.APEX, {"energy": 1500.0, "height": 0.98}),
-        (Event.APEX, {"energy": 1500.0, "speed": 4.0}),
+        (VLO, {"energy": 826.0, "height": 0.9818}),
+        (VLO, {"speed": 1.1, "height": 0.98}),
+        (VLO, {"energy": 826.0, "speed": 1.1}),
+        (APEX, {"energy": 1500.0, "height": 0.98}),
+        (APEX, {"energy": 1500.0, "speed": 4.0}),
     ],
 )
 def test_targets_have_the_quantities_asked_for(section, quantities):
     z = section_target(P, section, quantities)
-    spring = 0.5 * K0 * (1.0 - z[1]) ** 2 if section is Event.VLO else 0.0
+    spring = 0.5 * K0 * (1.0 - z[1]) ** 2 if section is VLO else 0.0
     energy = 0.5 * P.mass * z[0] ** 2 + P.mass * P.gravity * z[1] + spring
     found = {"energy": energy, "height": z[1], "speed": z[0]}
     assert {name: found[name] for name in quantities} == pytest.approx(quantities)
-    assert len(z) == (3 if section is Event.VLO else 2)
+    assert len(z) == (3 if section is VLO else 2)
 
 
 def test_impossible_targets_and_families_are_named():
     with pytest.raises(ParameterError, match="no VLO state has energy 500"):
-        section_target(P, Event.VLO, {"energy": 500.0, "height": 0.98})
+        section_target(P, VLO, {"energy": 500.0, "height": 0.98})
     with pytest.raises(ParameterError, match="give two of"):
-        section_target(P, Event.VLO, {"energy": 500.0})
+        section_target(P, VLO, {"energy": 500.0})
     with pytest.raises(ParameterError, match="cannot vary the target's 'angle'"):
         ControlledFamily(ReturnMap(P), lambda z, _: z, "angle")
     with pytest.raises(ParameterError, match="stride is 'wr'"):

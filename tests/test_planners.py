@@ -15,8 +15,9 @@ from template_control.embedding.step_planning import ReplanOptions, StepPlanning
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.gait import gait_at, gait_for_speed, vlo_energy, vlo_jacobians
+from template_control.slip.gaits.gait import gait_at, gait_for_speed, vlo_jacobians
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -91,7 +92,7 @@ def test_modified_planner_meets_the_energy_of_equation_38(gait):
     # Stance stiffness is back at k0 at the next VLO; the reset's energy is part of (38) only
     # where the height met is the wanted one, so compare before the reset.
     y = decision.predicted[1]
-    before_reset = vlo_energy(P, decision.predicted) + 0.5 * (k2 - k0) * (1.0 - y) ** 2
+    before_reset = VLO.energy(P, decision.predicted) + 0.5 * (k2 - k0) * (1.0 - y) ** 2
     injected = 0.5 * (k2 - k0) * (1.0 - gait.vlo[1]) ** 2
     assert before_reset == pytest.approx(gait.energy + injected, abs=1e-6)
 
@@ -142,7 +143,7 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(later, f
     planning.decide(node, sensed, 0.0, 1.0, 0.0)
     u = planning.steps[0].decision.controls
     z = gait.vlo + [faster, higher, 0.0]
-    disturbed = simulate_stride(P, node.name, [0.0, z[1], z[0], z[2]], u)
+    disturbed = simulate_stride(P, node.name, VLO.state(z), u)
     assume(later < disturbed.time_of(Event.TOUCHDOWN))
     sensed.state[:] = disturbed.sample(later)[0][:4]
     change = ReplanOptions().agility * (planning.path.touchdown - later) ** 2

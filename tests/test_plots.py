@@ -8,7 +8,7 @@ from matplotlib.image import imread
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.slip.gaits.gait import vlo_energy
+from template_control.slip.maps.section import VLO
 from template_control.view.figures import FIGURES
 from template_control.view.state_figures import phase_portrait, template_energies, vlo_states
 
@@ -93,7 +93,7 @@ def test_bad_input_is_one_line(record, arguments, culprit, tmp_path, monkeypatch
 
 def test_template_conserves_its_energy_within_a_phase(record, gait):
     total = template_energies(record)["total"]
-    target = vlo_energy(gait.parameters, gait.vlo)
+    target = VLO.energy(gait.parameters, gait.vlo)
     first = record.time < 0.1
     assert np.allclose(total[first], target, atol=0.01)
     # After the rear liftoff until VLO nothing changes the template.
@@ -121,7 +121,7 @@ def test_vlo_figure_shows_the_recorded_states(record, gait):
         assert np.array_equal(shown["expected by the planner"], record.vlo_predicted[:-1, column])
         assert np.allclose(shown["gait"], gait.vlo[column])
     reached = next(line for line in energy.lines if line.get_label() == "reached").get_ydata()
-    assert reached[-1] == pytest.approx(vlo_energy(gait.parameters, record.vlo_state[-1]))
+    assert reached[-1] == pytest.approx(VLO.energy(gait.parameters, record.vlo_state[-1]))
 
 
 def test_portrait_is_broken_where_the_stance_foot_changes(record):

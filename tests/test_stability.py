@@ -11,10 +11,10 @@ from template_control.errors import GaitError, ParameterError
 from template_control.paper.stability import branch, lower_limit
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.gaits.branch import Special
-from template_control.slip.gaits.gait import vlo_energy
 from template_control.slip.gaits.gait_branch import Family
 from template_control.slip.gaits.stability import Kind, classify, closed_loop_eigenvalues
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -32,7 +32,7 @@ def test_every_point_is_a_gait(points):
         mapped = step(point.state, point.controls)
         np.testing.assert_allclose(mapped.state, point.state, atol=1e-8)
         assert point.state[1] == pytest.approx(0.9818, abs=1e-8)
-        assert point.energy == pytest.approx(vlo_energy(P, point.state), rel=1e-12)
+        assert point.energy == pytest.approx(VLO.energy(P, point.state), rel=1e-12)
 
 
 def test_the_branch_passes_the_fold_the_paper_stops_at(points):

@@ -18,7 +18,6 @@ from template_control.slip.automaton.vocabulary import Outcome, Reset, Slot
 from template_control.view.automaton_figure import (
     GAIT_NAMES,
     automaton_figure,
-    gait_of,
     gaits,
     words,
 )
@@ -89,16 +88,21 @@ def save(automaton: Automaton, path: Path) -> None:
 def describe(automaton: Automaton) -> dict[str, Any]:
     """The whole automaton in JSON's types: its nodes in order, each with its edges in order.
 
+    ``starts`` names the first node of each kind of stride.
+
     Phases, slots, events, resets and outcomes go by their names in
     ``vocabulary``. An edge has either a ``target`` or a ``failure``.
     """
-    return {"nodes": [_describe_node(node) for node in automaton.nodes]}
+    return {
+        "starts": dict(automaton.starts),
+        "nodes": [_describe_node(node) for node in automaton.nodes],
+    }
 
 
 def _describe_node(node: Node) -> dict[str, Any]:
     return {
         "name": node.name,
-        "gait": gait_of(node.name),
+        "gait": node.gait,
         "phase": node.phase.name,
         "rear": None if node.rear is None else node.rear.name,
         "front": None if node.front is None else node.front.name,

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import Event, MapKind
+from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.control.controllers import ActiveRunning, ModifiedWalking
 from template_control.slip.control.section_target import VARIED, section_target, targeted
 from template_control.slip.dynamics.stride import controls
@@ -25,6 +25,7 @@ from template_control.slip.gaits.branch import QUANTITIES, BranchPoint
 from template_control.slip.gaits.controlled_branch import ControlledFamily
 from template_control.slip.gaits.gait_branch import Family
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.storage import writable
 from template_control.view.stability_figures import UNITS, branch_figure
@@ -180,7 +181,7 @@ def _controlled(wanted: _Wanted, kind: MapKind) -> list[BranchPoint]:
             f" {', '.join(VARIED)} and give another to --over"
         )
     p, walking = SlipParameters(), wanted.gait == "walk"
-    section = Event.VLO if walking else Event.APEX
+    section = VLO if walking else APEX
     controller = ModifiedWalking(p, kind) if walking else ActiveRunning(p, kind)
     start = {**_DEFAULTS[wanted.gait].start, **wanted.start}
     guess = controls(np.radians(start["angle"]), start["stiffness"], start["stiffness"])

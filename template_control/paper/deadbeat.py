@@ -15,16 +15,15 @@ from numpy.typing import NDArray
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, MapKind, Outcome, Slot
 from template_control.slip.control.step_solver import StepProblem, Unknowns
-from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.basin import steps_to_fall
 from template_control.slip.gaits.branch import BranchPoint
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 
 Array = NDArray[np.float64]
 
-_MIRROR = np.array([1.0, 1.0, -1.0])
 _RETURNS = 1e-7  # how exactly a step of the set must lead onto the equilibrium
 
 
@@ -58,20 +57,19 @@ def backward_set(
         counts: numbers of kappa_2 and of angles between 0 and 90 degrees.
     """
     p = gait.parameters
-    mirrored = gait.vlo * _MIRROR
-    start = [0.0, mirrored[1], mirrored[0], mirrored[2]]
+    start = VLO.state(VLO.mirror(gait.vlo))
     forward = ReturnMap(p)
-    scratch = new_scratch()
+    walk = StrideSimulator(p)
     states, controls = [], []
     for kappa in np.linspace(*stiffness_range, counts[0]) * p.leg_stiffness:
         for angle in np.radians(np.linspace(0.0, 90.0, counts[1] + 2)[1:-1]):
             u = np.zeros(NUM_SLOTS)
             u[[Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]] = angle, kappa, p.leg_stiffness
-            back = simulate_stride(p, STRIDE_START["w"], start, u, scratch=scratch)
+            back = walk.run(STRIDE_START["w"], start, u)
             if not back.completed:
                 continue
             liftoff = next(e.state for e in back.events if e.event is Event.REAR_LIFTOFF)
-            z = back.state[[2, 1, 3]] * _MIRROR
+            z = VLO.mirror(VLO.of(back.state))
             u[Slot.TOUCHDOWN_ANGLE] = np.arcsin(liftoff[1] / p.rest_length)
             u[[Slot.K_SC, Slot.K_SD]] = p.leg_stiffness, kappa
             end, outcome = forward.step(z, u)
@@ -120,9 +118,7 @@ def settles(
     order = np.argsort([point.energy for point in branch])
     energies = np.array([branch[i].energy for i in order])
     angles = np.array([branch[i].angle for i in order])
-    kinetic = 0.5 * p.mass * (ends[:, 0] ** 2 + ends[:, 2] ** 2)
-    spring = 0.5 * p.leg_stiffness * (p.rest_length - ends[:, 1]) ** 2
-    energy = kinetic + p.mass * p.gravity * ends[:, 1] + spring
+    energy = np.asarray(VLO.energy(p, ends))
     inside = (energy >= energies[0]) & (energy <= energies[-1])
     u = np.tile(gait.controls, (len(ends), 1))
     u[:, Slot.TOUCHDOWN_ANGLE] = np.interp(energy, energies, angles)

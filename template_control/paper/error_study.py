@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -125,9 +126,5 @@ def study(grid: Grid | None = None, parameters: SlipParameters | None = None) ->
 def _may_touch_down(p: SlipParameters, z: Array, u: Array) -> NDArray[np.bool_]:
     """(29) and (30): the energy is enough for the next touchdown."""
     k, low = u[:, Slot.K_SC], p.rest_length * np.sin(u[:, Slot.TOUCHDOWN_ANGLE])
-
-    def potential(y: Array) -> Array:
-        return p.mass * p.gravity * y + 0.5 * k * (p.rest_length - y) ** 2
-
-    kinetic = 0.5 * p.mass * (z[:, 0] ** 2 + z[:, 2] ** 2)
-    return np.asarray(kinetic + potential(z[:, 1]) >= potential(low))
+    at_rest = np.column_stack((np.zeros_like(low), low, np.zeros_like(low)))
+    return np.asarray(VLO.energy(p, z, k) >= VLO.energy(p, at_rest, k))

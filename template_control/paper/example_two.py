@@ -31,8 +31,9 @@ from template_control.run.record import Record
 from template_control.run.simulation import SimulationOptions, simulate
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.gaits.basin import velocity_angle, vlo_state
-from template_control.slip.gaits.gait import WalkingGait, vlo_energy
+from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 from template_control.view.figures import stick_diagram
 
 Array = NDArray[np.float64]
@@ -94,7 +95,7 @@ def start_state(gait: WalkingGait) -> tuple[float, float, float]:
 
 def sections(gait: WalkingGait, z: Array) -> Array:
     """y, phi, E (n, 3) of VLO states (n, 3), with the template's formulas."""
-    energy = [vlo_energy(gait.parameters, state) for state in z]
+    energy = np.asarray(VLO.energy(gait.parameters, z))
     return np.column_stack((z[:, 1], velocity_angle(z), energy))
 
 

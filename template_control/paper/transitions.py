@@ -15,6 +15,7 @@ from template_control.slip.control.controllers import RunToWalk, WalkToRun
 from template_control.slip.control.step_solver import StepSolution
 from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -179,7 +180,7 @@ def _stride_data(strides: list[tuple[str, Stride]]) -> dict[str, Any]:
 
 def fig6() -> Reproduction:
     """The WRT stride on the exact model, with Table IV's gains and with ours."""
-    start = [0.0, WRT_STATE[1], WRT_STATE[0], WRT_STATE[2]]
+    start = VLO.state(WRT_STATE)
     published = simulate_stride(P, STRIDE_START["wr"], start, WRT_CONTROLS)
     target = np.array([published.state[2], APEX_HEIGHT])
     ours = walk_to_run(target)[MapKind.IMPROVED].controls
@@ -199,7 +200,7 @@ def fig6() -> Reproduction:
 
 def fig7() -> Reproduction:
     """The RWT stride on the exact model, with Table IV's gains and with ours."""
-    start = [0.0, RWT_STATE[1], RWT_STATE[0], 0.0]
+    start = APEX.state(RWT_STATE)
     ours = run_to_walk()[MapKind.IMPROVED].controls
     strides = [
         ("Table IV's gains", simulate_stride(P, STRIDE_START["rw"], start, RWT_CONTROLS)),

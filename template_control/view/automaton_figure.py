@@ -43,11 +43,6 @@ _FONT = 11.0
 _SAMPLES = np.linspace(0.0, 1.0, 41)
 
 
-def gait_of(name: str) -> str:
-    """Superscript of a node's name: ``"wr"`` of ``"SS_av^wr"``."""
-    return name.partition("^")[2]
-
-
 def mathtext(name: str) -> str:
     """A node's or guard's name as in the paper: ``"SS_sc^w"`` is ``"$SS_{sc}^{w}$"``."""
     stem, _, gait = name.partition("^")
@@ -81,12 +76,10 @@ def successions(automaton: Automaton) -> Iterator[tuple[str, str, Edge]]:
 
 def gaits(automaton: Automaton) -> dict[str, tuple[str, ...]]:
     """Node names by gait, each gait's in order of first arrival from its stride's start."""
-    named = dict.fromkeys(gait_of(node.name) for node in automaton.nodes)
-    inner = {target for _, target, edge in successions(automaton) if not edge.section}
     ordered = {}
-    for gait in named:
-        members = [n.name for n in automaton.nodes if gait_of(n.name) == gait]
-        start = next((name for name in members if name not in inner), members[0])
+    for gait in dict.fromkeys(node.gait for node in automaton.nodes):
+        members = [n.name for n in automaton.nodes if n.gait == gait]
+        start = automaton.starts.get(gait, members[0])
         reached = [n.name for n in automaton.stride(start) if n.name in members]
         ordered[gait] = (*reached, *(name for name in members if name not in reached))
     return ordered
@@ -122,7 +115,11 @@ def layout(automaton: Automaton) -> dict[str, Array]:
     below, from the side they start on.
     """
     members = gaits(automaton)
-    ends = [(gait_of(a), gait_of(b)) for a, b, edge in successions(automaton) if edge.section]
+    ends = [
+        (automaton.node(a).gait, automaton.node(b).gait)
+        for a, b, edge in successions(automaton)
+        if edge.section
+    ]
     cycles = [gait for gait in members if (gait, gait) in ends]
     rows = [gait for gait in members if gait not in cycles]
     half = 0.5 * _PITCH * (max((len(members[g]) for g in rows), default=1) - 1)
@@ -228,7 +225,7 @@ def _draw_nodes(axes: Axes, automaton: Automaton, centre: dict[str, Array]) -> I
     for node in automaton.nodes:
         x, y = centre[node.name]
         circle = Circle((x, y), _NODE, facecolor=_PHASES[node.phase][0], zorder=3)
-        circle.set(edgecolor=_INK, linestyle=_line(gait_of(node.name)))
+        circle.set(edgecolor=_INK, linestyle=_line(node.gait))
         axes.add_patch(circle)
         text = axes.text(x, y, mathtext(node.name), fontsize=_FONT + 1, zorder=4)
         text.set(ha="center", va="center")
@@ -245,7 +242,7 @@ def _draw_edges(
     for i, (a, b, edge) in enumerate(edges):
         same = pairs[:i].count((a, b))
         bend = 0.18 * (same + (a != b and (b, a) in pairs))
-        gait = [centre[n] for n in gaits(automaton)[gait_of(a)]]
+        gait = [centre[n] for n in gaits(automaton)[automaton.node(a).gait]]
         # A gait of one node has its own loop face the middle, where there is room.
         away = centre[a] - np.mean(gait, axis=0) - 1e-9 * centre[a]
         arrow = _route(centre[a], centre[b], bend, away / np.linalg.norm(away))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.run.record import Record
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.gaits.gait import vlo_energy
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, shade, window
 
@@ -175,7 +175,7 @@ def energies(record: Record) -> Figure:
         label="template",
     )  # fmt: skip
     lower.plot(time, template["total"][w], color=TEMPLATE, label="template with its springs")
-    target = vlo_energy(p, np.array(record.metadata["gait_vlo"]))
+    target = float(VLO.energy(p, record.metadata["gait_vlo"]))
     lower.axhline(target, color=LEFT, linewidth=1.2, linestyle=":", label="gait at VLO")
     lower.set(xlabel="time [s]", ylabel="sum [J]")
     for axes in panels:
@@ -204,9 +204,9 @@ def vlo_states(record: Record) -> Figure:
         (panels[2], state[:, 2], expected[:, 2], target[2], 0.005, "dy/dt [m/s]"),
         (
             panels[3],
-            np.array([vlo_energy(p, z) for z in state]),
-            np.array([vlo_energy(p, z) for z in expected]),
-            vlo_energy(p, target),
+            VLO.energy(p, state),
+            VLO.energy(p, expected),
+            VLO.energy(p, target),
             1.0,
             "energy [J]",
         ),

@@ -17,7 +17,6 @@ from scipy.linalg import solve_discrete_are
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.step_search import FALL_PRICE, Law, linear, price, search
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import TABLES
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.stride import kernel_model
@@ -121,7 +120,7 @@ class LqrPlanner:
         self._settle_on(gait)
         # Compile now what a step would otherwise wait for.
         linear(self._law, gait.vlo, u := np.empty(3))
-        search(TABLES, _NODE, self._law, self._scratch, gait.vlo, self._spread, u, np.empty(3))
+        search(AUTOMATON.tables, _NODE, self._law, self._scratch, gait.vlo, self._spread, u, np.empty(3))
 
     def _settle_on(self, gait: WalkingGait) -> None:
         """Make ``gait`` the one that the law leads to."""
@@ -180,10 +179,10 @@ class LqrPlanner:
             law = law._replace(lower=lower, upper=upper)
         u, first = np.empty(3), np.empty(3)
         linear(law, z, u)
-        cost = price(TABLES, _NODE, _EXACT, law, s, z, u, np.inf, first)
+        cost = price(AUTOMATON.tables, _NODE, _EXACT, law, s, z, u, np.inf, first)
         nominal = cost < self.options.trusted_price
         if not nominal:
-            cost = search(TABLES, _NODE, law, s, z, self._spread, u, first)
+            cost = search(AUTOMATON.tables, _NODE, law, s, z, self._spread, u, first)
         controls = self.gait.controls.copy()
         controls[WALKING_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)

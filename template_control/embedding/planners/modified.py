@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import TABLES
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.control.modified_walking import search_angle
 from template_control.slip.dynamics.kernel import new_scratch
@@ -79,7 +78,7 @@ class ModifiedPlanner:
         high = min(nominal + o.angle_range[1], top, max(angles[1], nominal + o.angle_range[0]))
         low = min(max(nominal + o.angle_range[0], angles[0]), high)
         outcome, alpha, kappa_2, residual = search_angle(
-            TABLES,
+            AUTOMATON.tables,
             self._model,
             int(o.map_kind),
             _NODE,

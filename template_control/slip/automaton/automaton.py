@@ -5,12 +5,14 @@ controller all read these tables, so "what comes after touchdown" is written onc
 
 A leg is *rear* or *front*. In single stance the stance leg is the rear one, because the
 leg that touches down next lands in front of it; at the rear leg's liftoff the front leg
-takes its place (``Reset.SHIFT``).
+takes its place (``Reset.SHIFT``). At the liftoff into a flight the legs change roles
+(``Reset.SWAP``): the other one lands next.
 """
 
 from __future__ import annotations
 
-from template_control.slip.automaton.hybrid import Automaton, Edge, Node
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.node import Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
 
 _SINGLE_STANCE_FAILURES = (
@@ -108,7 +110,7 @@ def _running() -> tuple[Node, ...]:
             Slot.K_SD,
             None,
             (
-                Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.NONE, "G_l^r"),
+                Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.SWAP, "G_l^r"),
                 *_RUNNING_STANCE_FAILURES,
             ),
         ),
@@ -173,7 +175,7 @@ def _walk_to_run() -> tuple[Node, ...]:
             Slot.K_SD_WR,
             None,
             (
-                Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.NONE, "G_f^wr"),
+                Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.SWAP, "G_f^wr"),
                 *_RUNNING_STANCE_FAILURES,
             ),
         ),
@@ -261,21 +263,22 @@ def _run_to_walk() -> tuple[Node, ...]:
 
 
 AUTOMATON = Automaton(
-    (
+    nodes=(
         *_walking(),
         *_running(),
         *_walk_to_run(),
         *_run_to_walk(),
         *_simplified_walk_to_run(),
-    )
+    ),
+    starts={
+        "w": "SS_av^w",
+        "r": "F_aa^r",
+        "wr": "SS_av^wr",
+        "rw": "F_aa^rw",
+        "wr*": "SS_av^wr*",
+    },
 )
 """The one automaton of the library."""
 
-STRIDE_START = {
-    "w": "SS_av^w",
-    "r": "F_aa^r",
-    "wr": "SS_av^wr",
-    "rw": "F_aa^rw",
-    "wr*": "SS_av^wr*",
-}
+STRIDE_START = AUTOMATON.starts
 """First node of each kind of stride (superscripts of Table I; * the controller's WRT)."""

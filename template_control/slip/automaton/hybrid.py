@@ -1,65 +1,47 @@
-"""What a hybrid automaton is made of: nodes, and edges with guards and resets."""
+"""A hybrid automaton: its nodes, and where each kind of stride starts among them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
-from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
+from template_control.errors import ParameterError
+from template_control.slip.automaton.node import Edge, Node
+from template_control.slip.automaton.tables import Tables, pack
+from template_control.slip.automaton.vocabulary import MAX_EDGES, Event, Outcome, Phase
 
-
-@dataclass(frozen=True)
-class Edge:
-    """A transition: when ``event`` fires, apply ``reset`` and go to ``target``.
-
-    Attributes:
-        event: the guard.
-        target: name of the successor node, or the failure the stride ends with.
-        reset: what happens to the toes.
-        guard: the guard's name in Fig. 2 (empty for failures).
-        section: True where a stride ends (VLO or apex), and the next begins at ``target``.
-    """
-
-    event: Event
-    target: str | Outcome
-    reset: Reset = Reset.NONE
-    guard: str = ""
-    section: bool = False
-
-
-@dataclass(frozen=True)
-class Node:
-    """A circle of Fig. 2, ``phase_subphase^gait``; leg stiffness is constant in it.
-
-    Attributes:
-        name: the node's name, such as ``"DS_sc^w"``.
-        phase: flight, single or double stance.
-        rear: stiffness slot of the rear (in single stance: the only) leg, None in the air.
-        front: stiffness slot of the front leg, None in the air.
-        edges: the ways out, failures included.
-    """
-
-    name: str
-    phase: Phase
-    rear: Slot | None
-    front: Slot | None
-    edges: tuple[Edge, ...]
-
-    def edge(self, event: Event) -> Edge | None:
-        """The first edge that ``event`` fires, or None."""
-        return next((e for e in self.edges if e.event is event), None)
+__all__ = ["Automaton", "Edge", "Node"]
 
 
 @dataclass(frozen=True)
 class Automaton:
-    """Nodes of the walking and running gaits and of both transition strides."""
+    """Nodes of gaits and of the strides between them.
+
+    Attributes:
+        nodes: in the order that numbers them.
+        starts: first node of each kind of stride.
+
+    Raises:
+        ParameterError: naming the first node, edge or start that leads nowhere.
+    """
 
     nodes: tuple[Node, ...]
+    starts: Mapping[str, str] = field(hash=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "starts", dict(self.starts))
+        _check(self)
 
     @cached_property
     def index(self) -> dict[str, int]:
         """Node name to position in :attr:`nodes`."""
         return {node.name: i for i, node in enumerate(self.nodes)}
+
+    @cached_property
+    def tables(self) -> Tables:
+        """The automaton as the compiled kernels read it."""
+        return pack(self.nodes)
 
     def node(self, name: str) -> Node:
         """The node called ``name``.
@@ -68,6 +50,16 @@ class Automaton:
             KeyError: if there is none.
         """
         return self.nodes[self.index[name]]
+
+    def start(self, stride: str) -> Node:
+        """First node of a kind of stride.
+
+        Raises:
+            ParameterError: if there is no such stride.
+        """
+        if stride not in self.starts:
+            raise ParameterError(f"no stride {stride!r}: give one of {', '.join(self.starts)}")
+        return self.node(self.starts[stride])
 
     def stride(self, start: str) -> tuple[Node, ...]:
         """Nodes a stride from ``start`` can pass, in order of first arrival."""
@@ -81,10 +73,35 @@ class Automaton:
         return tuple(found)
 
     def sections(self, start: str) -> tuple[Event, Event]:
-        """Sections (VLO or APEX) at which a stride from ``start`` begins and ends."""
+        """Sections (VLO or APEX) at which a stride from ``start`` begins and ends.
+
+        Raises:
+            ParameterError: if no section ends it.
+        """
         begin = Event.APEX if self.node(start).phase is Phase.F else Event.VLO
-        end = next(e.event for n in self.stride(start) for e in n.edges if e.section)
-        return begin, end
+        ends = [edge.event for node in self.stride(start) for edge in node.edges if edge.section]
+        if not ends:
+            raise ParameterError(f"no section ends a stride from {start}: mark one of its edges")
+        return begin, ends[0]
+
+    def before(self, node_name: str) -> Node:
+        """The node from which the section is reached that ``node_name`` begins at.
+
+        It is the first whose section leads there; for a start that is only chosen at a
+        section, such as a transition's, the first whose section is the same.
+
+        Raises:
+            ParameterError: if there is none.
+        """
+        events = [self.sections(node_name)[0]] if node_name in self.starts.values() else []
+        reached = [(node, edge) for node in self.nodes for edge in node.edges if edge.section]
+        for node, edge in reached:
+            if edge.target == node_name:
+                return node
+        for node, edge in reached:
+            if edge.event in events:
+                return node
+        raise ParameterError(f"no section leads to {node_name}: give the start of a stride")
 
     def successor(self, name: str, event: Event) -> str:
         """Name of the node that follows ``name`` when ``event`` fires.
@@ -96,3 +113,38 @@ class Automaton:
         if edge is None or isinstance(edge.target, Outcome):
             raise KeyError(f"{event.name} leads nowhere from {name}")
         return edge.target
+
+
+def _check(automaton: Automaton) -> None:
+    """Raise a ParameterError for the first thing that makes a stride impossible to follow."""
+    names = [node.name for node in automaton.nodes]
+    for node in automaton.nodes:
+        if names.count(node.name) > 1:
+            raise ParameterError(f"two nodes are called {node.name}: give each its own name")
+        _check_edges(node, names)
+    for stride, name in automaton.starts.items():
+        if name not in names:
+            raise ParameterError(
+                f"stride {stride!r} starts at {name}, which is no node: give one of"
+                f" {', '.join(names) or 'them'}"
+            )
+
+
+def _check_edges(node: Node, names: list[str]) -> None:
+    events = [edge.event for edge in node.edges]
+    if not events:
+        raise ParameterError(f"node {node.name} has no way out: give it an edge")
+    if len(events) > MAX_EDGES:
+        raise ParameterError(
+            f"node {node.name} has {len(events)} edges: give it at most {MAX_EDGES}"
+        )
+    for edge in node.edges:
+        where = f"{edge.event.name} of node {node.name}"
+        if events.count(edge.event) > 1:
+            raise ParameterError(f"{where} has two edges: leave one")
+        if edge.section and isinstance(edge.target, Outcome):
+            raise ParameterError(f"{where} ends at a section: give it a node as target")
+        if edge.target is Outcome.SECTION:
+            raise ParameterError(f"{where} fails with SECTION: give another outcome or a node")
+        if isinstance(edge.target, str) and edge.target not in names:
+            raise ParameterError(f"{where} leads to {edge.target}, which is no node: name one")

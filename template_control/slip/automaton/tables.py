@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.node import Node
 from template_control.slip.automaton.vocabulary import Outcome
 
 IntArray = NDArray[np.int64]
@@ -36,22 +36,21 @@ class Tables(NamedTuple):
     outcome: IntArray
 
 
-def pack(automaton: Automaton) -> Tables:
-    """Pack ``automaton`` into :class:`Tables`."""
-    edges = [edge for node in automaton.nodes for edge in node.edges]
-    counts = [len(node.edges) for node in automaton.nodes]
+def pack(nodes: Sequence[Node]) -> Tables:
+    """Pack an automaton's ``nodes`` into :class:`Tables`."""
+    index = {node.name: i for i, node in enumerate(nodes)}
+    edges = [edge for node in nodes for edge in node.edges]
+    counts = [len(node.edges) for node in nodes]
 
     def array(values: list[int]) -> IntArray:
         return np.array(values, dtype=np.int64)
 
     return Tables(
-        rear=array([-1 if n.rear is None else int(n.rear) for n in automaton.nodes]),
-        front=array([-1 if n.front is None else int(n.front) for n in automaton.nodes]),
+        rear=array([-1 if n.rear is None else int(n.rear) for n in nodes]),
+        front=array([-1 if n.front is None else int(n.front) for n in nodes]),
         first_edge=array([0, *np.cumsum(counts).tolist()]),
         event=array([int(e.event) for e in edges]),
-        target=array(
-            [-1 if isinstance(e.target, Outcome) else automaton.index[e.target] for e in edges]
-        ),
+        target=array([-1 if isinstance(e.target, Outcome) else index[e.target] for e in edges]),
         reset=array([int(e.reset) for e in edges]),
         outcome=array(
             [
@@ -62,7 +61,3 @@ def pack(automaton: Automaton) -> Tables:
             ]
         ),
     )
-
-
-TABLES = pack(AUTOMATON)
-"""Tables of :data:`AUTOMATON`."""

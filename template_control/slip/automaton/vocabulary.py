@@ -13,6 +13,17 @@ class Phase(IntEnum):
     DS = 2
 
 
+class Leg(IntEnum):
+    """A leg by its role; the automaton's resets change who plays it.
+
+    In single stance the stance leg is the rear one, because the leg that touches down next
+    lands in front of it.
+    """
+
+    REAR = 0
+    FRONT = 1
+
+
 class Slot(IntEnum):
     """Places of the control vector u of a stride, in order.
 
@@ -63,19 +74,23 @@ class Event(IntEnum):
 
 
 NUM_EVENTS = len(Event)
+MAX_EDGES = 8
+"""Most edges that a node may have."""
 
 
 class Reset(IntEnum):
     """What happens to the toes when an edge is taken.
 
     ``PLACE_REAR`` and ``PLACE_FRONT`` put a toe where the stretched leg at the touchdown
-    angle meets the ground, x + l0 cos(alpha); ``SHIFT`` makes the front toe the rear one.
+    angle meets the ground, x + l0 cos(alpha); ``SHIFT`` makes the front toe the rear one;
+    ``SWAP`` exchanges the legs' roles and places none: the other leg lands next.
     """
 
     NONE = 0
     PLACE_REAR = 1
     PLACE_FRONT = 2
     SHIFT = 3
+    SWAP = 4
 
 
 class Outcome(IntEnum):

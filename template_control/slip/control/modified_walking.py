@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import TABLES, Tables
+from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
 from template_control.slip.dynamics.kernel import Model, Scratch, new_scratch
 from template_control.slip.dynamics.stride import kernel_model
@@ -197,7 +197,7 @@ class ModifiedMap:
         self.target = np.zeros(3)
         self._range = np.array(stiffness_range)
         node = AUTOMATON.index[STRIDE_START["w"]]
-        self._kernel = TABLES, kernel_model(parameters), int(kind), node
+        self._kernel = AUTOMATON.tables, kernel_model(parameters), int(kind), node
         self._scratch, self._complex_scratch = new_scratch(), new_scratch(complex)
 
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:

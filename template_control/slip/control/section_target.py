@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.control.controllers import Controller
+from template_control.slip.maps.section import VLO, Section
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -21,9 +21,9 @@ VARIED = ("energy", "height", "speed")
 
 
 def section_target(
-    parameters: SlipParameters, section: Event, quantities: Mapping[str, float]
+    parameters: SlipParameters, section: Section, quantities: Mapping[str, float]
 ) -> Array:
-    """A symmetric state: dx/dt, y, 0 at VLO, dx/dt, y at apex.
+    """A symmetric (n,) state: dx/dt, y, 0 at VLO, dx/dt, y at apex.
 
     Args:
         parameters: the template; at VLO the stance leg's spring, of stiffness k0, counts.
@@ -39,11 +39,11 @@ def section_target(
             f" {', '.join(VARIED)}"
         )
     p = parameters
-    weight = p.mass * p.gravity
-    stiffness = p.leg_stiffness if section is Event.VLO else 0.0
     if "height" in quantities:
         y = quantities["height"]
     else:
+        weight = p.mass * p.gravity
+        stiffness = p.leg_stiffness if section is VLO else 0.0
         # weight * y + stiffness * (rest_length - y)^2 / 2 = rest, the root next to rest_length
         rest = quantities["energy"] - 0.5 * p.mass * quantities["speed"] ** 2
         over = rest - weight * p.rest_length
@@ -53,18 +53,17 @@ def section_target(
     if "speed" in quantities:
         speed = quantities["speed"]
     else:
-        kinetic = quantities["energy"] - weight * y - 0.5 * stiffness * (p.rest_length - y) ** 2
-        speed = np.sqrt(2.0 * kinetic / p.mass) if kinetic >= 0.0 else np.nan
+        speed = float(section.speed(p, y, quantities["energy"]))
     if not (np.isfinite(y) and np.isfinite(speed)):
         text = ", ".join(f"{name} {value:g}" for name, value in quantities.items())
         raise ParameterError(f"no {section.name} state has {text}: give more energy")
-    return np.array([speed, y, 0.0] if section is Event.VLO else [speed, y])
+    return section.of([0.0, y, speed, 0.0])
 
 
 def targeted(
     controller: Controller,
     parameters: SlipParameters,
-    section: Event,
+    section: Section,
     held: Mapping[str, float],
     varied: str,
     guess: Array,

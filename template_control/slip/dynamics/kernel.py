@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.slip.automaton.tables import Tables
-from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Reset
+from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
 from template_control.slip.dynamics.compiled import inner
-from template_control.slip.dynamics.locate import MAX_EDGES, arm, first_event
+from template_control.slip.dynamics.locate import arm, first_event
 from template_control.slip.dynamics.path import COEFFICIENTS, SERIES, sample
 from template_control.slip.dynamics.taylor import ORDER, expand
 
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 _PLACE_REAR = int(Reset.PLACE_REAR)
 _PLACE_FRONT = int(Reset.PLACE_FRONT)
 _SHIFT = int(Reset.SHIFT)
+_SWAP = int(Reset.SWAP)
 _BOTTOM = int(Event.BOTTOM)
 _VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
 _TIMEOUT = int(Outcome.TIMEOUT)
@@ -102,6 +103,8 @@ def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha
         toes[1] = state[0] + rest_length * np.cos(alpha)
     elif reset == _SHIFT:
         toes[0] = toes[1]
+    elif reset == _SWAP:
+        toes[0], toes[1] = toes[1], toes[0]
 
 
 @inner

@@ -16,7 +16,6 @@ from template_control.slip.dynamics.path import sample
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MAX_EDGES = 8
 _FALL = int(Event.FALL)
 _BACKWARD = int(Event.BACKWARD)
 _ARMING = 1e-10  # a guard must have been this far below zero before it can fire

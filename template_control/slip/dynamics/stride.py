@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.tables import TABLES
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
-from template_control.slip.dynamics.kernel import Model, Scratch, new_scratch, run_stride
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset, Slot
+from template_control.slip.dynamics.kernel import Model, new_scratch, run_stride
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -39,6 +39,7 @@ class FiredEvent:
         event: which guard.
         source, target: node left, and node entered ("" where the stride failed).
         state: (4,) x, y, dx/dt, dy/dt [m, m/s] at the event.
+        reset: what happened to the toes then.
     """
 
     time: float
@@ -46,6 +47,7 @@ class FiredEvent:
     source: str
     target: str
     state: Array
+    reset: Reset
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,7 @@ class Stride:
         events: guards in the order they fired.
         cx, cy: (segments, ORDER + 1) Taylor polynomials of the path.
         meta: (segments, 7) start time, duration, node index, toes (2), stiffness (2).
+        node_names: of the automaton, by index.
     """
 
     outcome: Outcome
@@ -72,6 +75,7 @@ class Stride:
     cx: Array
     cy: Array
     meta: Array
+    node_names: tuple[str, ...]
 
     @property
     def completed(self) -> bool:
@@ -101,7 +105,7 @@ class Stride:
         """Name of the automaton's node at each of ``times`` [s]."""
         t = np.atleast_1d(np.asarray(times, dtype=float))
         row = np.clip(np.searchsorted(self.meta[:, 0], t, side="right") - 1, 0, len(self.meta) - 1)
-        return [AUTOMATON.nodes[int(i)].name for i in self.meta[row, 2]]
+        return [self.node_names[int(i)] for i in self.meta[row, 2]]
 
 
 def controls(
@@ -139,61 +143,112 @@ def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
     return array
 
 
+class StrideSimulator:
+    """Simulates strides on the exact model, one after the other.
+
+    Args:
+        parameters: the template.
+        automaton: that the strides are of.
+        max_time: give a stride up after this time [s]; default 20 sqrt(l0/g).
+
+    One object serves one thread: it owns the compiled kernel's scratch arrays.
+    """
+
+    def __init__(
+        self,
+        parameters: SlipParameters,
+        automaton: Automaton = AUTOMATON,
+        max_time: float | None = None,
+    ) -> None:
+        self.parameters = parameters
+        self.automaton = automaton
+        self._model = kernel_model(parameters, max_time)
+        self._scratch = new_scratch()
+        self._names = tuple(node.name for node in automaton.nodes)
+        self._resets = [{e.event: e.reset for e in node.edges} for node in automaton.nodes]
+
+    def run(
+        self,
+        start: str,
+        state: Sequence[float] | Array,
+        u: Array,
+        toes: Sequence[float] | Array = (0.0, 0.0),
+    ) -> Stride:
+        """Simulate one stride.
+
+        Args:
+            start: first node, usually from ``STRIDE_START``.
+            state: (4,) x, y, dx/dt, dy/dt [m, m/s].
+            u: (5,) controls from :func:`controls`.
+            toes: (2,) x of the rear and front toe [m].
+
+        Raises:
+            ParameterError: for NaN or a wrong shape.
+            KeyError: if there is no node ``start``.
+        """
+        w, names = self._scratch, self._names
+        x = finite("state", state, 4)
+        c = finite("toes", toes, 2)
+        outcome, node, segments, events, duration = run_stride(
+            self.automaton.tables,
+            self._model,
+            self.automaton.index[start],
+            x,
+            c,
+            finite("controls", u, NUM_SLOTS),
+            True,
+            w,
+        )
+        return Stride(
+            outcome=Outcome(outcome),
+            node=names[node],
+            state=x,
+            toes=c,
+            duration=duration,
+            events=tuple(self._fired(row) for row in w.events[:events]),
+            cx=w.cx[:segments].copy(),
+            cy=w.cy[:segments].copy(),
+            meta=w.meta[:segments].copy(),
+            node_names=names,
+        )
+
+    def _fired(self, row: Array) -> FiredEvent:
+        """An event from the kernel's row (8,): time, event, nodes left and entered, state."""
+        event, source, target = Event(int(row[1])), int(row[2]), int(row[3])
+        return FiredEvent(
+            time=float(row[0]),
+            event=event,
+            source=self._names[source],
+            target=self._names[target] if target >= 0 else "",
+            state=row[4:8].copy(),
+            reset=self._resets[source][event],
+        )
+
+
 def simulate_stride(
     parameters: SlipParameters,
     start: str,
     state: Sequence[float] | Array,
     u: Array,
-    toes: Sequence[float] = (0.0, 0.0),
+    toes: Sequence[float] | Array = (0.0, 0.0),
     max_time: float | None = None,
-    scratch: Scratch | None = None,
+    automaton: Automaton = AUTOMATON,
 ) -> Stride:
     """Simulate one stride on the exact model.
+
+    For many strides a :class:`StrideSimulator`, which this makes anew, is quicker.
 
     Args:
         parameters: the template.
         start: first node, usually from ``STRIDE_START``.
         state: (4,) x, y, dx/dt, dy/dt [m, m/s].
         u: (5,) controls from :func:`controls`.
-        toes: x of the rear and front toe [m].
+        toes: (2,) x of the rear and front toe [m].
         max_time: give up after this time [s]; default 20 sqrt(l0/g).
-        scratch: reuse these arrays.
+        automaton: that the stride is of.
 
     Raises:
         ParameterError: for NaN or a wrong shape.
         KeyError: if there is no node ``start``.
     """
-    w = scratch or new_scratch()
-    x = finite("state", state, 4)
-    c = finite("toes", toes, 2)
-    outcome, node, segments, events, duration = run_stride(
-        TABLES,
-        kernel_model(parameters, max_time),
-        AUTOMATON.index[start],
-        x,
-        c,
-        finite("controls", u, NUM_SLOTS),
-        True,
-        w,
-    )
-    names = [n.name for n in AUTOMATON.nodes]
-    return Stride(
-        outcome=Outcome(outcome),
-        node=names[node],
-        state=x,
-        toes=c,
-        duration=duration,
-        events=tuple(
-            FiredEvent(
-                time=float(row[0]),
-                event=Event(int(row[1])),
-                source=names[int(row[2])],
-                target=names[int(row[3])] if row[3] >= 0 else "",
-                state=row[4:8].copy(),
-            )
-            for row in w.events[:events]
-        ),
-        cx=w.cx[:segments].copy(),
-        cy=w.cy[:segments].copy(),
-        meta=w.meta[:segments].copy(),
-    )
+    return StrideSimulator(parameters, automaton, max_time).run(start, state, u, toes)

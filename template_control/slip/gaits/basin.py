@@ -13,11 +13,12 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import TABLES, Tables
+from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.dynamics.compiled import inner
 from template_control.slip.dynamics.kernel import Model, Scratch, new_scratch
 from template_control.slip.dynamics.stride import kernel_model
+from template_control.slip.maps.section import VLO
 from template_control.slip.maps.section_map import RESULTS, section_map
 from template_control.slip.parameters import SlipParameters
 
@@ -38,11 +39,8 @@ def vlo_state(parameters: SlipParameters, y: ArrayLike, phi: ArrayLike, energy: 
 
     The speeds are NaN where the energy does not suffice.
     """
-    p = parameters
     y, phi, energy = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (y, phi, energy)))
-    potential = p.mass * p.gravity * y + 0.5 * p.leg_stiffness * (p.rest_length - y) ** 2
-    squared = 2.0 * (energy - potential) / p.mass
-    v = np.sqrt(np.where(squared > 0.0, squared, np.nan))
+    v = VLO.speed(parameters, y, energy)
     return np.stack((v * np.cos(phi), y, -v * np.sin(phi)), axis=-1)
 
 
@@ -141,7 +139,7 @@ def steps_to_fall(
     count = len(states)
     steps, converges = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.bool_)
     _many(
-        TABLES,
+        AUTOMATON.tables,
         kernel_model(parameters),
         AUTOMATON.index[STRIDE_START["w"]],
         states,

@@ -17,7 +17,6 @@ from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.control.section_target import VARIED, TargetedPolicy
 from template_control.slip.gaits.branch import Branch, BranchPoint, Equations, null_vector
-from template_control.slip.gaits.gait_branch import section_energy
 from template_control.slip.gaits.stability import classify
 from template_control.slip.maps.return_map import Linearisation, ReturnMap
 
@@ -86,7 +85,7 @@ class ControlledFamily(Branch):
             x=x.copy(),
             state=x[:-1].copy(),
             controls=u,
-            energy=section_energy(p, x[:-1], p.leg_stiffness)[0],
+            energy=float(self.map.sections[0].energy(p, x[:-1])),
             target=float(x[-1]),
             eigenvalues=eigenvalues,
             kind=classify(eigenvalues, _NOISE),

@@ -14,6 +14,7 @@ from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -52,15 +53,7 @@ class WalkingGait:
     @property
     def energy(self) -> float:
         """Mechanical energy at VLO, the stance spring's included [J]."""
-        return vlo_energy(self.parameters, self.vlo)
-
-
-def vlo_energy(parameters: SlipParameters, z: Array) -> float:
-    """E = m v^2 / 2 + m g y + k0 (l0 - y)^2 / 2 at the VLO state z (3,) [J]."""
-    p = parameters
-    kinetic = 0.5 * p.mass * (z[0] ** 2 + z[2] ** 2)
-    spring = 0.5 * p.leg_stiffness * (p.rest_length - z[1]) ** 2
-    return float(kinetic + p.mass * p.gravity * z[1] + spring)
+        return float(VLO.energy(self.parameters, self.vlo))
 
 
 def vlo_jacobians(gait: WalkingGait) -> tuple[Array, Array]:
@@ -74,8 +67,8 @@ def vlo_jacobians(gait: WalkingGait) -> tuple[Array, Array]:
 
 
 def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingGait:
-    stride = simulate_stride(parameters, STRIDE_START["w"], [0.0, z[1], z[0], z[2]], u)
-    if not stride.completed or np.max(np.abs(stride.state[[2, 1, 3]] - z)) > 1e-6:
+    stride = simulate_stride(parameters, STRIDE_START["w"], VLO.state(z), u)
+    if not stride.completed or np.max(np.abs(VLO.of(stride.state) - z)) > 1e-6:
         raise GaitError(f"gait {name!r} does not return to its VLO state: {stride.outcome.reason}")
     return WalkingGait(name, parameters, z, u, float(stride.state[0]), stride.duration)
 
@@ -141,12 +134,11 @@ def gait_from_energy(
         GaitError: if there is none.
     """
     p = parameters
-    spring = 0.5 * p.leg_stiffness * (p.rest_length - height) ** 2
-    squared = 2.0 / p.mass * (energy - spring - p.mass * p.gravity * height)
+    speed = float(VLO.speed(p, height, energy))
     top = np.arcsin(min(height / p.rest_length, 1.0))
-    if not squared > 0.0:
+    if not speed > 0.0:
         raise GaitError(f"energy {energy:g} J leaves no speed at a VLO height of {height:g} m")
-    z = np.array([np.sqrt(squared), height, 0.0])
+    z = np.array([speed, height, 0.0])
     k0 = p.leg_stiffness
     roots = _symmetric_roots(
         parameters, lambda a: (z, controls(a, k0, k0)), np.linspace(0.9, top - 1e-4, _SCAN)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
 from template_control.slip.gaits.branch import (
     QUANTITIES,
     Branch,
@@ -23,6 +23,7 @@ from template_control.slip.gaits.branch import (
 )
 from template_control.slip.gaits.stability import classify, shell_eigenvalues
 from template_control.slip.maps.return_map import Linearisation, ReturnMap
+from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -57,7 +58,8 @@ class Family(Branch):
         self.fixed = dict(fixed)
         self.free = tuple(q for q in QUANTITIES if q not in fixed)
         self.map = ReturnMap(parameters, stride)
-        self.n = self.map.dimensions[0]
+        self.section = self.map.sections[0]
+        self.n = self.section.dimension
         p = parameters
         speed = np.sqrt(p.gravity * p.rest_length)
         self.scale = np.array([*[speed, p.rest_length, speed][: self.n], 1.0, p.leg_stiffness])
@@ -89,9 +91,9 @@ class Family(Branch):
         if name != "energy":
             gradient[_COORDINATE[name]] = 1.0
             return float(x[_COORDINATE[name]]), gradient
-        energy, by_state, by_stiffness = section_energy(self.parameters, x[: self.n], x[-1])
-        gradient[: self.n], gradient[-1] = by_state, by_stiffness
-        return energy, gradient
+        z = x[: self.n]
+        gradient[: self.n], gradient[-1] = energy_gradient(self.section, self.parameters, z, x[-1])
+        return float(self.section.energy(self.parameters, z, x[-1])), gradient
 
     def _controls(self, x: Array) -> Array:
         u = np.zeros(NUM_SLOTS)
@@ -122,18 +124,22 @@ class Family(Branch):
         return Equations(residual, rows * self.scale, valid), linear
 
 
-def section_energy(
-    parameters: SlipParameters, z: Array, stiffness: float
-) -> tuple[float, Array, float]:
-    """Energy at VLO (3,) or apex (2,) [J], and its derivatives by the state and the stiffness.
+def energy_gradient(
+    section: Section, parameters: SlipParameters, z: Array, stiffness: float
+) -> tuple[Array, float]:
+    """Derivatives of :meth:`Section.energy` at ``z`` (n,).
 
-    At VLO the stance leg is vertical and as long as the CoM is high, (8).
+    Args:
+        section: VLO, where the stance leg is vertical and as long as the CoM is high, or APEX.
+        parameters: the template.
+        z: state at the section.
+        stiffness: of the stance leg [N/m].
+
+    Returns:
+        (n,) by the state; by the stiffness [J m/N].
     """
     p = parameters
-    compression = p.rest_length - z[1] if len(z) == 3 else 0.0
-    kinetic = 0.5 * p.mass * (z[0] ** 2 + (z[2] ** 2 if len(z) == 3 else 0.0))
-    by_stiffness = 0.5 * compression**2
+    compression = p.rest_length - z[1] if section.event is Event.VLO else 0.0
     gradient = p.mass * np.array([z[0], p.gravity, *z[2:]])
     gradient[1] -= stiffness * compression
-    energy = kinetic + p.mass * p.gravity * z[1] + stiffness * by_stiffness
-    return float(energy), gradient, float(by_stiffness)
+    return gradient, float(0.5 * compression**2)

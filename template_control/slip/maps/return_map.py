@@ -9,21 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import TABLES
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, MapKind, Outcome
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.stride import kernel_model
+from template_control.slip.maps.section import PADDED, section_of
 from template_control.slip.maps.section_map import RESULTS, map_many, section_jacobian, section_map
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-DIMENSION = {Event.VLO: 3, Event.APEX: 2}
-"""Size of a section's state: dx/dt, y, dy/dt at VLO (8), dx/dt, y at apex (4)."""
-
-_STATE = 3
 
 
 class Mapped(NamedTuple):
@@ -63,13 +59,15 @@ class ReturnMap:
 
     Args:
         parameters: the template.
-        stride: key of ``STRIDE_START``: "w" (VLO to VLO), "r" (apex to
-            apex), "wr" (VLO to apex), "rw" (apex to VLO), or "wr*", the walk-to-run stride
-            as its controller simplifies it.
+        stride: key of the automaton's ``starts``: "w" (VLO to VLO), "r" (apex to apex), "wr"
+            (VLO to apex), "rw" (apex to VLO), or "wr*", the walk-to-run stride as its
+            controller simplifies it.
         kind: exact, or one of the closed forms.
+        automaton: that the stride is of.
 
     Attributes:
-        dimensions: sizes of the state at the section it starts from and it ends at.
+        sections: that it starts from and ends at.
+        dimensions: sizes of the state there.
 
     Raises:
         ParameterError: if there is no such stride.
@@ -78,17 +76,21 @@ class ReturnMap:
     """
 
     def __init__(
-        self, parameters: SlipParameters, stride: str = "w", kind: MapKind = MapKind.EXACT
+        self,
+        parameters: SlipParameters,
+        stride: str = "w",
+        kind: MapKind = MapKind.EXACT,
+        automaton: Automaton = AUTOMATON,
     ) -> None:
-        if stride not in STRIDE_START:
-            raise ParameterError(f"no stride {stride!r}: give one of {', '.join(STRIDE_START)}")
+        start = automaton.start(stride).name
         self.parameters = parameters
         self.stride = stride
         self.kind = MapKind(kind)
-        begin, end = AUTOMATON.sections(STRIDE_START[stride])
-        self.dimensions = DIMENSION[begin], DIMENSION[end]
-        node = AUTOMATON.index[STRIDE_START[stride]]
-        self._kernel = TABLES, kernel_model(parameters), int(self.kind), node
+        begin, end = automaton.sections(start)
+        self.sections = section_of(begin), section_of(end)
+        self.dimensions = self.sections[0].dimension, self.sections[1].dimension
+        node = automaton.index[start]
+        self._kernel = automaton.tables, kernel_model(parameters), int(self.kind), node
         self._scratch = new_scratch()
         self._complex_scratch = new_scratch(complex)
 
@@ -104,7 +106,7 @@ class ReturnMap:
             distance covered, legs' lengths at the bottom; the outcome.
         """
         result = np.empty(RESULTS)
-        outcome = section_map(*self._kernel, _padded(z), u, self._scratch, result)
+        outcome = section_map(*self._kernel, self.sections[0].padded(z), u, self._scratch, result)
         return result, Outcome(outcome)
 
     def step(self, z: Array, u: Array) -> tuple[Array, Outcome]:
@@ -114,7 +116,7 @@ class ReturnMap:
 
     def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
         """As :meth:`evaluate` for controls ``u`` (n, NUM_SLOTS) from one state ``z``."""
-        return self._many(np.tile(_padded(z), (len(u), 1)), u)
+        return self._many(np.tile(self.sections[0].padded(z), (len(u), 1)), u)
 
     def _many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
         result, outcome = np.empty((len(z), RESULTS)), np.empty(len(z), dtype=np.int64)
@@ -133,9 +135,10 @@ class ReturnMap:
             (RESULTS,) as :meth:`evaluate`; its (RESULTS, c) derivatives; the outcome.
         """
         result, jacobian = np.empty(RESULTS), np.empty((RESULTS, len(columns)))
+        full = self.sections[0].padded(z)
         try:
             outcome = section_jacobian(
-                *self._kernel, _padded(z), u, columns, self._complex_scratch, result, jacobian
+                *self._kernel, full, u, columns, self._complex_scratch, result, jacobian
             )
         except ZeroDivisionError:
             # Where a real division gives NaN, Numba's complex one raises. It happens in strides
@@ -158,18 +161,17 @@ class ReturnMap:
         inputs = _checked("controls", u, NUM_SLOTS)
         shape = np.broadcast_shapes(states.shape[:-1], inputs.shape[:-1])
         count = int(np.prod(shape, dtype=np.int64))
-        flat_z, flat_u = np.zeros((*shape, _STATE)), np.empty((*shape, NUM_SLOTS))
-        flat_z[..., : self.dimensions[0]], flat_u[...] = states, inputs
-        result, outcome = self._many(
-            flat_z.reshape(count, _STATE), flat_u.reshape(count, NUM_SLOTS)
-        )
+        full = self.sections[0].padded(np.broadcast_to(states, (*shape, states.shape[-1])))
+        flat_u = np.empty((*shape, NUM_SLOTS))
+        flat_u[...] = inputs
+        result, outcome = self._many(full.reshape(count, PADDED), flat_u.reshape(count, NUM_SLOTS))
         result[outcome != Outcome.SECTION] = np.nan
         result = result.reshape(*shape, RESULTS)
         return Mapped(
             result[..., : self.dimensions[1]],
             outcome.reshape(shape),
-            result[..., _STATE],
-            result[..., _STATE + 1 :],
+            result[..., PADDED],
+            result[..., PADDED + 1 :],
         )
 
     def linearise(self, z: ArrayLike, u: ArrayLike) -> Linearisation:
@@ -189,16 +191,9 @@ class ReturnMap:
         if states.ndim != 1 or inputs.ndim != 1:
             raise ParameterError("linearise takes one state and one control vector")
         n, m = self.dimensions
-        columns: Sequence[int] = [*range(n), *range(_STATE, _STATE + NUM_SLOTS)]
+        columns: Sequence[int] = [*range(n), *range(PADDED, PADDED + NUM_SLOTS)]
         result, jacobian, outcome = self.derivatives(states, inputs, np.array(columns))
         return Linearisation(result[:m], outcome, jacobian[:m, :n], jacobian[:m, n:])
-
-
-def _padded(z: Array) -> Array:
-    """A section's state as the kernel takes it: dy/dt is 0 at apex."""
-    full = np.zeros(_STATE)
-    full[: len(z)] = z
-    return full
 
 
 def _checked(name: str, values: ArrayLike, size: int) -> Array:

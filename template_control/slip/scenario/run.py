@@ -21,8 +21,8 @@ from template_control.slip.control.controllers import (
     WalkToRun,
 )
 from template_control.slip.control.step_solver import StepSolution
-from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
+from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
+from template_control.slip.maps.section import VLO, section_of
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.scenario import Scenario, Segment
 
@@ -116,17 +116,16 @@ def simulate_scenario(
     duration = dict.fromkeys(_STRIDES, _FIRST_DURATION * np.sqrt(p.rest_length / p.gravity))
     profile = _Profile(scenario.segments, speed=scenario.segments[0].speed or 0.0)
     log = _Log()
-    u, y, v = scenario.start
-    state, now, at_apex, failure = np.array([0.0, y, u, v]), 0.0, False, ""
-    scratch = new_scratch()
+    state, now, section, failure = VLO.state(scenario.start), 0.0, VLO, ""
+    simulator = StrideSimulator(p)
     walking_target = np.array([profile.speed, *scenario.vlo])
-    log.sections.append((now, state[[2, 1, 3]]))
+    log.sections.append((now, VLO.of(state)))
     while profile.advance(now, float(state[2])) and len(log.strides) < _LIMIT:
         runs = profile.segment.gait == "run"
-        kind = ("r" if runs else "rw") if at_apex else ("wr" if runs else "w")
+        kind = ("wr" if runs else "w") if section is VLO else ("r" if runs else "rw")
         speed = profile.wanted(now if kind in ("wr", "rw") else now + duration[kind])
         target = np.array([speed, scenario.apex_height] if runs else [speed, *scenario.vlo])
-        z = state[[2, 1]] if at_apex else state[[2, 1, 3]]
+        z = section.of(state)
         begin = time.perf_counter()
         try:
             if kind == "wr":
@@ -141,9 +140,7 @@ def simulate_scenario(
         if kind == "w":
             walking_target = target
         toe = float(state[0])
-        stride = simulate_stride(
-            p, STRIDE_START[kind], state, solution.controls, (toe, toe), scratch=scratch
-        )
+        stride = simulator.run(STRIDE_START[kind], state, solution.controls, (toe, toe))
         _note(log, kind, stride, now, speed, target, solution, p.rest_length)
         now += stride.duration
         if kind in ("wr", "rw"):
@@ -152,13 +149,13 @@ def simulate_scenario(
             profile.strides += 1
         state = stride.state
         duration[kind] = stride.duration
-        log.sections.append((now, state[[2, 1, 3]]))
+        log.sections.append((now, VLO.of(state)))
         if progress is not None:
             progress(now)
         if not stride.completed:
             failure = f"stride {len(log.strides)} ({kind}): {stride.outcome.reason}"
             break
-        at_apex = AUTOMATON.sections(STRIDE_START[kind])[1] is Event.APEX
+        section = section_of(AUTOMATON.sections(STRIDE_START[kind])[1])
     return _record(scenario, log, failure)
 
 
