@@ -13,7 +13,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Decision, Planner
-from template_control.embedding.scaling import default_gait, paper_gait, template_for
+from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import (
     GaitError,
     ParameterError,

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from template_control.embedding.scaling import default_gait
+from template_control.embedding.robot_template import default_gait
 from template_control.robot.library import ROBOTS, load_robot
 from template_control.slip.automaton.vocabulary import Slot
 

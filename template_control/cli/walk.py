@@ -17,7 +17,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner
-from template_control.embedding.scaling import default_gait, paper_gait, template_for
+from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions

@@ -20,6 +20,7 @@ from template_control.embedding.phases import Clock
 from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.dynamics.taylor import ORDER
+from template_control.slip.maps.section import VLO
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ class TemplatePath:
         landings: next touchdown of the leg that is rear, and of the one that is front, at the
             start of the path.
         toes: x of the rear and the front toe at the start [m].
-        section_state: (3,) dx/dt, y, dy/dt where the first stride ends.
+        section_state: (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex.
         outcome: how it ends.
         duration: end of the last segment [s].
     """
@@ -114,7 +115,7 @@ def join(strides: Sequence[Stride]) -> TemplatePath:
         events=tuple(events),
         landings=_landings(meta, resets),
         toes=(float(meta[0, 3]), float(meta[0, 4])),
-        section_state=strides[0].state[[2, 1, 3]],
+        section_state=VLO.of(strides[0].state),
         outcome=strides[0].outcome,
         duration=offset,
     )

@@ -15,7 +15,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner
-from template_control.embedding.scaling import paper_gait, template_for
+from template_control.embedding.robot_template import paper_gait, template_for
 from template_control.paper.example_two_figures import (
     Liftoff,
     beginning,

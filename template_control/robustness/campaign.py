@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.scaling import default_gait
+from template_control.embedding.robot_template import default_gait
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.robot.library import load_robot
 from template_control.robot.planar_biped import PlanarBiped

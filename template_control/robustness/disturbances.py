@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.scaling import REFERENCE, Scale
+from template_control.slip.similarity import REFERENCE, Scale
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.planar_biped import PlanarBiped

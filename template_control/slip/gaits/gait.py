@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,38 @@ WALKING_SLOTS = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
 _SCAN = 120
 
 
+class Gait(Protocol):
+    """A stride that returns to its state: what planners settle on, whatever its kind."""
+
+    @property
+    def name(self) -> str:
+        """For tables and records."""
+
+    @property
+    def parameters(self) -> SlipParameters:
+        """The template."""
+
+    @property
+    def stride(self) -> str:
+        """Kind of stride, a key of an automaton's ``starts``."""
+
+    @property
+    def state(self) -> Array:
+        """(n,) dx/dt, y and, at VLO, dy/dt at its section [m/s, m, m/s]."""
+
+    @property
+    def controls(self) -> Array:
+        """(5,) touchdown angle [rad] and stiffnesses [N/m] by Slot."""
+
+    @property
+    def step_length(self) -> float:
+        """Distance covered [m]."""
+
+    @property
+    def step_duration(self) -> float:
+        """[s]."""
+
+
 @dataclass(frozen=True)
 class WalkingGait:
     """A passive symmetric walking gait.
@@ -44,6 +77,16 @@ class WalkingGait:
     controls: Array
     step_length: float
     step_duration: float
+
+    @property
+    def stride(self) -> str:
+        """Kind of stride: from VLO to VLO."""
+        return "w"
+
+    @property
+    def state(self) -> Array:
+        """(3,) :attr:`vlo`."""
+        return self.vlo
 
     @property
     def mean_speed(self) -> float:

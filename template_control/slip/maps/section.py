@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 PADDED = 3
 """Size of a padded state: dx/dt, y, dy/dt."""
 
+_DY = 3  # place of dy/dt in a state x, y, dx/dt, dy/dt
 _MIRROR = np.array([1.0, 1.0, -1.0])
 
 
@@ -104,6 +105,23 @@ class Section:
         dx/dt changes its sign twice, by the time and by the direction; dy/dt once.
         """
         return np.asarray(z, dtype=float) * _MIRROR[: self.dimension]
+
+    def calmer(self, z: Array, share: float, highest: float) -> Array:
+        """A state (n,) that the template can go on from more easily than from ``z``.
+
+        Args:
+            z: (n,) state at the section.
+            share: of dy/dt that is left.
+            highest: height that it may have at most [m].
+
+        At apex dy/dt is 0 already, and no leg limits the height: there it is ``z``.
+        """
+        calm = np.array(z, dtype=float)
+        for place, quantity in enumerate(self.order):
+            if quantity == _DY:
+                calm[1] = min(calm[1], highest)
+                calm[place] *= share
+        return calm
 
     def _spring(self, p: SlipParameters, y: Array, stiffness: ArrayLike | None) -> Array | float:
         """Energy of the stance leg, vertical and as long as the CoM is high [J]."""
