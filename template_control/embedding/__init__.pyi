@@ -1,0 +1,15 @@
+from .controller import EmbeddingController as EmbeddingController
+from .load import LoadOptions as LoadOptions
+from .momentum_trim import TrimOptions as TrimOptions
+from .options import EmbeddingOptions as EmbeddingOptions
+from .planners.lqr import LqrOptions as LqrOptions
+from .planners.lqr import LqrPlanner as LqrPlanner
+from .planners.modified import ModifiedOptions as ModifiedOptions
+from .planners.modified import ModifiedPlanner as ModifiedPlanner
+from .planners.planner import Decision as Decision
+from .planners.planner import Planner as Planner
+from .scaling import default_gait as default_gait
+from .scaling import paper_gait as paper_gait
+from .scaling import template_for as template_for
+from .step_planning import ReplanOptions as ReplanOptions
+from .swing_foot import SwingOptions as SwingOptions
