@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Column, Table
 
-from template_control.plant.quiet import stdout_to_stderr
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.maps.return_map import ReturnMap
@@ -145,8 +144,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Time sweeps of passive walking steps.")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     as_json = parser.parse_args().json
-    with stdout_to_stderr():  # PyBullet greets in every worker that imports the library
-        rows = measure()
+    rows = measure()
     about = {"cores": os.cpu_count(), "load": os.getloadavg()[0]}
     if as_json:
         print(json.dumps({**about, "rows": rows}, default=float))

@@ -11,11 +11,8 @@ from pathlib import Path
 import numpy as np
 
 import template_control as tc
-from template_control.slip.gaits.basin import margin, steps_to_fall, vlo_state
-from template_control.slip.gaits.branch import BranchPoint
-from template_control.slip.gaits.gait_branch import Family
-from template_control.slip.gaits.stability import Kind
-from template_control.view.stability_figures import basin_figure
+from template_control.slip import BranchPoint, Family, Kind, margin, steps_to_fall, vlo_state
+from template_control.view import basin_figure
 
 HEIGHT, STIFFNESS = 0.9818, 16.5e3
 HEIGHTS, ANGLES = np.linspace(0.945, 1.0, 81), np.linspace(-8.0, 8.0, 81)

@@ -68,7 +68,7 @@ def test_numbers_out_of_range_are_named(record, arguments, culprit):
     if culprit is None:  # a small run may be slow; a long one may not
         record = replace(record, time=100.0 * record.time)
         culprit = "more than 100000"
-    with pytest.raises(tc.ParameterError, match=culprit):
+    with pytest.raises(tc.errors.ParameterError, match=culprit):
         playback(record, **{"fps": 30.0, **arguments})
 
 
@@ -210,14 +210,14 @@ def test_a_mesh_is_shown_and_a_missing_one_is_named(record, tmp_path):
     assert len(visuals[0].geometry.faces) == 4
     assert tc.save_html(shown, tmp_path / "mesh.html", end=0.2).is_file()
     path.write_text("no mesh")
-    with pytest.raises(tc.RecordError, match=r"trunk\.stl.*put it back"):
+    with pytest.raises(tc.errors.RecordError, match=r"trunk\.stl.*put it back"):
         load_visuals(shown)
     path.unlink()
-    with pytest.raises(tc.RecordError, match=r"mesh .*trunk\.stl is missing: put it back"):
+    with pytest.raises(tc.errors.RecordError, match=r"mesh .*trunk\.stl is missing: put it back"):
         tc.save_html(shown, tmp_path / "mesh.html")
 
 
 def test_a_run_without_urdf_is_refused(record, tmp_path):
     old = replace(record, metadata={k: v for k, v in record.metadata.items() if k != "urdf"})
-    with pytest.raises(tc.RecordError, match="no URDF"):
+    with pytest.raises(tc.errors.RecordError, match="no URDF"):
         tc.save_html(old, tmp_path / "a.html")

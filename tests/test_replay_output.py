@@ -14,6 +14,7 @@ from PIL import Image
 
 import template_control as tc
 from template_control.cli.main import main
+from template_control.errors import RecordError
 from template_control.view.replay.film import write_film
 from template_control.view.replay.playback import playback
 
@@ -78,14 +79,14 @@ def test_video_has_its_frames(record, run_file, tmp_path):
 
 def test_video_without_ffmpeg_is_one_line(record, tmp_path, monkeypatch):
     monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
-    with pytest.raises(tc.RecordError, match=r"no ffmpeg here; install it, or write a \.gif"):
+    with pytest.raises(RecordError, match=r"no ffmpeg here; install it, or write a \.gif"):
         tc.save_film(record, tmp_path / "walk.mp4")
     assert not (tmp_path / "walk.mp4").exists()
 
 
 def test_a_gif_too_long_is_refused(record, tmp_path):
     frames = playback(record, fps=120.0, speed=0.05)
-    with pytest.raises(tc.RecordError, match="shorter part"):
+    with pytest.raises(RecordError, match="shorter part"):
         write_film(tmp_path / "walk.gif", frames, 120.0)
 
 

@@ -85,7 +85,7 @@ def commands():
 def test_commands_of_the_documentation_are_understood(line):
     words = shlex.split(line)
     assert words[0] == "template-control"
-    assert build_parser().parse_args(words[1:]).command == "robustness"
+    assert build_parser(words[1:]).parse_args(words[1:]).command == "robustness"
 
 
 def test_the_documentation_has_its_pictures_and_a_snippet_that_runs(capfd):

@@ -96,7 +96,7 @@ def test_every_explained_message_is_provoked_here():
 @pytest.mark.parametrize("message", MISTAKES)
 def test_a_mistake_gives_its_message(message, tmp_path):
     pattern = ".*".join(re.escape(part) for part in message.split("…"))
-    kind = tc.GaitError if "gait" in message else tc.RobotError
+    kind = tc.errors.GaitError if "gait" in message else tc.errors.RobotError
     with pytest.raises(kind, match=pattern):
         MISTAKES[message](tmp_path)
 

@@ -26,18 +26,14 @@ _SUFFIXES = (".png", ".svg", ".pdf")
 _PIPE_WIDTH = 140  # columns where there is no terminal to ask
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "automaton",
-        help="show the hybrid automaton that simulator, planners and robot controller read",
-        description=(
-            "Print the nodes of the hybrid automaton by gait, with leg stiffnesses, guards,"
-            " successors, resets and ways to fail, and draw it (the paper's Fig. 2). Exit status:"
-            " 0, 2 for bad input."
-        ),
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = (
+        "Print the nodes of the hybrid automaton by gait, with leg stiffnesses, guards,"
+        " successors, resets and ways to fail, and draw it (the paper's Fig. 2). Exit status:"
+        " 0, 2 for bad input."
     )
+    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument(
         "--output",
         type=Path,
@@ -51,7 +47,6 @@ def add_parser(commands: Any) -> None:
         help="print the automaton as one JSON object, and nothing else, on stdout",
     )
     parser.add_argument("--no-figure", action="store_true", help="do not draw the figure")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

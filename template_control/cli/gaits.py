@@ -80,21 +80,17 @@ _MAPS = {kind.name.lower(): kind for kind in (MapKind.EXACT, MapKind.IMPROVED, M
 _TABLE_ROWS = 14
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "gaits",
-        help="follow a branch of periodic gaits and tell its stability",
-        description=(
-            "Follow a branch of passive periodic gaits of the template by pseudo-arclength, past"
-            " its folds: two quantities are held fixed, the others vary. Quantities:"
-            f" {', '.join(QUANTITIES)} (J, degrees, N/m, m, m/s at VLO or apex). Without options:"
-            " the walking gaits of Section IV-D. With --controlled: where the paper's controller"
-            " settles as its target is moved; one quantity of the target is held fixed, --over is"
-            " moved, and the gait found near --start is followed."
-        ),
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = (
+        "Follow a branch of passive periodic gaits of the template by pseudo-arclength, past"
+        " its folds: two quantities are held fixed, the others vary. Quantities:"
+        f" {', '.join(QUANTITIES)} (J, degrees, N/m, m, m/s at VLO or apex). Without options:"
+        " the walking gaits of Section IV-D. With --controlled: where the paper's controller"
+        " settles as its target is moved; one quantity of the target is held fixed, --over is"
+        " moved, and the gait found near --start is followed."
     )
+    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument("--gait", choices=tuple(_STRIDES), default="walk")
     parser.add_argument(
         "--fix",
@@ -125,7 +121,6 @@ def add_parser(commands: Any) -> None:
         "--json", action="store_true", help="print the branch as JSON, and nothing else, on stdout"
     )
     parser.add_argument("--no-figures", action="store_true", help="do not draw the figure")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

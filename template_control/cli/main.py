@@ -1,38 +1,86 @@
-"""Entry point of ``template-control``: one module a command."""
+"""Entry point of ``template-control``: one module a command, imported when it is asked for."""
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 from collections.abc import Sequence
+from typing import NamedTuple
 
-from template_control.cli import (
-    automaton,
-    gaits,
-    plots,
-    replay,
-    robots,
-    robustness,
-    slip,
-    walk,
-)
 from template_control.cli.output import INTERRUPTED
 from template_control.errors import TemplateControlError
-from template_control.paper import command as reproduce
 
-_COMMANDS = (walk, robots, replay, plots, robustness, slip, gaits, automaton, reproduce)
+
+class _Command(NamedTuple):
+    """A command of the command line.
+
+    Attributes:
+        module: where its ``add_options(parser)`` and its ``run(options)`` are.
+        about: one line.
+    """
+
+    module: str
+    about: str
+
+
+_COMMANDS = {
+    "walk": _Command(
+        "template_control.cli.walk",
+        "walk a robot that follows the SLIP template, headless, and report",
+    ),
+    "robots": _Command(
+        "template_control.cli.robots",
+        "list the shipped robots, with the template scaled to each",
+    ),
+    "replay": _Command(
+        "template_control.cli.replay",
+        "show a recorded run in the browser, or write it as a page or a film",
+    ),
+    "plots": _Command("template_control.cli.plots", "draw the figures of a recorded run"),
+    "robustness": _Command(
+        "template_control.cli.robustness",
+        "raise disturbances until a robot's walk breaks, and tell how much it takes",
+    ),
+    "slip": _Command(
+        "template_control.cli.slip",
+        "simulate the SLIP template through a scenario of gaits and speeds",
+    ),
+    "gaits": _Command(
+        "template_control.cli.gaits",
+        "follow a branch of periodic gaits and tell its stability",
+    ),
+    "automaton": _Command(
+        "template_control.cli.automaton",
+        "show the hybrid automaton that simulator, planners and robot controller read",
+    ),
+    "reproduce": _Command(
+        "template_control.paper.command",
+        "reproduce a table or figure of the paper, ours beside the paper's",
+    ),
+}
 _USER_ERROR = 2
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser for ``arguments``.
+
+    It lists every command, but has the options of the one command that ``arguments`` name:
+    importing them all would take seconds, even for ``--help``.
+    """
     parser = argparse.ArgumentParser(
         prog="template-control",
         description="Bipedal SLIP templates, their control, and robots that follow them.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in _COMMANDS:
-        module.add_parser(commands)
+    # Before the command there are only options without a value.
+    wanted = next((word for word in arguments if not word.startswith("-")), None)
+    for name, command in _COMMANDS.items():
+        sub_parser = commands.add_parser(name, help=command.about)
+        if name == wanted:
+            module = importlib.import_module(command.module)
+            module.add_options(sub_parser)
+            sub_parser.set_defaults(run=module.run)
     return parser
 
 
@@ -41,8 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     A user's mistake is told in one line, status 2; Ctrl-C is status 130.
     """
-    options = build_parser().parse_args(arguments)
+    arguments = sys.argv[1:] if arguments is None else arguments
     try:
+        options = build_parser(arguments).parse_args(arguments)
         return int(options.run(options))
     except TemplateControlError as error:
         print(f"template-control: {error}", file=sys.stderr)

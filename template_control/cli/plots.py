@@ -4,35 +4,29 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
+from template_control import view
 from template_control.run.record import Record
 from template_control.storage import writable
-from template_control.view.figures import save_figures
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "plots",
-        help="draw the figures of a recorded run",
-        description=(
-            "Draw a run: stick diagram, centre of mass, torques, ground forces, phase portrait,"
-            " tracking errors, energies, VLO states. Works on fallen and interrupted runs too."
-            " Exit status: 0, 2 for bad input."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = (
+        "Draw a run: stick diagram, centre of mass, torques, ground forces, phase portrait,"
+        " tracking errors, energies, VLO states. Works on fallen and interrupted runs too."
+        " Exit status: 0, 2 for bad input."
     )
     parser.add_argument("run_file", type=Path, metavar="RUN", help="run.npz of a walk")
     parser.add_argument(
         "--output", type=Path, metavar="DIR", help="folder for the figures; by default the run's"
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Draw and name the files."""
     record = Record.load(options.run_file)
     folder = options.run_file.parent if options.output is None else options.output
-    for path in save_figures(record, writable(folder)):
+    for path in view.save_figures(record, writable(folder)):
         print(path)
     return 0

@@ -14,16 +14,12 @@ from template_control.run.record import Record
 from template_control.view.replay.replay import GIF_FPS, GIF_SECONDS, replay, save_film, save_html
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "replay",
-        help="show a recorded run in the browser, or write it as a page or a film",
-        description=(
-            "Replay a run: robot, centre of mass and its trail, the template's loaded legs,"
-            " ground forces and footholds. Without --html, --gif or --video a server shows it in"
-            " the browser until Ctrl-C. Exit status: 0, 2 for bad input."
-        ),
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = (
+        "Replay a run: robot, centre of mass and its trail, the template's loaded legs,"
+        " ground forces and footholds. Without --html, --gif or --video a server shows it in"
+        " the browser until Ctrl-C. Exit status: 0, 2 for bad input."
     )
     parser.add_argument("run_file", type=Path, metavar="RUN", help="run.npz of a walk")
     parser.add_argument(
@@ -52,7 +48,6 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--no-browser", action="store_true", help="print the server's address, open no browser"
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -15,17 +15,12 @@ from template_control.robot.library import ROBOTS, load_robot
 from template_control.slip.automaton.vocabulary import Slot
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "robots",
-        help="list the shipped robots, with the template scaled to each",
-        description="The shipped robots: mass, legs, limits, scaled template and default gait.",
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = "The shipped robots: mass, legs, limits, scaled template and default gait."
     parser.add_argument(
         "--json", action="store_true", help="print the list as JSON, and nothing else, on stdout"
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

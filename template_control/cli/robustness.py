@@ -36,22 +36,18 @@ _COLUMNS = (
 _MOST_WORKERS = 1000
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "robustness",
-        help="raise disturbances until a robot's walk breaks, and tell how much it takes",
-        description=(
-            "Raise pushes, unseen steps of the ground, friction, mass and torque errors, sensor"
-            " noise and delay level by level, with several trials each, until the walk breaks."
-            f" A trial succeeds if the robot does not fall within {AFTER} more steps and, after"
-            " a push or a step, its mean speed and VLO height over the last 5 of them are"
-            f" within {100 * SETTLED:g} %% of its gait's. Ends with a table and a figure. Ctrl-C"
-            " and the same command again go on where it was. Exit status: 0, 2 for bad input"
-            " or a robot that falls undisturbed, 130 after Ctrl-C."
-        ),
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = (
+        "Raise pushes, unseen steps of the ground, friction, mass and torque errors, sensor"
+        " noise and delay level by level, with several trials each, until the walk breaks."
+        f" A trial succeeds if the robot does not fall within {AFTER} more steps and, after"
+        " a push or a step, its mean speed and VLO height over the last 5 of them are"
+        f" within {100 * SETTLED:g} %% of its gait's. Ends with a table and a figure. Ctrl-C"
+        " and the same command again go on where it was. Exit status: 0, 2 for bad input"
+        " or a robot that falls undisturbed, 130 after Ctrl-C."
     )
+    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot(parser)
     parser.add_argument(
         "--disturbance",
@@ -82,7 +78,6 @@ def add_parser(commands: Any) -> None:
     printed.add_argument(
         "--markdown", action="store_true", help="print the table as Markdown on stdout"
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -13,29 +13,25 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from template_control import view
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import writable
-from template_control.view.scenario_figures import save_scenario_figures
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}
 _NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "slip",
-        help="simulate the SLIP template through a scenario of gaits and speeds",
-        description=(
-            "Simulate the bipedal SLIP through a scenario (TOML): a speed profile with gait"
-            " switches. Ends with a table and a folder with the run and figures. Exit status:"
-            " 0, 1 if a stride failed, 2 for bad input."
-        ),
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = (
+        "Simulate the bipedal SLIP through a scenario (TOML): a speed profile with gait"
+        " switches. Ends with a table and a folder with the run and figures. Exit status:"
+        " 0, 1 if a stride failed, 2 for bad input."
     )
+    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument(
         "scenario", type=Path, help="the scenario, such as examples/example_one.toml"
     )
@@ -51,7 +47,6 @@ def add_parser(commands: Any) -> None:
         "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
     )
     parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -64,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
         record = simulate_scenario(scenario, lambda now: status.update(f"simulating, {now:.1f} s"))
     path = record.save(folder / "run.npz")
     if not options.no_figures:
-        save_scenario_figures(record, folder)
+        view.save_scenario_figures(record, folder)
     figures = {**summarise_scenario(record), "record": str(path)}
     if options.json:
         print(json.dumps(figures))

@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from template_control import view
 from template_control.cli.output import INTERRUPTED, progress_bar
 from template_control.cli.robot_options import add_robot_options, robot_from
 from template_control.embedding.options import EmbeddingOptions
@@ -29,25 +30,20 @@ from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.gaits.gait import WalkingGait, gait_for_speed
 from template_control.storage import writable
-from template_control.view.figures import save_figures
 
 _CONE_MARGIN = 0.9  # the controller trusts this share of the friction
 _LONG = 200  # steps beyond which samples are thinned
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "walk",
-        help="walk a robot that follows the SLIP template, headless, and report",
-        description=(
-            "Walk a robot in PyBullet or on an ideal plant: a planner on the SLIP template chooses"
-            " each step, a whole-body QP makes the robot follow it. Ends with a table, and a folder"
-            " with the run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input,"
-            " 130 after Ctrl-C (what was walked by then is saved)."
-        ),
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = (
+        "Walk a robot in PyBullet or on an ideal plant: a planner on the SLIP template chooses"
+        " each step, a whole-body QP makes the robot follow it. Ends with a table, and a folder"
+        " with the run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input,"
+        " 130 after Ctrl-C (what was walked by then is saved)."
     )
+    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot_options(parser)
     parser.add_argument("--steps", type=int, default=50, help="steps to walk, VLO to VLO")
     parser.add_argument(
@@ -115,7 +111,6 @@ def add_parser(commands: Any) -> None:
         "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
     )
     parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -145,7 +140,7 @@ def run(options: argparse.Namespace) -> int:
             record = simulate(robot, planner, simulation, advance)
         path = record.save(folder / "run.npz")
         if not options.no_figures:
-            save_figures(record, folder)
+            view.save_figures(record, folder)
     figures = summarise(record, str(path))
     if options.json:
         print(json.dumps(figures))

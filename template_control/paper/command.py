@@ -5,28 +5,22 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 from rich.console import Console
 from rich.table import Table
 
 from template_control.errors import ParameterError
-from template_control.paper import REPRODUCTIONS
-from template_control.paper.reproduction import Reproduction
+from template_control.paper.reproduction import REPRODUCTIONS, Reproduction
 from template_control.storage import writable
 
 _DPI = 110
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command's options."""
-    parser = commands.add_parser(
-        "reproduce",
-        help="reproduce a table or figure of the paper, ours beside the paper's",
-        description="Compute a table or figure of the paper again and print ours beside it.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = "Compute a table or figure of the paper again and print ours beside it."
+    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(REPRODUCTIONS)}")
     parser.add_argument(
         "--output", type=Path, default=Path("runs/reproduce"), help="folder for the figures"
@@ -35,7 +29,6 @@ def add_parser(commands: Any) -> None:
         "--json", action="store_true", help="print the numbers as JSON, and nothing else, on stdout"
     )
     parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

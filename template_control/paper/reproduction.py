@@ -1,11 +1,15 @@
-"""What a reproduction of a table or figure yields."""
+"""What a reproduction of a table or figure yields, and which ones there are."""
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from matplotlib.figure import Figure
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -27,3 +31,28 @@ class Reproduction:
     data: dict[str, Any]
     notes: tuple[str, ...] = ()
     figures: dict[str, Figure] = field(default_factory=dict)
+
+
+def _reproduce(module: str, name: str) -> Reproduction:
+    """Call function ``name`` of ``module``, imported only now: the list itself costs nothing."""
+    found: Reproduction = getattr(importlib.import_module(f"{__package__}.{module}"), name)()
+    return found
+
+
+_MODULES = {
+    "table3": "map_errors",
+    "fig5": "map_errors",
+    "table4": "transitions",
+    "fig6": "transitions",
+    "fig7": "transitions",
+    "fig8": "stability",
+    "fig9": "stability",
+    "fig10": "example_one",
+    "fig12": "example_two",
+    "fig13": "example_two",
+}
+
+REPRODUCTIONS: dict[str, Callable[[], Reproduction]] = {
+    name: partial(_reproduce, module, name) for name, module in _MODULES.items()
+}
+"""By the name ``template-control reproduce`` knows them by."""

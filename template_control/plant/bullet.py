@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
 from template_control.plant.ground import GroundStep
-from template_control.plant.quiet import stdout_discarded
+from template_control.plant.quiet import silenced
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 
-with stdout_discarded():  # PyBullet announces its build time on standard output
+with silenced():  # PyBullet announces its build time on standard output or stderr
     import pybullet
 
 Array = NDArray[np.float64]

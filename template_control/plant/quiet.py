@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import os
+import shutil
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -14,32 +16,44 @@ _STDOUT, _STDERR = 1, 2
 @contextmanager
 def stdout_to_stderr() -> Iterator[None]:
     """Within it, everything written to standard output, by C code too, goes to stderr."""
-    with _redirected(_STDERR):
+    with _redirected((_STDOUT,), _STDERR):
         yield
 
 
 @contextmanager
-def stdout_discarded() -> Iterator[None]:
-    """Within it, everything written to standard output, by C code too, is lost."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        with _redirected(nowhere):
-            yield
-    finally:
-        os.close(nowhere)
+def silenced() -> Iterator[None]:
+    """Within it, nothing is written to standard output and stderr, by C code neither.
+
+    If an error leaves it, what was held back comes on stderr after all: it may tell why.
+    """
+    with tempfile.TemporaryFile() as held:
+        try:
+            with _redirected((_STDOUT, _STDERR), held.fileno()):
+                yield
+        except Exception:
+            held.seek(0)
+            with os.fdopen(os.dup(_STDERR), "wb") as stderr:
+                shutil.copyfileobj(held, stderr)
+            raise
 
 
 @contextmanager
-def _redirected(descriptor: int) -> Iterator[None]:
+def _redirected(descriptors: tuple[int, ...], to: int) -> Iterator[None]:
     libc = ctypes.CDLL(None)
-    sys.stdout.flush()
-    libc.fflush(None)
-    saved = os.dup(_STDOUT)
-    os.dup2(descriptor, _STDOUT)
+    _flush(libc)
+    saved = [os.dup(descriptor) for descriptor in descriptors]
+    for descriptor in descriptors:
+        os.dup2(to, descriptor)
     try:
         yield
     finally:
-        sys.stdout.flush()
-        libc.fflush(None)  # C's buffer still holds what was printed meanwhile
-        os.dup2(saved, _STDOUT)
-        os.close(saved)
+        _flush(libc)  # the buffers still hold what was printed meanwhile
+        for descriptor, copy in zip(descriptors, saved, strict=True):
+            os.dup2(copy, descriptor)
+            os.close(copy)
+
+
+def _flush(libc: ctypes.CDLL) -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    libc.fflush(None)

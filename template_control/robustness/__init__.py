@@ -1,0 +1,5 @@
+"""How much a robot's walk takes until it breaks."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,1 @@
+"""Planners: which step of the template the robot takes next."""

@@ -1,0 +1,1 @@
+"""One stride of the template: its phases' motion and where their guards fire."""

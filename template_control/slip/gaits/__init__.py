@@ -1,0 +1,1 @@
+"""Periodic gaits: found, followed along a branch, their stability and basins."""

@@ -1,0 +1,1 @@
+"""Return maps from section to section, and their derivatives."""

@@ -1,0 +1,1 @@
+"""Scenarios: a speed profile with gait switches that the template goes through."""

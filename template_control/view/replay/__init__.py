@@ -1,0 +1,1 @@
+"""Replays of a recorded run: in the browser, as a page, as a film."""

@@ -1,0 +1,2 @@
+from .reproduction import REPRODUCTIONS as REPRODUCTIONS
+from .reproduction import Reproduction as Reproduction

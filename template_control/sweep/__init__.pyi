@@ -1,0 +1,6 @@
+from .executor import worker_processes as worker_processes
+from .sweep import SweepResult as SweepResult
+from .sweep import grid as grid
+from .sweep import item_seed as item_seed
+from .sweep import sample as sample
+from .sweep import sweep as sweep

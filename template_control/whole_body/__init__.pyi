@@ -1,0 +1,12 @@
+from .com_task import ComTask as ComTask
+from .foot_task import FootTask as FootTask
+from .momentum_task import MomentumTask as MomentumTask
+from .posture_task import PostureTask as PostureTask
+from .solver import QpOptions as QpOptions
+from .solver import Solution as Solution
+from .solver import Stance as Stance
+from .solver import WholeBodyQp as WholeBodyQp
+from .task import Rows as Rows
+from .task import Task as Task
+from .task import TaskStack as TaskStack
+from .wanted import Wanted as Wanted
