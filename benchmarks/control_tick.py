@@ -53,8 +53,8 @@ def measure(steps: int) -> dict[str, np.ndarray[Any, Any]]:
     forces, dt, warm = np.zeros((2, 2)), 1e-3, 0
     with BulletPlant(robot, PlantOptions(time_step=dt)) as plant:
         plant.reset(q, v)
-        while len(controller.steps) <= steps + _WARM_UP:
-            if len(controller.steps) <= _WARM_UP:
+        while len(controller.reports) <= steps + _WARM_UP:
+            if len(controller.reports) <= _WARM_UP:
                 warm = len(ticks)
             plant.read(q, v)
             plant.contact_forces(forces)

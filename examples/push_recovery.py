@@ -15,6 +15,6 @@ options = tc.SimulationOptions(steps=25, pushes=(tc.Push(IMPULSE, step=8, phase=
 record = tc.simulate(robot, tc.LqrPlanner(gait), options)
 
 print(f"gait: {gait.vlo[0]:.3f} m/s at VLO; push of {IMPULSE:g} N s in step 8")
-for step, (speed, height, vertical) in enumerate(record.vlo_state):
+for step, (speed, height, vertical) in enumerate(record.section_state):
     print(f"step {step:2d}: {speed:.3f} m/s  {height:.4f} m  {vertical:+.3f} m/s")
 print("fell: " + record.metadata["fall_reason"] if record.fell else "recovered")

@@ -9,13 +9,14 @@ import pytest
 
 from template_control.cli.main import main
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.scaling import Scale, default_gait, paper_gait, template_for
+from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import RobotError
 from template_control.robot.five_link import FiveLink, Link
 from template_control.robot.library import ROBOTS, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.simulation import SimulationOptions, simulate
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
 
 BOLT_FEET = ("FL_FOOT", "FR_FOOT")
 BOLT_JOINTS = ("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE")
@@ -62,8 +63,10 @@ def check(record, gait, steps):
     assert record.metadata["summary"]["qp_failures"] == 0
     if steps >= 20:
         scale = Scale.of(gait.parameters)
-        error = np.abs(record.vlo_state[-5:].mean(axis=0) - gait.vlo)
-        assert np.all(error < scale.state((0.03, 0.01, 0.05)))
+        error = np.abs(record.section_state[-5:].mean(axis=0) - gait.vlo)
+        assert np.all(
+            error < np.array([0.03 * scale.speed, 0.01 * scale.length, 0.05 * scale.speed])
+        )
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -118,9 +121,9 @@ def test_similar_robots_walk_similarly(tmp_path):
     (large, gait), (small, small_gait) = records
     ratio = Scale.of(small_gait.parameters).length / Scale.of(gait.parameters).length
     assert ratio == pytest.approx(0.5)
-    scaled = small.vlo_state / [ratio**0.5, ratio, ratio**0.5]
+    scaled = small.section_state / [ratio**0.5, ratio, ratio**0.5]
     # The physics step is not scaled, so not quite.
-    np.testing.assert_allclose(scaled, large.vlo_state, atol=0.03)
+    np.testing.assert_allclose(scaled, large.section_state, atol=0.03)
 
 
 def test_template_scales_with_the_robot():
@@ -221,7 +224,7 @@ def test_a_joint_that_turns_the_other_way_walks_the_same(tmp_path):
     tree.write(path)
     turned, _ = walk(PlanarBiped.from_urdf(path), 3)
     usual, _ = walk(load_robot("five-link"), 3)
-    np.testing.assert_allclose(turned.vlo_state, usual.vlo_state, atol=1e-6)
+    np.testing.assert_allclose(turned.section_state, usual.section_state, atol=1e-6)
 
 
 def test_links_without_mass_are_refused():

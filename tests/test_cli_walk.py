@@ -110,7 +110,7 @@ def test_a_seed_moves_the_start(tmp_path):
     for seed in ("1", "2"):
         out = str(tmp_path / seed)
         assert main(["walk", "--steps", "1", "--seed", seed, "--no-figures", "--output", out]) == 0
-    starts = [Record.load(tmp_path / s / "run.npz").vlo_state[0] for s in ("1", "2")]
+    starts = [Record.load(tmp_path / s / "run.npz").section_state[0] for s in ("1", "2")]
     assert not np.allclose(starts[0], starts[1])
 
 

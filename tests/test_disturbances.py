@@ -42,7 +42,7 @@ def test_rays_meet_the_ground_where_it_is_said_to_be(robot, height, edge):
 def test_a_step_nobody_told_of_moves_the_feet(robot, gait, height):
     step, record = on_step(robot, gait, height)
     assert not record.fell
-    at = np.searchsorted(record.time, record.vlo_time)[1:]
+    at = np.searchsorted(record.time, record.section_time)[1:]
     foot = record.foot[at, record.rear[at]]
     beyond = foot[:, 0] > step.x
     # The first foot beyond the edge is about the fifth.
@@ -69,7 +69,7 @@ def test_an_edge_out_of_reach_changes_nothing(robot, gait):
     np.testing.assert_array_equal(ahead.q, flat.q)
     # Before a step down the ground is another kind of body, which carries as well.
     above = walk(robot, gait, steps=4, plant=PlantOptions(ground_step=GroundStep(-0.05, 50.0)))
-    np.testing.assert_allclose(above.vlo_state, flat.vlo_state, atol=1e-3)
+    np.testing.assert_allclose(above.section_state, flat.section_state, atol=1e-3)
 
 
 def test_a_wall_pushes_sideways(robot):

@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.guards import Sensed, fired
+from template_control.embedding.guards import GuardOptions, RobotGuards
 from template_control.embedding.load import LoadEstimate, LoadOptions
-from template_control.embedding.plan import at_phase, chain, sample
+from template_control.embedding.phases import Clock
 from template_control.embedding.references import leg_forces
+from template_control.embedding.sensing import Sensed
+from template_control.embedding.template_path import LOCATE, at_direction, join, sample
 from template_control.errors import GaitError, RobotError
 from template_control.robot.start import state_at_vlo
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
@@ -20,22 +22,54 @@ from template_control.slip.parameters import SlipParameters
 P = SlipParameters()
 
 
-def test_chained_plan_is_continuous_and_knows_its_events(gait):
+def test_joined_path_is_continuous_and_knows_its_events(gait):
     u = gait.controls
     first = simulate_stride(
         P, STRIDE_START["w"], [2.0, gait.vlo[1], gait.vlo[0], 0.0], u, (2.0, 0.0)
     )
     second = simulate_stride(P, first.node, first.state, u, tuple(first.toes))
-    plan = chain([first, second])
-    times = np.linspace(0.0, plan.duration - 1e-6, 400)
+    path = join([first, second])
+    times = np.linspace(0.0, path.duration - 1e-6, 400)
     states = np.empty((400, 6))
     for t, row in zip(times, states, strict=True):
-        sample(plan.cx, plan.cy, plan.meta, t, row)
+        sample(path.curve, 0.0, t, row)
     assert np.max(np.abs(np.diff(states[:, :2], axis=0))) < 0.01
-    assert plan.foothold == pytest.approx(2.0 + gait.step_length, abs=1e-6)
-    assert plan.touchdown < plan.liftoff < plan.vlo
-    assert plan.vlo == pytest.approx(gait.step_duration, abs=1e-9)
-    np.testing.assert_allclose(plan.vlo_state, gait.vlo, atol=1e-7)
+    touchdown, liftoff = path.due(Event.TOUCHDOWN), path.due(Event.REAR_LIFTOFF)
+    assert touchdown < liftoff < path.due(Event.VLO)
+    assert path.due(Event.VLO) == pytest.approx(gait.step_duration, abs=1e-9)
+    np.testing.assert_allclose(path.section_state, gait.vlo, atol=1e-7)
+    # The front leg lands first; then the one that is the rear leg's at the start.
+    rear, front = path.landings
+    assert front.x == pytest.approx(2.0 + gait.step_length, abs=1e-6)
+    assert rear.x == pytest.approx(2.0 + 2.0 * gait.step_length, abs=1e-6)
+    assert front.time == touchdown
+    assert rear.time == pytest.approx(touchdown + gait.step_duration, abs=1e-9)
+
+
+def test_events_that_are_over_are_not_due_again(gait):
+    stride = simulate_stride(
+        P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], gait.controls
+    )
+    path = join([stride, stride])
+    first = path.due(Event.TOUCHDOWN)
+    passed = path.after(Event.TOUCHDOWN, 0)
+    assert path.due(Event.TOUCHDOWN, passed) == pytest.approx(first + stride.duration)
+    passed = path.after(Event.TOUCHDOWN, passed)
+    assert path.due(Event.TOUCHDOWN, passed) == np.inf
+    assert path.after(Event.TOUCHDOWN, passed) == passed
+
+
+def test_running_path_knows_where_either_foot_lands():
+    u = controls(np.radians(68.0), 20e3, 20e3)
+    first = simulate_stride(P, STRIDE_START["r"], [0.0, 1.0, 3.0, 0.0], u)
+    second = simulate_stride(P, STRIDE_START["r"], first.state, u)
+    path = join([first, second])
+    rear, front = path.landings
+    down = [e for stride in (first, second) for e in stride.events if e.event is Event.TOUCHDOWN]
+    reach = P.rest_length * np.cos(u[0])
+    assert rear.x == pytest.approx(down[0].state[0] + reach)
+    assert front.x == pytest.approx(down[1].state[0] + reach)
+    assert rear.time < path.due(Event.APEX) < front.time
 
 
 @given(time=st.floats(0.0, 0.32), scale=st.floats(0.97, 1.03))
@@ -43,15 +77,18 @@ def test_chained_plan_is_continuous_and_knows_its_events(gait):
 def test_phase_look_up_inverts_the_path(time, scale):
     gait = gait_for_speed(P, 1.2)
     u = gait.controls
-    plan = chain([simulate_stride(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)])
+    curve = join(
+        [simulate_stride(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)]
+    ).curve
     state, found = np.empty(6), np.empty(6)
-    sample(plan.cx, plan.cy, plan.meta, time, state)
+    sample(curve, 0.0, time, state)
     # A robot on the same ray from the foot, a little nearer or farther, is in the same phase.
-    t, _ = at_phase(
-        plan.cx, plan.cy, plan.meta, 0.0, scale * state[0], scale * state[1], 0.2, found
-    )
+    t, _ = at_direction(curve, 0.0, scale * state[0], scale * state[1], 0.2, found)
     assert t == pytest.approx(time, abs=1e-8)
     np.testing.assert_allclose(found, state, atol=1e-7)
+    # By time, wherever the robot is.
+    assert LOCATE[Clock.TIME](curve, 0.0, -5.0, 0.1, time, found)[0] == time
+    np.testing.assert_allclose(found, state, atol=1e-12)
 
 
 def test_template_forces_accelerate_the_template(gait):
@@ -67,17 +104,24 @@ def test_template_forces_accelerate_the_template(gait):
 
 
 def test_guards_feel_what_the_template_sees():
-    sensed = Sensed(np.array([0.0, 0.97, 1.1, 0.0]), np.array([0.0, 0.6]), True, 1.0)
+    sensed = Sensed(
+        np.array([0.0, 0.97, 1.1, 0.0]),
+        np.array([0.0, 0.6]),
+        np.array([True, True]),
+        np.array([np.inf, 1.0]),
+    )
+    guards = RobotGuards(P, GuardOptions())
 
-    def happened(event, phase=0.0, liftoff=np.inf):
-        return fired(event, sensed, phase, liftoff, 1.0, 9.81)
+    def happened(event, due=np.inf):
+        edges = [e for node in AUTOMATON.nodes for e in node.edges if e.event is event]
+        return guards.fired(edges[0], sensed, due)
 
     assert happened(Event.VLO)
     assert happened(Event.TOUCHDOWN)
     assert not happened(Event.VIRTUAL_BOTTOM)
     assert not happened(Event.REAR_LIFTOFF)
-    assert happened(Event.REAR_LIFTOFF, phase=0.3, liftoff=0.29)
-    sensed.swing_time = 0.01
+    assert happened(Event.REAR_LIFTOFF, due=-0.01)
+    sensed.swing_time[1] = 0.01
     assert not happened(Event.TOUCHDOWN), "the foot that just left may still scrape"
     sensed.state[0] = -0.01
     assert not happened(Event.VLO)
@@ -85,23 +129,34 @@ def test_guards_feel_what_the_template_sees():
     assert happened(Event.REAR_LIFTOFF), "an overstretched leg is let go without a plan"
 
 
+def test_touchdown_is_the_placed_leg_s():
+    guards = RobotGuards(P, GuardOptions())
+    walking = AUTOMATON.start("w").edge(Event.TOUCHDOWN)
+    running = AUTOMATON.start("r").edge(Event.TOUCHDOWN)
+    for leg, edge, other in ((0, running, walking), (1, walking, running)):
+        contact = np.array([leg == 0, leg == 1])
+        sensed = Sensed(contact=contact)
+        assert guards.fired(edge, sensed, np.inf)
+        assert not guards.fired(other, sensed, np.inf)
+
+
 def test_load_learns_a_constant_and_ignores_the_gait():
     load = LoadEstimate(LoadOptions(), 9.81)
-    load.end_step(True)
+    load.end_stride(True)
     for _ in range(10):
         load.observe(0.15, 0.5)  # within the dead zone
-        load.end_step(True)
+        load.end_stride(True)
         load.observe(5.0, 0.5)  # a push
-        load.end_step(False)
+        load.end_stride(False)
     assert load.factor == 1.0
     for _ in range(20):
         load.observe(9.81 * (1.1 - load.factor), 0.5)
-        load.end_step(True)
+        load.end_stride(True)
     # At the edge of the dead zone, less what is forgotten of it there.
     assert 1.07 < load.factor < 1.09
     for _ in range(60):
         load.observe(0.0, 0.5)
-        load.end_step(True)
+        load.end_stride(True)
     assert load.factor == pytest.approx(1.0, abs=1e-3)
 
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.guards import Sensed, fired
+from template_control.embedding.guards import GuardOptions, RobotGuards
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.sensing import Sensed
 from template_control.paper.example_two import (
     EARLIER,
     PLANNERS,
@@ -20,6 +21,7 @@ from template_control.paper.example_two_figures import beginning, liftoff
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
 from template_control.run.simulation import SimulationOptions, simulate
+from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import gait_from_energy
 from template_control.slip.parameters import SlipParameters
@@ -29,7 +31,9 @@ GAIT = gait_from_energy(SlipParameters(), 0.9818, 826.0)
 
 def first_steps(beta=None, planner=LqrPlanner):
     options = SimulationOptions(
-        steps=2, plant=IdealOptions(), embedding=EmbeddingOptions(liftoff_angle=beta)
+        steps=2,
+        plant=IdealOptions(),
+        embedding=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
     )
     return simulate(load_robot("five-link"), planner(GAIT), options)
 
@@ -59,12 +63,14 @@ def test_the_template_alone_shows_what_a_map_costs():
 def test_liftoff_waits_for_the_predefined_direction():
     ahead = Sensed(np.array([0.4, 0.9, 1.0, 0.0]), np.array([0.0, 0.6]))
     beta = np.arctan2(0.9, 0.4)
+    liftoff = AUTOMATON.node("DS_sd^w").edge(Event.REAR_LIFTOFF)
     for angle, lifts in ((beta + 1e-6, True), (beta - 1e-6, False)):
         # Whatever the template's time says.
-        for time in (0.0, 1.0):
-            args = (Event.REAR_LIFTOFF, ahead, time, 0.5, 1.0, 9.81)
-            assert fired(*args, liftoff_angle=angle) is lifts
-            assert bool(fired(*args)) is (time >= 0.5)
+        for due in (0.5, -0.5):
+            predefined = RobotGuards(SlipParameters(), GuardOptions(liftoff_angle=angle))
+            assert predefined.fired(liftoff, ahead, due) is lifts
+            template = RobotGuards(SlipParameters(), GuardOptions())
+            assert template.fired(liftoff, ahead, due) is (due <= 0.0)
 
 
 def test_an_earlier_liftoff_is_rougher_with_smaller_amplitudes():
@@ -99,7 +105,7 @@ def test_beginning_cuts_the_samples():
     record = beginning(first_steps(), 0.1)
     assert record.time[-1] < 0.1
     assert len(record.q) == len(record.time) == 100
-    assert len(record.vlo_time) == 3
+    assert len(record.section_time) == 3
 
 
 @pytest.mark.slow

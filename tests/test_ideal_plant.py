@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.guards import GuardOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
@@ -293,4 +293,4 @@ def test_bad_options_are_named():
     with pytest.raises(ParameterError, match="mass_scale"):
         IdealOptions(mass_scale=float("nan"))
     with pytest.raises(ParameterError, match="liftoff_angle"):
-        EmbeddingOptions(liftoff_angle=4.0)
+        GuardOptions(liftoff_angle=4.0)

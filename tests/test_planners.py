@@ -7,11 +7,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.guards import Sensed
 from template_control.embedding.momentum_trim import MomentumTrim, TrimOptions, uncontrolled
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
-from template_control.embedding.step_planning import ReplanOptions, StepPlanning
+from template_control.embedding.sensing import Sensed
+from template_control.embedding.stride_planning import Learnt, ReplanOptions, StridePlanning
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
@@ -19,6 +19,7 @@ from template_control.slip.gaits.gait import gait_at, gait_for_speed, vlo_jacobi
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import SteadyRoute
 
 P = SlipParameters()
 
@@ -31,7 +32,7 @@ def planner(request, gait):
 def test_planner_leaves_the_gait_alone(planner, gait):
     decision = planner.decide(gait.vlo)
     assert decision.feasible
-    assert decision.reached
+    assert decision.nominal
     np.testing.assert_allclose(decision.predicted, gait.vlo, atol=4e-3)
     assert decision.controls[Slot.TOUCHDOWN_ANGLE] == pytest.approx(np.radians(66.0), abs=4e-3)
 
@@ -99,38 +100,46 @@ def test_modified_planner_meets_the_energy_of_equation_38(gait):
 
 def test_unreachable_state_is_said(planner, gait):
     decision = planner.decide(gait.vlo + [0.5, 0.01, 0.3])
-    assert not decision.reached
+    assert not decision.nominal
+
+
+NOTHING = Learnt(load=1.0, trim=0.0)
+
+
+def planned(gait, options=None):
+    """The planning of a walk that keeps its gait."""
+    return StridePlanning(SteadyRoute.of(gait), {"w": LqrPlanner(gait)}, options or ReplanOptions())
 
 
 def test_overdue_ground_keeps_the_template_in_single_stance():
     gait = gait_at(P, np.radians(66.0), 1.1)
-    planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
+    planning = planned(gait)
     sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
     node = AUTOMATON.node(STRIDE_START["w"])
-    planning.decide(node, sensed, 0.0, 1.0, 0.0)
-    touchdown = planning.path.touchdown
+    planning.decide(VLO, sensed, 0.0, NOTHING)
+    touchdown = planning.due(Event.TOUCHDOWN)
     assert not planning.overdue(node, touchdown + 0.009)
     assert planning.overdue(node, touchdown + 0.011)
-    stride = simulate_stride(P, node.name, sensed.state, planning.steps[0].decision.controls)
+    stride = simulate_stride(P, node.name, sensed.state, planning.reports[0].decision.controls)
     sensed.state[:] = stride.sample(touchdown - 1e-6)[0][:4]
     planning.reach_on(node, sensed, touchdown)
     assert planning.reaching
-    assert planning.path.touchdown > 0.03, "not at once"
+    assert planning.due(Event.TOUCHDOWN) > 0.03, "not at once"
     assert not planning.overdue(node, 1.0), "once is enough"
     assert not planning.surprised(1.0, 1.0, 10.0)
 
 
 def test_a_template_that_would_take_off_is_planned_from_the_ground():
     gait = gait_at(P, np.radians(66.0), 1.1)
-    planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
+    planning = planned(gait)
     high = np.array([1.1, 0.999, 0.4])
-    assert not planning.planner.decide(high).feasible
+    assert not planning.planners["w"].decide(high).feasible
     sensed = Sensed(np.array([0.0, high[1], high[0], high[2]]), np.zeros(2))
-    planning.decide(AUTOMATON.node(STRIDE_START["w"]), sensed, 0.0, 1.0, 0.0)
-    report = planning.steps[0]
+    planning.decide(VLO, sensed, 0.0, NOTHING)
+    report = planning.reports[0]
     assert not report.decision.feasible, "the record keeps the truth"
     np.testing.assert_array_equal(report.state, high)
-    assert np.isfinite(planning.path.touchdown)
+    assert np.isfinite(planning.due(Event.TOUCHDOWN))
 
 
 @settings(max_examples=20, deadline=None)
@@ -138,26 +147,24 @@ def test_a_template_that_would_take_off_is_planned_from_the_ground():
 def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(later, faster, higher):
     gait = gait_at(P, np.radians(66.0), 1.1)
     node = AUTOMATON.node(STRIDE_START["w"])
-    planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
+    planning = planned(gait)
     sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
-    planning.decide(node, sensed, 0.0, 1.0, 0.0)
-    u = planning.steps[0].decision.controls
+    planning.decide(VLO, sensed, 0.0, NOTHING)
+    u = planning.reports[0].decision.controls
     z = gait.vlo + [faster, higher, 0.0]
     disturbed = simulate_stride(P, node.name, VLO.state(z), u)
     assume(later < disturbed.time_of(Event.TOUCHDOWN))
     sensed.state[:] = disturbed.sample(later)[0][:4]
-    change = ReplanOptions().agility * (planning.path.touchdown - later) ** 2
+    change = ReplanOptions().agility * (planning.due(Event.TOUCHDOWN) - later) ** 2
     planning.reconsider(node, sensed, later, later)
-    expected = LqrPlanner(gait).decide(z, (u[0] - change, u[0] + change)).controls
-    np.testing.assert_allclose(planning.steps[0].decision.controls, expected, rtol=1e-6)
-    assert abs(planning.steps[0].decision.controls[0] - u[0]) <= change * (1 + 1e-12)
-    assert len(planning.steps) == 1
+    expected = LqrPlanner(gait).decide(z, angles=(u[0] - change, u[0] + change)).controls
+    np.testing.assert_allclose(planning.reports[0].decision.controls, expected, rtol=1e-6)
+    assert abs(planning.reports[0].decision.controls[0] - u[0]) <= change * (1 + 1e-12)
+    assert len(planning.reports) == 1
 
 
 def test_surprise_is_a_large_deviation_some_time_after_the_last_plan():
-    planning = StepPlanning(
-        LqrPlanner(gait_at(P, np.radians(66.0), 1.1)), ReplanOptions(speed=0.05, interval=0.02)
-    )
+    planning = planned(gait_at(P, np.radians(66.0), 1.1), ReplanOptions(speed=0.05, interval=0.02))
     assert planning.surprised(-0.06, phase_time=0.1, now=0.1)
     assert not planning.surprised(0.04, phase_time=0.1, now=0.1)
     assert not planning.surprised(0.06, phase_time=0.01, now=0.1)
@@ -170,31 +177,33 @@ def test_trim_goes_against_the_drift_that_no_control_takes_away(gait):
     np.testing.assert_allclose(n @ b, 0.0, atol=1e-6)
     # Such a drift must show in dy/dt at VLO, and in nothing else.
     np.testing.assert_allclose((n @ (np.eye(3) - a))[:2], 0.0, atol=1e-6)
-    planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
+    planning = planned(gait)
     sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
-    planning.decide(AUTOMATON.node(STRIDE_START["w"]), sensed, 0.0, 1.0, 0.0)
+    planning.decide(VLO, sensed, 0.0, NOTHING)
     plan = planning.path
-    trim = MomentumTrim(gait, TrimOptions())
-    trim.end_step(plan.vlo_state + 1.0, True)  # nothing was expected yet
+    trim = MomentumTrim(P, TrimOptions())
+    trim.end_stride(plan.section_state + 1.0, True)  # nothing was expected yet
     assert trim.acceleration == 0.0
-    trim.expect(plan)
-    trim.end_step(plan.vlo_state + [1.0, 0.0, 0.0], False)  # a push
+    trim.expect(plan, gait)
+    trim.end_stride(plan.section_state + [1.0, 0.0, 0.0], False)  # a push
     assert trim.acceleration == 0.0
     for _ in range(20):
-        trim.end_step(plan.vlo_state + b @ [0.01, 0.01, -0.02], True)  # the planner's business
-        trim.end_step(plan.vlo_state + [0.0024, 0.0, 0.0], True)  # within the dead zone
-        trim.end_step(plan.vlo_state - [0.0024, 0.0, 0.0], True)
+        trim.end_stride(
+            plan.section_state + b @ [0.01, 0.01, -0.02], True
+        )  # the planner's business
+        trim.end_stride(plan.section_state + [0.0024, 0.0, 0.0], True)  # within the dead zone
+        trim.end_stride(plan.section_state - [0.0024, 0.0, 0.0], True)
     assert trim.acceleration == 0.0
     # A robot whose drift yields to the trim settles within the dead zone.
-    duration = plan.liftoff - plan.touchdown
+    duration = plan.due(Event.REAR_LIFTOFF) - plan.due(Event.TOUCHDOWN)
     for _ in range(100):
         drift = 0.01 + trim.acceleration * duration
-        trim.end_step(plan.vlo_state + [drift, 0.0, 0.0], True)
+        trim.end_stride(plan.section_state + [drift, 0.0, 0.0], True)
     assert 0.0 < drift <= 0.0008 * np.sqrt(9.81)
     for _ in range(100):
-        trim.end_step(plan.vlo_state + [9.0, 0.0, 0.0], True)
+        trim.end_stride(plan.section_state + [9.0, 0.0, 0.0], True)
     assert trim.acceleration == pytest.approx(-0.03 * 9.81)
     # A path without a double stance teaches nothing.
-    trim.expect(replace(plan, liftoff=np.inf))
-    trim.end_step(plan.vlo_state - [9.0, 0.0, 0.0], True)
+    trim.expect(replace(plan, events=plan.events[:1]), gait)
+    trim.end_stride(plan.section_state - [9.0, 0.0, 0.0], True)
     assert trim.acceleration == pytest.approx(-0.03 * 9.81)

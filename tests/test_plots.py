@@ -30,12 +30,12 @@ def record(gait):
 
 def cut(record, samples):
     """The run as it would be, had it been interrupted after so many samples."""
-    vlos = int(np.sum(record.vlo_time <= record.time[samples - 1]))
+    sections = int(np.sum(record.section_time <= record.time[samples - 1]))
     held = {}
     for field in fields(record):
         value = getattr(record, field.name)
-        if field.name.startswith("vlo_") or field.name == "plan_seconds":
-            held[field.name] = value[:vlos]
+        if field.name.startswith("section") or field.name in ("stride", "plan_seconds"):
+            held[field.name] = value[:sections]
         elif field.name != "metadata":
             held[field.name] = value[:samples]
     return replace(record, **held)
@@ -98,7 +98,7 @@ def test_template_conserves_its_energy_within_a_phase(record, gait):
     assert np.allclose(total[first], target, atol=0.01)
     # After the rear liftoff until VLO nothing changes the template.
     last = record.metadata["nodes"].index("SS_bv^w")
-    for begin, end in zip(record.vlo_time, record.vlo_time[1:], strict=False):
+    for begin, end in zip(record.section_time, record.section_time[1:], strict=False):
         on = (record.node == last) & (record.time > begin) & (record.time < end)
         # The template's own VLO may come some milliseconds before the robot's.
         toe = record.foot[np.arange(len(record.time)), record.rear, 0]
@@ -117,11 +117,13 @@ def test_vlo_figure_shows_the_recorded_states(record, gait):
     speed, height, vertical, energy = figure.axes
     for axes, column in ((speed, 0), (height, 1), (vertical, 2)):
         shown = {line.get_label(): line.get_ydata() for line in axes.lines}
-        assert np.array_equal(shown["reached"], record.vlo_state[:, column])
-        assert np.array_equal(shown["expected by the planner"], record.vlo_predicted[:-1, column])
+        assert np.array_equal(shown["reached"], record.section_state[:, column])
+        assert np.array_equal(
+            shown["expected by the planner"], record.section_predicted[:-1, column]
+        )
         assert np.allclose(shown["gait"], gait.vlo[column])
     reached = next(line for line in energy.lines if line.get_label() == "reached").get_ydata()
-    assert reached[-1] == pytest.approx(VLO.energy(gait.parameters, record.vlo_state[-1]))
+    assert reached[-1] == pytest.approx(VLO.energy(gait.parameters, record.section_state[-1]))
 
 
 def test_portrait_is_broken_where_the_stance_foot_changes(record):

@@ -9,7 +9,7 @@ import pytest
 
 from template_control.cli import robustness as command
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.scaling import default_gait
+from template_control.embedding.robot_template import default_gait
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.robot.library import load_robot
 from template_control.robustness import campaign as robustness
@@ -91,7 +91,7 @@ def test_the_edge_of_a_step_lies_between_two_footholds(robot, gait, number):
     options = BY_NAME["step-up"].options(Situation(robot, gait), 0.001, number)
     edge = options.plant.ground_step.x
     record = simulate(robot, LqrPlanner(gait), replace(options, steps=8))
-    at = np.searchsorted(record.time, record.vlo_time)
+    at = np.searchsorted(record.time, record.section_time)
     foothold = record.foot[at, record.rear[at]]
     beyond = int(np.argmax(foothold[:, 0] > edge))
     assert beyond == 5
@@ -107,7 +107,7 @@ def test_the_error_of_a_walk_is_that_of_its_last_five_steps(undisturbed):
     gait = default_gait(load_robot("five-link"))
     errors = off_gait(undisturbed, gait)
     assert np.all(np.abs(errors) < 0.01)
-    last = undisturbed.time >= undisturbed.vlo_time[-6]
+    last = undisturbed.time >= undisturbed.section_time[-6]
     speed = undisturbed.com_velocity[last, 0].mean()
     assert errors[0] == pytest.approx(speed / gait.mean_speed - 1.0, abs=1e-3)
     slower = replace(gait, step_length=0.9 * gait.step_length)

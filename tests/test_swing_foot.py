@@ -43,7 +43,7 @@ def test_swing_without_a_foothold_comes_down():
 
 
 def test_swing_stays_within_reach_of_the_hip():
-    swing = SwingFoot(SwingOptions(reach=0.97))
+    swing = SwingFoot(SwingOptions(leg_share=0.97))
     swing.start(np.array([0.55, 0.1]), np.zeros(2))
     x = swing.furthest(np.array([0.2, 0.85]), 0.9)
     assert np.hypot(x - 0.2, 0.75) == pytest.approx(0.97 * 0.9)
@@ -55,7 +55,7 @@ def test_swing_falls_to_ground_that_comes_late():
     swing = SwingFoot(options)
     swing.start(np.array([0.6, 0.0]), np.array([0.1, -0.2]))
     for _ in range(50):
-        swing.reach_down(1e-3)
-    assert swing.y[0] == pytest.approx(-0.2 * 0.05 - 0.5 * options.reach_acceleration * 0.05**2)
+        swing.drop(1e-3)
+    assert swing.y[0] == pytest.approx(-0.2 * 0.05 - 0.5 * options.drop_acceleration * 0.05**2)
     assert swing.x[0] == 0.6
     assert swing.x[1] == 0.0

@@ -149,7 +149,7 @@ def test_bad_options_are_named():
 
 
 def settled(record, gait):
-    return record.vlo_state[-50:].mean(axis=0) - gait.vlo
+    return record.section_state[-50:].mean(axis=0) - gait.vlo
 
 
 @pytest.mark.slow
@@ -216,7 +216,7 @@ def test_slippery_ground():
         gait,
         steps=50,
         plant=PlantOptions(friction=0.5),
-        embedding=EmbeddingOptions(friction=0.45),
+        embedding=EmbeddingOptions(friction=0.5),
     )
     assert not record.fell
 

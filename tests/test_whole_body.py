@@ -1,17 +1,40 @@
 """The whole-body QP: exact dynamics, hard constraints, and the same optimum as a plain QP."""
 
+from dataclasses import replace
+
 import numpy as np
 import proxsuite
 import pytest
 
+from template_control.slip.automaton.vocabulary import Leg
+from template_control.whole_body.com_task import ComTask
+from template_control.whole_body.foot_task import FootTask
+from template_control.whole_body.momentum_task import MomentumTask
+from template_control.whole_body.posture_task import PostureTask
 from template_control.whole_body.problem import ROWS_PER_FOOT
-from template_control.whole_body.solver import WholeBodyQp
-from template_control.whole_body.tasks import Row, TaskStack, Weights
+from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
+from template_control.whole_body.task import DESIRED, TaskStack
+from template_control.whole_body.wanted import Wanted
 
 FRICTION = 0.6
-WEIGHTS = Weights((1.0, 3.0, 1.0, 0.0, 0.0))
-SINGLE = Weights((0.01, 3.0, 1.0, 1.0, 1.0))
-STANCES = {1: (0,), 2: (0, 1)}
+OPTIONS = QpOptions(friction=FRICTION, friction_margin=1.0)
+TASKS = {
+    0: (PostureTask(), FootTask(Leg.REAR), FootTask(Leg.FRONT)),
+    1: (ComTask((0.01, 3.0)), PostureTask(), FootTask(Leg.FRONT)),
+    2: (ComTask((1.0, 3.0)), PostureTask()),
+}
+STANCES = {0: (), 1: (0,), 2: (0, 1)}
+
+
+def written(robot, feet, rng=None, scale=0.0):
+    """The rows of a phase's tasks, with random wanted accelerations."""
+    stack = TaskStack(TASKS[feet], 7)
+    wanted = Wanted()
+    wanted.com_now[:] = *robot.com, *robot.com_velocity
+    stack.write(robot, wanted)
+    rows = stack.table[:, 7 + DESIRED]
+    rows[:] = 0.0 if rng is None else rng.normal(0.0, scale, len(rows))
+    return stack
 
 
 def standing(rng):
@@ -23,29 +46,23 @@ def standing(rng):
 def solve(robot, rng, feet, qp=None, scale=2.0, torque_scale=1.0):
     q, v = standing(rng)
     robot.update(q, v)
-    tasks = TaskStack(7)
-    tasks.read(robot, 1, robot.com[1])
-    tasks.desired[:] = rng.normal(0.0, scale, len(Row))
-    weights = WEIGHTS if feet == 2 else SINGLE
-    forces = np.tile([0.0, 785.0 / feet], feet)
-    cap = np.full(feet, np.inf)
-    qp = qp or WholeBodyQp(robot, FRICTION, torque_scale)
-    rows = np.array(weights.rows)
-    solution = qp.solve(tasks, weights, rows, STANCES[feet], forces, cap)
-    return tasks, weights, forces, solution
+    tasks = written(robot, feet, rng, scale)
+    forces = np.tile([0.0, 785.0 / max(feet, 1)], feet)
+    qp = qp or WholeBodyQp(robot, replace(OPTIONS, torque_scale=torque_scale))
+    solution = qp.solve(tasks, Stance(STANCES[feet], forces, np.full(feet, np.inf)))
+    return tasks, forces, solution
 
 
 def stance_rows(robot, feet):
-    jacobian = np.vstack([robot.foot_jacobian[i] for i in STANCES[feet]])
-    bias = np.concatenate([robot.foot_bias[i] for i in STANCES[feet]])
-    velocity = np.concatenate([robot.foot_velocity[i] for i in STANCES[feet]])
-    return jacobian, bias, velocity
+    on_ground = list(STANCES[feet])
+    jacobian = robot.foot_jacobian[on_ground].reshape(-1, 7)
+    return jacobian, robot.foot_bias[on_ground].ravel(), robot.foot_velocity[on_ground].ravel()
 
 
-@pytest.mark.parametrize("feet", [1, 2])
+@pytest.mark.parametrize("feet", [0, 1, 2])
 def test_dynamics_and_stance_are_exact(robot, feet):
     rng = np.random.default_rng(1)
-    qp = WholeBodyQp(robot, FRICTION)
+    qp = WholeBodyQp(robot, OPTIONS)
     for _ in range(20):
         *_, s = solve(robot, rng, feet, qp)
         assert s.solved
@@ -57,10 +74,10 @@ def test_dynamics_and_stance_are_exact(robot, feet):
         np.testing.assert_allclose(jacobian @ s.acceleration + bias, -40.0 * velocity, atol=1e-8)
 
 
-@pytest.mark.parametrize("feet", [1, 2])
+@pytest.mark.parametrize("feet", [0, 1, 2])
 def test_constraints_hold_for_wild_tasks(robot, feet):
     rng = np.random.default_rng(2)
-    qp = WholeBodyQp(robot, FRICTION, 0.6)
+    qp = WholeBodyQp(robot, replace(OPTIONS, torque_scale=0.6))
     solved = 0
     for _ in range(200):
         *_, s = solve(robot, rng, feet, qp, scale=15.0)
@@ -74,24 +91,24 @@ def test_constraints_hold_for_wild_tasks(robot, feet):
     assert solved >= 190
 
 
-@pytest.mark.parametrize("feet", [1, 2])
+@pytest.mark.parametrize("feet", [0, 1, 2])
 def test_optimum_is_that_of_the_full_problem(robot, feet):
     """The same QP over (a, f, tau) with explicit equalities, solved independently."""
     rng = np.random.default_rng(3)
     for _ in range(10):
-        tasks, weights, reference, s = solve(robot, rng, feet, scale=3.0)
+        tasks, reference, s = solve(robot, rng, feet, scale=3.0)
         jacobian, bias, velocity = stance_rows(robot, feet)
         n, m = 7 + 2 * feet + 4, 2 * feet
         a, f, tau = slice(0, 7), slice(7, 7 + m), slice(7 + m, n)
         hessian, gradient = np.zeros((n, n)), np.zeros(n)
-        for row, w in enumerate(weights.rows):
-            t = tasks.jacobian[row]
+        for row in tasks.table:
+            t, (row_bias, wanted, w) = row[:7], row[7:]
             hessian[a, a] += w * np.outer(t, t)
-            gradient[a] += w * t * (tasks.bias[row] - tasks.desired[row])
+            gradient[a] += w * t * (row_bias - wanted)
         scale = (robot.mass * robot.gravity) ** 2
-        hessian[f, f] += weights.force / scale * np.eye(m)
-        gradient[f] -= weights.force / scale * reference
-        hessian[tau, tau] += weights.torque / 350.0**2 * np.eye(4)
+        hessian[f, f] += OPTIONS.force_cost / scale * np.eye(m)
+        gradient[f] -= OPTIONS.force_cost / scale * reference
+        hessian[tau, tau] += OPTIONS.torque_cost / 350.0**2 * np.eye(4)
         equal = np.zeros((7 + m, n))
         equal[:7, a], equal[:7, f] = robot.mass_matrix, -jacobian.T
         equal[3:7, tau] = -np.eye(4)
@@ -120,7 +137,7 @@ def test_optimum_is_that_of_the_full_problem(robot, feet):
 
 def test_infeasible_problem_is_reported_and_recovers(robot):
     rng = np.random.default_rng(4)
-    qp = WholeBodyQp(robot, FRICTION)
+    qp = WholeBodyQp(robot, OPTIONS)
     *_, before = solve(robot, rng, 2, qp)
     qp.torque_limit = np.full(4, 1.0)  # cannot carry the robot
     *_, s = solve(robot, np.random.default_rng(4), 2, qp)
@@ -136,27 +153,16 @@ def test_infeasible_problem_is_reported_and_recovers(robot):
 def test_straight_coinciding_feet_are_reported_not_raised(robot):
     q = np.array([0.0, 0.9, 0.0, 0.0, 0.0, 0.0, 0.0])
     robot.update(q, np.zeros(7))
-    tasks = TaskStack(7)
-    tasks.read(robot, 1, robot.com[1])
-    s = WholeBodyQp(robot, FRICTION).solve(
-        tasks, WEIGHTS, np.array(WEIGHTS.rows), (0, 1), np.zeros(4), np.full(2, np.inf)
-    )
+    stance = Stance((0, 1), np.zeros(4), np.full(2, np.inf))
+    s = WholeBodyQp(robot, OPTIONS).solve(written(robot, 2), stance)
     assert not s.solved
 
 
 def test_rear_force_cap_is_a_hard_limit(robot):
     q, _ = standing(np.random.default_rng(5))
     robot.update(q, np.zeros(7))
-    tasks = TaskStack(7)
-    tasks.read(robot, 1, robot.com[1])
-    s = WholeBodyQp(robot, FRICTION).solve(
-        tasks,
-        WEIGHTS,
-        np.array(WEIGHTS.rows),
-        (0, 1),
-        np.array([0.0, 600.0, 0.0, 100.0]),
-        np.array([50.0, np.inf]),
-    )
+    stance = Stance((0, 1), np.array([0.0, 600.0, 0.0, 100.0]), np.array([50.0, np.inf]))
+    s = WholeBodyQp(robot, OPTIONS).solve(written(robot, 2), stance)
     assert s.solved
     assert s.force[1] <= 50.0 + 1e-3
 
@@ -164,16 +170,75 @@ def test_rear_force_cap_is_a_hard_limit(robot):
 def test_load_scales_torques_within_their_limits(robot):
     q, _ = standing(np.random.default_rng(6))
     robot.update(q, np.zeros(7))
-    tasks = TaskStack(7)
-    tasks.read(robot, 1, robot.com[1])
-    rows, cap = np.array(WEIGHTS.rows), np.full(2, np.inf)
-    forces = np.tile([0.0, 390.0], 2)
+    stance = Stance((0, 1), np.tile([0.0, 390.0], 2), np.full(2, np.inf))
     plain, loaded = (
-        WholeBodyQp(robot, FRICTION).solve(tasks, WEIGHTS, rows, (0, 1), forces, cap, load)
-        for load in (1.0, 1.1)
+        WholeBodyQp(robot, OPTIONS).solve(written(robot, 2), stance, load) for load in (1.0, 1.1)
     )
     np.testing.assert_allclose(loaded.acceleration, plain.acceleration, atol=2e-3)
     left = robot.mass_matrix @ loaded.acceleration + robot.nonlinear_effects
     jacobian = np.vstack(robot.foot_jacobian)
     np.testing.assert_allclose(left[3:], loaded.torque / 1.1 + (jacobian.T @ loaded.force)[3:])
     assert np.all(np.abs(loaded.torque) <= robot.torque_limit)
+
+
+def quantity_of(task, robot):
+    """What the task's rows move, at the robot's last update: their time integral's rate."""
+    if isinstance(task, ComTask):
+        extra = robot.angular_momentum / (robot.mass * robot.com[1])
+        return robot.com_velocity + [extra, 0.0]
+    if isinstance(task, MomentumTask):
+        return np.array([robot.angular_momentum])
+    if isinstance(task, PostureTask):
+        return None
+    return robot.foot_velocity[1].copy()
+
+
+@pytest.mark.parametrize("task", [ComTask(), MomentumTask(), FootTask(Leg.FRONT)])
+def test_task_rows_are_the_rates_of_what_they_move(robot, random_states, task):
+    """T a + bias against central differences along a motion with constant a."""
+    rng = np.random.default_rng(8)
+    for q, v in random_states[:8]:
+        a, h = rng.normal(0.0, 5.0, 7), 1e-6
+        seen = []
+        for t in (-h, h):
+            robot.update(q + v * t + 0.5 * a * t * t, v + a * t)
+            seen.append(quantity_of(task, robot))
+        robot.update(q, v)
+        stack, wanted = TaskStack((task,), 7), Wanted()
+        wanted.com_now[:] = *robot.com, *robot.com_velocity
+        stack.write(robot, wanted)
+        rate = (seen[1] - seen[0]) / (2.0 * h)
+        if isinstance(task, MomentumTask):
+            rate /= robot.mass * robot.com[1] ** 2
+        rows = stack.table[:, :7] @ a + stack.table[:, 7]
+        np.testing.assert_allclose(rows, rate, rtol=2e-6, atol=2e-5)
+
+
+def test_a_flying_robot_keeps_its_momentum(robot):
+    """Without feet on the ground no torque moves the CoM or turns the robot as a whole."""
+    q, v = standing(np.random.default_rng(9))
+    robot.update(q, v)
+    s = WholeBodyQp(robot, OPTIONS).solve(
+        written(robot, 0, np.random.default_rng(10), 20.0), Stance((), np.zeros(0), np.zeros(0))
+    )
+    assert s.solved
+    assert s.force.size == 0
+    fall = robot.com_jacobian @ s.acceleration + robot.com_bias
+    np.testing.assert_allclose(fall, [0.0, -robot.gravity], atol=1e-9)
+    turning = robot.angular_momentum_jacobian @ s.acceleration + robot.angular_momentum_bias
+    assert turning == pytest.approx(0.0, abs=1e-8)
+
+
+def test_a_foot_is_held_where_its_leg_would_go_straight(robot):
+    q, v = standing(np.random.default_rng(11))
+    robot.update(q, v)
+    stack, wanted = TaskStack((FootTask(Leg.FRONT),), 7), Wanted()
+    position = robot.foot_position[1]
+    wanted.foot[1, :, 0] = position + [0.3, 0.0]
+    stack.write(robot, wanted)
+    free = stack.table[0, 7 + DESIRED]
+    wanted.furthest[1] = position[0]
+    stack.write(robot, wanted)
+    assert free > 100.0
+    held = stack.table[0, 7 + DESIRED]
+    assert held == pytest.approx(200.0 * (wanted.hip_speed - robot.foot_velocity[1, 0]))

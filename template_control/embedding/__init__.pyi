@@ -13,10 +13,10 @@ from .planners.modified import ModifiedOptions as ModifiedOptions
 from .planners.modified import ModifiedPlanner as ModifiedPlanner
 from .planners.planner import Decision as Decision
 from .planners.planner import Planner as Planner
+from .references import UnloadOptions as UnloadOptions
 from .robot_template import default_gait as default_gait
 from .robot_template import paper_gait as paper_gait
 from .robot_template import template_for as template_for
 from .stride_planning import ReplanOptions as ReplanOptions
 from .stride_planning import SectionReport as SectionReport
-from .references import UnloadOptions as UnloadOptions
 from .swing_foot import SwingOptions as SwingOptions

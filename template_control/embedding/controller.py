@@ -34,12 +34,13 @@ from template_control.embedding.stride_planning import (
     StridePlanning,
 )
 from template_control.embedding.template_path import LOCATE
+from template_control.errors import ParameterError
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Leg
 from template_control.slip.maps.section import Section, section_of
-from template_control.slip.scenario.route import Route
+from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
 from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.solver import Solution, Stance, WholeBodyQp
@@ -79,10 +80,14 @@ class EmbeddingController:
 
     Args:
         robot: the (nominal) model; every tick updates it.
-        planners: one for each kind of stride of the route.
-        route: which stride comes next, and towards which state.
+        planners: one for each kind of stride of the route; or one planner, whose gait is kept.
         options: tuning.
+        route: which stride comes next, and towards which state; None: the gait of the one
+            planner for ever.
         automaton: of the route's strides.
+
+    Raises:
+        ParameterError: if there are several planners and no route.
 
     Attributes:
         station: where on the automaton the robot is, and what that asks for.
@@ -97,12 +102,18 @@ class EmbeddingController:
     def __init__(
         self,
         robot: PlanarBiped,
-        planners: Planners,
-        route: Route,
+        planners: Planners | Planner,
         options: EmbeddingOptions | None = None,
+        route: Route | None = None,
         automaton: Automaton = AUTOMATON,
     ) -> None:
         self.robot = robot
+        if isinstance(planners, Planner):
+            gait = planners.gait
+            route = route or SteadyRoute.of(gait, automaton)
+            planners = {gait.stride: planners}
+        if route is None:
+            raise ParameterError("several planners and no route: say which stride comes next")
         self.parameters = route.parameters
         self.options = scaled(options or EmbeddingOptions(), Scale.of(self.parameters))
         o = self.options
@@ -150,20 +161,19 @@ class EmbeddingController:
         """Where the template's rear toe is in the world: at the foot, if that stands [m]."""
         return float(self._sensed.toes[0]) if self.node.stance else self.planning.toe
 
-    def start(self, section: Section, rear: int = 0) -> None:
-        """Begin at a section; the robot's model must be up to date.
+    def start(self, rear: int = 0) -> None:
+        """Begin where the route begins; the robot's model must be up to date.
 
         A foot in the air is taken to be in the middle of its swing.
 
         Args:
-            section: that the route begins at.
             rear: the foot that is the rear leg's.
 
         Raises:
             ParameterError: if the route begins with a stride for which there is no planner.
         """
-        planning = self.planning
-        planner, node = planning.begin(section)
+        section = self.planning.route.section
+        planner, node = self.planning.begin(section)
         self.station = self._stations[node.name]
         self.feet.begin(rear)
         self._sensed.feet = self.feet.of
@@ -309,9 +319,7 @@ class EmbeddingController:
         s, path, toe = self._sensed, self.planning.path, self.planning.toe
         x, y = s.state[0] + self.phase_offset - s.toes[Leg.REAR], s.state[1]
         locate = LOCATE[self.station.control.clock]
-        self.phase_time, row = locate(
-            path.curve, toe, x, y, self.phase_time + dt, self.reference
-        )
+        self.phase_time, row = locate(path.curve, toe, x, y, self.phase_time + dt, self.reference)
         self.phase_offset += (s.state[2] - self.robot.com_velocity[0]) * dt
         segment = path.curve.meta[row]
         leg_forces(
@@ -374,9 +382,7 @@ def _stations(automaton: Automaton, nv: int, options: EmbeddingOptions) -> dict[
     trimmed = {
         node.name
         for start in automaton.starts.values()
-        if any(
-            phase_control(options.phases, other).trims for other in automaton.stride(start)
-        )
+        if any(phase_control(options.phases, other).trims for other in automaton.stride(start))
         for node in automaton.stride(start)
     }
     found = {}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from template_control.embedding.template_path import TemplatePath
 from template_control.slip.automaton.vocabulary import Event
-from template_control.slip.gaits.gait import WalkingGait, vlo_jacobians
+from template_control.slip.gaits.gait import Gait, vlo_jacobians
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import tuned
 
@@ -62,10 +62,10 @@ class MomentumTrim:
         self._speed = float(np.sqrt(p.gravity * p.rest_length))
         self._bound = options.bound * p.gravity
         self._path: TemplatePath | None = None
-        self._gait: WalkingGait | None = None
+        self._gait: Gait | None = None
         self._left_alone = np.zeros(3)
 
-    def expect(self, path: TemplatePath | None, gait: WalkingGait) -> None:
+    def expect(self, path: TemplatePath | None, gait: Gait) -> None:
         """Take note of the exact template's path for the step that begins.
 
         Args:
@@ -98,7 +98,7 @@ class MomentumTrim:
         self.acceleration = float(min(max(wanted, -self._bound), self._bound))
 
 
-def uncontrolled(gait: WalkingGait) -> Array:
+def uncontrolled(gait: Gait) -> Array:
     """(3,) n with n B = 0 for the VLO map's control Jacobian B at the gait, n[0] = 1.
 
     n (z - P(z, u)) is a step's drift, as a forward speed [m/s].

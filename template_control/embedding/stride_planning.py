@@ -23,9 +23,10 @@ from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, StrideGoal
-from template_control.slip.similarity import LENGTH, RATE_SQUARED, SPEED, TIME, tuned
+from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 
 Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class ReplanOptions:
@@ -191,9 +192,7 @@ class StridePlanning:
         seconds = time.perf_counter() - begin
         offset = self.planner_of(goal).offset.copy()
         self.reports.append(
-            SectionReport(
-                now, section, section.padded(z), goal, decision, offset, learnt, seconds
-            )
+            SectionReport(now, section, section.padded(z), goal, decision, offset, learnt, seconds)
         )
         node = self.automaton.start(goal.stride)
         state = sensed.state.copy()
@@ -322,9 +321,7 @@ class StridePlanning:
                 self.reports[-1] = replace(report, decision=decision)
         self.follow(node, sensed, now)
 
-    def _back_to_section(
-        self, node: Node, report: SectionReport, sensed: Sensed
-    ) -> Array | None:
+    def _back_to_section(self, node: Node, report: SectionReport, sensed: Sensed) -> Array | None:
         """The section state from which the template would have come to where the robot is.
 
         The template's dynamics are the same forward and backward: its past is the mirror

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.guards import GuardOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
@@ -54,7 +55,7 @@ PLANNERS: dict[str, Callable[[WalkingGait], Planner]] = {
 }
 TEMPLATE = "template alone"
 PLANTS: dict[str, tuple[PlantOptions | IdealOptions, EmbeddingOptions]] = {
-    "ideal, full grip": (IdealOptions(), EmbeddingOptions(friction=GRIP)),
+    "ideal, full grip": (IdealOptions(), EmbeddingOptions(friction=GRIP, friction_margin=1.0)),
     "ideal": (IdealOptions(), EmbeddingOptions()),
     "PyBullet": (PlantOptions(), EmbeddingOptions()),
 }
@@ -108,11 +109,11 @@ def robot_walk(
     options = SimulationOptions(
         steps=steps,
         plant=world,
-        embedding=EmbeddingOptions(friction=tuning.friction, liftoff_angle=beta),
+        embedding=replace(tuning, guards=GuardOptions(liftoff_angle=beta)),
         start=start_state(gait),
     )
     record = simulate(load_robot("five-link"), PLANNERS[planner](gait), options)
-    return Walk(sections(gait, record.vlo_state), record.metadata["fall_reason"]), record
+    return Walk(sections(gait, record.section_state), record.metadata["fall_reason"]), record
 
 
 def template_walk(planner: str, steps: int = STEPS) -> Walk:
@@ -192,7 +193,7 @@ def fig12() -> Reproduction:
             "Template alone is the exact SLIP: its error is the planner's map. On the ideal plant"
             " (rigid contacts that stick) the error of a robot that is no SLIP is added, in"
             " PyBullet that of its contacts.",
-            f"Full grip: the controller's friction cone ({EmbeddingOptions().friction:g} otherwise)"
+            f"Full grip: the controller's friction cone ({EmbeddingOptions().cone:g} otherwise)"
             " never binds. It makes no difference to speak of: where the template is light on its"
             " foot near VLO, the swing foot gives way and not the CoM's height.",
         ),
@@ -210,7 +211,9 @@ def _liftoffs(case: tuple[str, str]) -> tuple[Liftoff, Record, Walk, Record]:
     rule, plant = case
     gait, beta = _gait(), _LIFTOFFS[rule]
     options = SimulationOptions(
-        steps=2, plant=PLANTS[plant][0], embedding=EmbeddingOptions(liftoff_angle=beta)
+        steps=2,
+        plant=PLANTS[plant][0],
+        embedding=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
     )
     record = simulate(load_robot("five-link"), LqrPlanner(gait), options)
     return liftoff(record), record, *robot_walk("LQR", plant, beta=beta)

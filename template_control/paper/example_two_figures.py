@@ -125,7 +125,7 @@ def liftoff_figure(settled: Record, records: dict[str, Record]) -> Figure:
     """
     figure = Figure(figsize=(9.0, 2.2 * (len(records) + 1)), layout="constrained")
     panels = figure.subplots(len(records) + 1, 1)
-    begin, _, end = _step(settled, len(settled.vlo_time) - 3)
+    begin, _, end = _step(settled, len(settled.section_time) - 3)
     w = slice(begin, end)
     com, template = settled.com[w], settled.template_com[w]
     panels[0].plot(*com.T, color=COM, linewidth=2.0, label="robot")

@@ -129,9 +129,9 @@ class Robustness:
 
 def off_gait(record: Record, gait: WalkingGait) -> tuple[float, float]:
     """Mean forward speed and VLO height of the last 5 steps over the gait's, less one."""
-    x = np.interp(record.vlo_time[[-1 - _LAST, -1]], record.time, record.com[:, 0])
-    speed = (x[1] - x[0]) / (record.vlo_time[-1] - record.vlo_time[-1 - _LAST])
-    height = record.vlo_state[-_LAST:, 1].mean()
+    x = np.interp(record.section_time[[-1 - _LAST, -1]], record.time, record.com[:, 0])
+    speed = (x[1] - x[0]) / (record.section_time[-1] - record.section_time[-1 - _LAST])
+    height = record.section_state[-_LAST:, 1].mean()
     return float(speed / gait.mean_speed - 1.0), float(height / gait.vlo[1] - 1.0)
 
 

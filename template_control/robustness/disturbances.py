@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.slip.similarity import REFERENCE, Scale
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.planar_biped import PlanarBiped
@@ -23,6 +22,7 @@ from template_control.run.sensing import SensorOptions
 from template_control.run.simulation import Push, SimulationOptions, perturbed_start, simulate
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import REFERENCE, Scale
 
 BEGIN = 10
 """Steps of a walk on its gait before a push comes."""
@@ -71,7 +71,7 @@ class Situation:
         if record.fell:
             return self.gait.step_length * np.arange(steps + 1.0)
         # The last VLO may round to just after the last sample.
-        at = np.minimum(np.searchsorted(record.time, record.vlo_time), len(record.time) - 1)
+        at = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
         return np.asarray(record.foot[at, record.rear[at], 0])
 
 

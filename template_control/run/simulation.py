@@ -28,7 +28,7 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.section import VLO
-from template_control.slip.scenario.route import Route, SteadyRoute
+from template_control.slip.scenario.route import Route
 
 Array = NDArray[np.float64]
 
@@ -157,11 +157,14 @@ def simulate(
         ParameterError: if there is no planner for a stride of the route, or no pose to start in.
     """
     o = options or SimulationOptions()
-    run = _Run.of(route, planners)
-    controller = EmbeddingController(robot, run.planners, run.route, o.embedding, automaton)
+    if isinstance(route, Planner):
+        controller = EmbeddingController(robot, route, o.embedding, automaton=automaton)
+    else:
+        chosen = planners or default_planners(route)
+        controller = EmbeddingController(robot, chosen, o.embedding, route, automaton)
     recorder = Recorder(controller, o.record_every)
-    q, v = _start(robot, controller, run.route, o)
-    controller.start(run.route.section, 0 if o.pose is None else o.pose.rear)
+    q, v = _start(controller, o)
+    controller.start(0 if o.pose is None else o.pose.rear)
     begin = time.perf_counter()
     interrupted = False
     with open_plant(robot, o.plant) as plant:
@@ -178,31 +181,13 @@ def simulate(
     return recorder.record(metadata)
 
 
-@dataclass(frozen=True)
-class _Run:
-    """A route, and planners for its strides."""
-
-    route: Route
-    planners: Planners
-
-    @classmethod
-    def of(cls, route: Route | Planner, planners: Planners | None) -> _Run:
-        """The route that was given, or the steady one of a planner's gait."""
-        if isinstance(route, Planner):
-            gait = route.gait
-            steady = SteadyRoute(gait.parameters, gait.stride, gait.state)
-            return cls(steady, {gait.stride: route})
-        return cls(route, planners or default_planners(route))
-
-
-def _start(
-    robot: PlanarBiped, controller: EmbeddingController, route: Route, o: SimulationOptions
-) -> tuple[Array, Array]:
+def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
     """(q, v) that the run begins in.
 
     Raises:
         ParameterError: if the route does not begin at VLO and no pose is given.
     """
+    robot, route = controller.robot, controller.planning.route
     if o.pose is not None:
         return state_in(robot, o.pose)
     if route.section != VLO:
@@ -316,7 +301,6 @@ def _metadata(
         "gait_controls": gait.controls.tolist(),
         "gait_mean_speed": gait.step_length / gait.step_duration,
         "planner": type(controller.planner).__name__,
-        "friction": controller.qp.friction,
         "plant": plant_name(o.plant),
         "options": asdict(o),
         "fall_reason": reason,
@@ -326,4 +310,9 @@ def _metadata(
         "summary": recorder.summary(),
     }
     # As it will be read back: JSON knows lists, not tuples.
-    return dict(json.loads(json.dumps(metadata)))
+    return dict(json.loads(json.dumps(metadata, default=_plain)))
+
+
+def _plain(value: Any) -> Any:
+    """What JSON knows of a value it does not: arrays are lists, anything else is its text."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)

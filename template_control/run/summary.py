@@ -30,7 +30,7 @@ def summarise(record: Record, path: str) -> dict[str, Any]:
 
     Returns:
         robot, gait, steps, fell, fall_reason, duration, mean_speed, vlo_target and
-        vlo_mean_last_50 (speed, height, vertical_speed; of the states at VLO), com_error_rms and com_error_max
+        vlo_mean_last_50 (speed, height, vertical_speed), com_error_rms and com_error_max
         (x, y), joint_torque (per joint peak, rms, limit), saturated_share, qp_failures,
         control_tick_seconds and qp_solve_seconds (median, p99), plan_seconds (median, p99),
         real_time_factor, steps_not_nominal (plans that left the planner's own law), record.

@@ -46,8 +46,8 @@ def phase_portrait(record: Record) -> Figure:
     upright, forward = figure.subplots(1, 2)
     samples = np.arange(len(record.time))
     toe = record.foot[samples, record.rear, 0]
-    target = record.metadata["gait_vlo"]
-    rows = np.minimum(np.searchsorted(record.time, record.vlo_time), len(record.time) - 1)
+    target = record.metadata["gait_state"]
+    rows = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
     panels: tuple[tuple[Axes, int, Array, tuple[float, float]], ...] = (
         (upright, 1, np.zeros(len(toe)), (target[1], target[2])),
         (forward, 0, toe, (0.0, target[0])),
@@ -68,7 +68,7 @@ def phase_portrait(record: Record) -> Figure:
             across, record.com_velocity[rows, axis], "o", color=RIGHT, markersize=3, zorder=4,
             label="robot at VLO",
         )  # fmt: skip
-        seen = record.vlo_state[:, 1 if axis else 0], record.vlo_state[:, 2]
+        seen = record.section_state[:, 1 if axis else 0], record.section_state[:, 2]
         planned = seen if axis else (np.zeros(len(rows)), seen[0])
         axes.plot(
             *planned, "o", color=RIGHT, fillstyle="none", markersize=4, zorder=4,
@@ -125,7 +125,7 @@ def template_energies(record: Record) -> dict[str, Array]:
         kinetic, gravity, spring, total.
     """
     p = _parameters(record)
-    step = np.maximum(np.searchsorted(record.vlo_time, record.time, side="right") - 1, 0)
+    step = np.maximum(np.searchsorted(record.section_time, record.time, side="right") - 1, 0)
     stiffness = np.zeros((len(record.time), 2))
     for index in np.unique(record.node):
         node = AUTOMATON.node(record.metadata["nodes"][index])
@@ -135,7 +135,7 @@ def template_energies(record: Record) -> dict[str, Array]:
             # in the robot's single stance.
             used = node.rear if slot is None else slot
             if used is not None:
-                stiffness[on, leg] = record.vlo_controls[step[on], used]
+                stiffness[on, leg] = record.section_controls[step[on], used]
     force_squared = np.sum(record.template_force**2, axis=2)
     stored = np.divide(
         force_squared, 2.0 * stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0
@@ -175,7 +175,7 @@ def energies(record: Record) -> Figure:
         label="template",
     )  # fmt: skip
     lower.plot(time, template["total"][w], color=TEMPLATE, label="template with its springs")
-    target = float(VLO.energy(p, record.metadata["gait_vlo"]))
+    target = float(VLO.energy(p, record.metadata["gait_state"]))
     lower.axhline(target, color=LEFT, linewidth=1.2, linestyle=":", label="gait at VLO")
     lower.set(xlabel="time [s]", ylabel="sum [J]")
     for axes in panels:
@@ -192,8 +192,8 @@ def vlo_states(record: Record) -> Figure:
     The energy is E = m v^2 / 2 + m g y + k0 (l0 - y)^2 / 2, as in Section IV-D.
     """
     p = _parameters(record)
-    state, expected = record.vlo_state, record.vlo_predicted[:-1]
-    target = np.array(record.metadata["gait_vlo"])
+    state, expected = record.section_state, record.section_predicted[:-1]
+    target = np.array(record.metadata["gait_state"])
     steps = np.arange(len(state))
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True)
@@ -221,7 +221,7 @@ def vlo_states(record: Record) -> Figure:
         axes.update_datalim([(0.0, wanted - least), (0.0, wanted + least)])
         axes.autoscale_view()
         axes.ticklabel_format(axis="y", useOffset=False)
-    far = np.flatnonzero(~record.vlo_reached)
+    far = np.flatnonzero(~record.section_nominal)
     if len(far):
         panels[0].plot(
             far, state[far, 0], "s", color=RIGHT, fillstyle="none", markersize=7,

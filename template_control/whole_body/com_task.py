@@ -47,9 +47,7 @@ class ComTask:
         rows.bias[0] += (
             robot.angular_momentum_bias - robot.angular_momentum * robot.com_velocity[1] / height
         ) / moment
-        rows.desired[0] = (
-            ref[4] + kp * (ref[0] - now[0]) + kd * (ref[2] - now[2]) + wanted.com_push
-        )
+        rows.desired[0] = ref[4] + kp * (ref[0] - now[0]) + kd * (ref[2] - now[2]) + wanted.com_push
         rows.desired[1] = ref[5] + self.lift(wanted)
 
     def lift(self, wanted: Wanted) -> float:

@@ -50,6 +50,11 @@ class QpOptions:
     force_cost: float = tuned(1e-3)
     torque_cost: float = tuned(1e-4)
 
+    @property
+    def cone(self) -> float:
+        """Coefficient that the cones are built with."""
+        return self.friction_margin * self.friction
+
 
 class Stance(NamedTuple):
     """The feet on the ground and what they should do there.
@@ -165,7 +170,7 @@ class WholeBodyQp:
     def __init__(self, robot: PlanarBiped, options: QpOptions | None = None) -> None:
         o = options or QpOptions()
         self.robot = robot
-        self.friction = o.friction_margin * o.friction
+        self.friction = o.cone
         self.torque_limit: Array = robot.torque_limit * o.torque_scale
         self._contact_damping = o.contact_damping
         self._costs = np.array([o.force_cost, o.torque_cost])
@@ -189,9 +194,7 @@ class WholeBodyQp:
         for i, foot in enumerate(stance.feet):
             rows = slice(2 * i, 2 * i + 2)
             w.jacobian[rows] = robot.foot_jacobian[foot]
-            w.bias[rows] = (
-                robot.foot_bias[foot] + self._contact_damping * robot.foot_velocity[foot]
-            )
+            w.bias[rows] = robot.foot_bias[foot] + self._contact_damping * robot.foot_velocity[foot]
         w.force[:] = stance.force
         regular = assemble(
             robot.mass_matrix,

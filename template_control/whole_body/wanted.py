@@ -10,11 +10,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def _zeros(*shape: int) -> Array:
-    array: Array = field(default_factory=lambda: np.zeros(shape))  # type: ignore[assignment]
-    return array
-
-
 @dataclass
 class Wanted:
     """References and measurements in one place; the controller overwrites them at every tick.
@@ -35,12 +30,12 @@ class Wanted:
         hip_speed: forward speed of the hips [m/s].
     """
 
-    com: Array = _zeros(6)
-    com_now: Array = _zeros(4)
+    com: Array = field(default_factory=lambda: np.zeros(6))
+    com_now: Array = field(default_factory=lambda: np.zeros(4))
     com_push: float = 0.0
     pitch: float = 0.0
-    pitch_now: Array = _zeros(2)
+    pitch_now: Array = field(default_factory=lambda: np.zeros(2))
     feet: tuple[int, int] = (0, 1)
-    foot: Array = _zeros(2, 2, 3)
+    foot: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
     furthest: Array = field(default_factory=lambda: np.full(2, np.inf))
     hip_speed: float = 0.0

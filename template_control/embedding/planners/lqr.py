@@ -120,7 +120,16 @@ class LqrPlanner:
         self._settle_on(gait)
         # Compile now what a step would otherwise wait for.
         linear(self._law, gait.vlo, u := np.empty(3))
-        search(AUTOMATON.tables, _NODE, self._law, self._scratch, gait.vlo, self._spread, u, np.empty(3))
+        search(
+            AUTOMATON.tables,
+            _NODE,
+            self._law,
+            self._scratch,
+            gait.vlo,
+            self._spread,
+            u,
+            np.empty(3),
+        )
 
     def _settle_on(self, gait: WalkingGait) -> None:
         """Make ``gait`` the one that the law leads to."""

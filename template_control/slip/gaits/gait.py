@@ -99,12 +99,12 @@ class WalkingGait:
         return float(VLO.energy(self.parameters, self.vlo))
 
 
-def vlo_jacobians(gait: WalkingGait) -> tuple[Array, Array]:
+def vlo_jacobians(gait: Gait) -> tuple[Array, Array]:
     """Of the exact VLO map at a gait: A (3, 3) in z and B (3, 3) in alpha and shares of k0.
 
     B's columns are the touchdown angle [1/rad], kappa_1 / k0 and kappa_2 / k0.
     """
-    linear = ReturnMap(gait.parameters).linearise(gait.vlo, gait.controls)
+    linear = ReturnMap(gait.parameters).linearise(gait.state, gait.controls)
     k0 = gait.parameters.leg_stiffness
     return linear.state_jacobian, linear.control_jacobian[:, WALKING_SLOTS] * [1.0, k0, k0]
 

@@ -1,0 +1,211 @@
+"""Gaits are data: a robot hops on one leg on the spot, and the package knows nothing of it.
+
+Own nodes, an own task, an own entry for each phase and an own planner; the automaton's
+interpreter, the return map, the controller, the whole-body QP and PyBullet are the library's.
+docs/architecture.md leads through it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.phases import Clock, PhaseControl
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.robot.library import load_robot
+from template_control.robot.start import Pose
+from template_control.run.record import Record
+from template_control.run.simulation import SimulationOptions, simulate
+from template_control.slip.automaton.hybrid import Automaton, Edge, Node
+from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Phase, Reset, Slot
+from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import APEX
+from template_control.slip.parameters import SlipParameters
+from template_control.whole_body.com_task import ComTask
+from template_control.whole_body.foot_task import FootTask
+from template_control.whole_body.momentum_task import MomentumTask
+from template_control.whole_body.posture_task import PostureTask
+
+P = SlipParameters(leg_stiffness=25e3)
+HEIGHT = 1.02  # of the apex [m]
+HOPS = 10
+
+_FALLS = (Edge(Event.FALL, Outcome.FALL),)
+# As running, but the same leg lands again: liftoff changes no role.
+HOPPING = Automaton(
+    (
+        Node(
+            "F_aa^hop",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^hop", Reset.PLACE_REAR, "G_t^hop"), *_FALLS),
+        ),
+        Node(
+            "SS_sc^hop",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^hop", Reset.NONE, "G_b^hop"), *_FALLS),
+        ),
+        Node(
+            "SS_sd^hop",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (Edge(Event.REAR_LIFTOFF, "F_ba^hop", Reset.NONE, "G_l^hop"), *_FALLS),
+        ),
+        Node(
+            "F_ba^hop",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^hop", Reset.NONE, "G_a^hop", section=True), *_FALLS),
+        ),
+    ),
+    {"hop": "F_aa^hop"},
+)
+
+
+@dataclass(frozen=True)
+class TuckedFoot:
+    """Two rows: a foot stays where it is relative to the CoM."""
+
+    leg: Leg
+    place: tuple[float, float]  # from the CoM [m]
+    weight: float = 0.1
+    gains: tuple[float, float] = (200.0, 28.0)
+
+    @property
+    def weights(self):
+        return (self.weight, self.weight)
+
+    def write(self, robot, wanted, rows):
+        foot, (kp, kd) = wanted.feet[self.leg], self.gains
+        rows.jacobian[:] = robot.foot_jacobian[foot] - robot.com_jacobian
+        rows.bias[:] = robot.foot_bias[foot] - robot.com_bias
+        away = robot.com + self.place - robot.foot_position[foot]
+        rows.desired[:] = kp * away + kd * (robot.com_velocity - robot.foot_velocity[foot])
+
+
+TUCKED = TuckedFoot(Leg.FRONT, (-0.05, -0.75))
+PHASES = {
+    Phase.F: PhaseControl(
+        tasks=(PostureTask(0.01), FootTask(Leg.REAR), TUCKED),
+        swings=(Leg.REAR,),
+        clock=Clock.TIME,
+        momentum_speed=False,
+        weighs=False,
+    ),
+    Phase.SS: PhaseControl(
+        tasks=(ComTask((0.01, 10.0)), MomentumTask(), TUCKED), clock=Clock.TIME, weighs=False
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Hop:
+    """A hop on the spot that returns to its apex."""
+
+    state: np.ndarray
+    controls: np.ndarray
+    step_duration: float
+    name: str = "hop"
+    parameters: SlipParameters = P
+    stride: str = "hop"
+    step_length: float = 0.0
+
+
+class Deadbeat:
+    """The controls that lead to the target in one hop, by least squares on the exact map."""
+
+    def __init__(self, height):
+        u = np.array([0.5 * np.pi, P.leg_stiffness, P.leg_stiffness, 0.0, 0.0])
+        z = np.array([0.0, height])
+        stride = simulate_stride(P, "F_aa^hop", APEX.state(z), u, automaton=HOPPING)
+        self.gait = Hop(z, u, stride.duration)
+        self.offset = np.zeros(2)
+        self._map = ReturnMap(P, "hop", automaton=HOPPING)
+
+    def reset(self):
+        self.offset = np.zeros(2)
+
+    def decide(self, z, target=None, angles=ANY_ANGLE):
+        aim = (self.gait.state if target is None else target) - self.offset
+        low, high = np.maximum(angles[0], 1.3), np.minimum(angles[1], np.pi - 1.3)
+
+        def controls(x):
+            return np.array([x[0], x[1] * P.leg_stiffness, x[2] * P.leg_stiffness, 0.0, 0.0])
+
+        def errors(x):
+            end, outcome = self._map.step(z, controls(x))
+            away = end - aim if outcome is Outcome.SECTION else np.full(2, 10.0)
+            return np.append(away / [0.05, 0.005], 0.1 * (x[1:] - 1.0))
+
+        start = [np.clip(0.5 * np.pi - 0.1 * z[0], low + 1e-6, high - 1e-6), 1.0, 1.0]
+        found = least_squares(errors, start, bounds=([low, 0.5, 0.5], [high, 2.0, 2.0]))
+        end, outcome = self._map.step(z, controls(found.x))
+        done = outcome is Outcome.SECTION
+        return Decision(controls(found.x), np.append(end + self.offset, 0.0), done, done, done)
+
+    def observe(self, decision, z):
+        self.offset += 0.3 * np.clip(z - decision.predicted[:2], -0.05, 0.05)
+
+
+def hop(hops=HOPS, **options):
+    """A recorded run of the five-link robot."""
+    planner = Deadbeat(HEIGHT)
+    start = Pose(
+        com=np.array([0.0, HEIGHT]),
+        com_velocity=np.zeros(2),
+        feet=np.array([[0.0, HEIGHT - P.rest_length], np.add([0.0, HEIGHT], TUCKED.place)]),
+        feet_velocity=np.zeros((2, 2)),
+    )
+    o = SimulationOptions(
+        steps=hops, pose=start, embedding=EmbeddingOptions(phases=PHASES, torque_scale=2.0)
+    )
+    return simulate(load_robot("five-link"), planner, replace(o, **options), automaton=HOPPING)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return hop()
+
+
+def test_robot_hops_on_the_spot(record):
+    assert record.metadata["fall_reason"] == ""
+    assert record.steps == HOPS
+    speed, height, _ = record.section_state[3:].T
+    assert np.max(np.abs(height - HEIGHT)) < 0.02
+    assert np.max(np.abs(speed)) < 0.15
+    assert np.max(np.abs(record.com[:, 0])) < 0.3
+    assert record.solved.mean() > 0.99
+
+
+def test_it_flies_and_lands_on_the_same_foot(record):
+    force = record.contact_force[:, :, 1]
+    assert not force[:, 1].any(), "the tucked foot never touches"
+    nodes = [record.metadata["nodes"][i] for i in record.node]
+    flying = np.array([name.startswith("F") for name in nodes])
+    assert 0.2 < flying.mean() < 0.8
+    assert (record.rear == 0).all()
+    landings = np.flatnonzero(np.diff(flying.astype(int)) < 0)
+    assert len(landings) == HOPS
+    # What the ground gives over whole hops carries the robot's weight.
+    begin, end = np.searchsorted(record.time, record.section_time[[2, -1]])
+    assert force[begin:end, 0].mean() == pytest.approx(80.0 * 9.81, rel=0.05)
+
+
+def test_record_names_the_toy_s_nodes_section_and_stride(record, tmp_path):
+    assert record.metadata["sections"] == ["APEX"]
+    assert record.metadata["strides"] == ["hop"]
+    assert record.metadata["nodes"] == [node.name for node in HOPPING.nodes]
+    swings = record.swing_reference
+    assert np.isnan(swings[:, 1]).all(), "only the leg that lands has a foothold"
+    assert np.isfinite(swings[:, 0]).any()
+    assert np.isnan(swings[:, 0]).any()
+    again = Record.load(record.save(tmp_path / "hop.npz"))
+    np.testing.assert_array_equal(again.section_state, record.section_state)
