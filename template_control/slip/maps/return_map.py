@@ -10,11 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import TABLES
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, MapKind, Outcome
 from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import kernel_model
-from template_control.slip.maps.section_map import RESULTS, map_many, section_jacobian, section_map
+from template_control.slip.dynamics.model import stride_kernel
+from template_control.slip.maps.section_map import (
+    RESULTS,
+    Derivatives,
+    closed_form,
+    map_many,
+    section_jacobian,
+    section_map,
+)
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -87,8 +93,7 @@ class ReturnMap:
         self.kind = MapKind(kind)
         begin, end = AUTOMATON.sections(STRIDE_START[stride])
         self.dimensions = DIMENSION[begin], DIMENSION[end]
-        node = AUTOMATON.index[STRIDE_START[stride]]
-        self._kernel = TABLES, kernel_model(parameters), int(self.kind), node
+        self._kernel = stride_kernel(parameters, stride), closed_form(self.kind)
         self._scratch = new_scratch()
         self._complex_scratch = new_scratch(complex)
 
@@ -132,17 +137,17 @@ class ReturnMap:
         Returns:
             (RESULTS,) as :meth:`evaluate`; its (RESULTS, c) derivatives; the outcome.
         """
-        result, jacobian = np.empty(RESULTS), np.empty((RESULTS, len(columns)))
+        found = Derivatives(np.empty(RESULTS), np.empty((RESULTS, len(columns))))
         try:
             outcome = section_jacobian(
-                *self._kernel, _padded(z), u, columns, self._complex_scratch, result, jacobian
+                *self._kernel, _padded(z), u, columns, self._complex_scratch, found
             )
         except ZeroDivisionError:
             # Where a real division gives NaN, Numba's complex one raises. It happens in strides
             # that fail, such as on a leg without stiffness; there is no derivative to lose.
             result, ended = self.evaluate(z, u)
-            return result, np.full_like(jacobian, np.nan), ended
-        return result, jacobian, Outcome(outcome)
+            return result, np.full_like(found.jacobian, np.nan), ended
+        return *found, Outcome(outcome)
 
     def __call__(self, z: ArrayLike, u: ArrayLike) -> Mapped:
         """Strides from one state or many, with the same controls or each its own.
