@@ -168,7 +168,7 @@ def test_momentum_changes_are_the_integrals_they_stand_for():
 
     def polar(time):
         out = np.empty(6)
-        sample(Path(STANCE, a, a), time, out)
+        sample(STANCE, Path(a, a), time, out)
         return np.hypot(out[0] - 0.3, out[1]), np.arctan2(out[1], out[0] - 0.3)
 
     mean_r = quad(lambda s: polar(s)[0], 0.0, t)[0] / t

@@ -44,19 +44,19 @@ _NODE_TIME = 1e-10  # [s], of the first path's event where it only places the co
 def _follow(path: Path, edge: int, t: float, watch: Watch) -> float:
     """Time of the same event on a corrected path, from its time on the first; -1 if none."""
     event, guess = watch.events[edge], t.real
-    t = root(path, event, guess, 0.5 * guess, 1.5 * guess, _EVENT_TIME, watch)
+    t = root(STANCE, path, event, guess, (0.5 * guess, 1.5 * guess), _EVENT_TIME, watch)
     if t.real >= 0.0:
         return t
     watch.values[0, event], watch.armed[0] = -1.0, False
     alone = Watch(watch.events[edge : edge + 1], *watch[1:])
-    fired, t = first_event(path, 3.0 * guess, 0.1 * guess, _EVENT_TIME, alone)
+    fired, t = first_event(STANCE, path, 3.0 * guess, 0.1 * guess, _EVENT_TIME, alone)
     return t if fired >= 0 else 0.0 * t - 1.0
 
 
 @inner
 def _end_velocity(a: Array, momentum: float, t: float, state: Array, out: Array) -> None:
     """State at ``t``: position and radial speed of the path, angular rate p / (m r^2)."""
-    sample(Path(STANCE, a, a), t, out)
+    sample(STANCE, Path(a, a), t, out)
     x, y = out[0] - a[0], out[1]
     r = np.sqrt(x * x + y * y)
     c, s = x / r, y / r
@@ -106,12 +106,12 @@ def _stance(
     w2 = k / mass
     start = Launch(pivot, r, theta, radial)
     harmonic(a, start, momentum, w2, length, gravity)
-    path = Path(STANCE, a, a)
+    path = Path(a, a)
     horizon, accuracy = model.max_time + 0.0 * r, _EVENT_TIME
     if map_kind == _IMPROVED:
         horizon, accuracy = _PIECE / a[5], _NODE_TIME
     substep = _SUBSTEP * np.sqrt(rest_length / gravity)
-    edge, t = first_event(path, horizon.real, substep, accuracy, watch)
+    edge, t = first_event(STANCE, path, horizon.real, substep, accuracy, watch)
     if map_kind != _IMPROVED and edge < 0:
         return _NO_EVENT
     if edge >= 0 and t == 0.0:
@@ -179,10 +179,10 @@ def closed_form_stride(
             for i in range(4):
                 a[i] = state[i]
             a[4] = model.gravity
-            path = Path(FLIGHT, a, a)
+            path = Path(a, a)
             substep = _SUBSTEP * np.sqrt(rest_length / model.gravity)
-            edge, t = first_event(path, model.max_time, substep, _EVENT_TIME, watch)
-            sample(path, t, out)
+            edge, t = first_event(FLIGHT, path, model.max_time, substep, _EVENT_TIME, watch)
+            sample(FLIGHT, path, t, out)
             for i in range(4):
                 state[i] = out[i]
         else:

@@ -150,9 +150,9 @@ def run_stride(
         px, py = cx[row], cy[row]
         horizon = expand(state, toes, stiffness, model, px, py, work)
         horizon = min(horizon, max_time - time, 0.1 * np.sqrt(rest_length / gravity) * _SUBSTEPS)
-        path = Path(SERIES, px, py)
-        fired, step = first_event(path, horizon, horizon / _SUBSTEPS, _EVENT_TIME, watch)
-        sample(path, step, out)
+        path = Path(px, py)
+        fired, step = first_event(SERIES, path, horizon, horizon / _SUBSTEPS, _EVENT_TIME, watch)
+        sample(SERIES, path, step, out)
         for i in range(4):
             state[i] = out[i]
         meta[row, 0], meta[row, 1], meta[row, 2] = time, step.real, node

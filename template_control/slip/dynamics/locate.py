@@ -75,36 +75,37 @@ def _inverse_hermite(t0: float, g0: float, r0: float, t1: float, g1: float, r1: 
 
 @inner
 def root(
+    kind: int,
     path: Path,
     event: int,
     start: float,
-    lo: float,
-    hi: float,
+    bracket: tuple[float, float],
     tolerance: float,
     watch: Watch,
 ) -> float:
-    """Time in [lo, hi] at which the guard rises through 0, -1 if it does not.
+    """Time within ``bracket`` at which the guard rises through 0, -1 if it does not.
 
     Newton's method, then the inverse cubic through the last two points, kept bracketed. In
     complex arithmetic the imaginary part carries the event time's derivative, which two
     more steps make exact.
 
     Args:
-        path: on which the guard is taken.
+        kind, path: on which the guard is taken.
         event: value of the guard's Event.
         start: where to begin [s].
-        lo, hi: [s].
+        bracket: earliest and latest time [s].
         tolerance: of the time [s].
         watch: toes and lengths; its ``out`` is overwritten.
     """
     toes, rest_length, out = watch.toes, watch.rest_length, watch.out
+    lo, hi = bracket
     out[0] = 0.0
     t = start + out[0]  # of the path's type
     t_last = g_last = rate_last = t
     step_last = np.inf
     polish = 2 if np.iscomplexobj(out) else 0
     for _ in range(_ITERATIONS):
-        sample(path, t, out)
+        sample(kind, path, t, out)
         g = guard(event, out, toes, rest_length, watch.touchdown_height)
         rate = guard_rate(event, out, toes)
         if g.real >= 0.0:
@@ -134,12 +135,12 @@ def root(
 
 @inner
 def first_event(
-    path: Path, horizon: float, substep: float, tolerance: float, watch: Watch
+    kind: int, path: Path, horizon: float, substep: float, tolerance: float, watch: Watch
 ) -> tuple[int, float]:
     """First of a node's guards that fires within ``horizon``, and when.
 
     Args:
-        path: the CoM's.
+        kind, path: the CoM's, see :func:`~.path.sample`.
         horizon: where to stop looking [s].
         substep: a guard is taken to rise through zero at most once within it [s].
         tolerance: of event times [s].
@@ -156,7 +157,7 @@ def first_event(
         t_hi = min(t_lo + substep, horizon)
         if t_hi > horizon - 1e-6 * substep:
             t_hi = horizon
-        sample(path, t_hi, out)
+        sample(kind, path, t_hi, out)
         rose = False
         all_guards(out, watch.toes, watch.rest_length, watch.touchdown_height, values[1])
         for i in range(events.shape[0]):
@@ -173,7 +174,7 @@ def first_event(
                 t = t_lo + 0.0 * fired_at
                 if g_lo < 0.0:
                     start = t_lo - g_lo * (t_hi - t_lo) / (g_hi - g_lo)
-                    t = root(path, events[i], start, t_lo, t_hi, tolerance, watch)
+                    t = root(kind, path, events[i], start, (t_lo, t_hi), tolerance, watch)
                 if fired < 0 or t.real < fired_at.real:
                     fired, fired_at = i, t
         for i in range(NUM_EVENTS):

@@ -192,7 +192,7 @@ def corrected(
     x, y = a[0] + radius * c, radius * s
     for i in range(3):
         if i > 0:
-            sample(Path(STANCE, a, a), 0.5 * i * t, out)
+            sample(STANCE, Path(a, a), 0.5 * i * t, out)
             x, y = out[0], out[1]
         d = x - a[0]
         r = np.sqrt(d * d + y * y)
