@@ -10,8 +10,13 @@ from template_control.errors import ParameterError
 from template_control.paper.error_study import Grid, study
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
-from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, sample
-from template_control.slip.dynamics.stance_map import axial_torsional, harmonic, momentum_changes
+from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, Path, sample
+from template_control.slip.dynamics.stance_map import (
+    Launch,
+    axial_torsional,
+    harmonic,
+    momentum_changes,
+)
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.maps.return_map import ReturnMap
@@ -160,11 +165,11 @@ def test_double_stance_constants_solve_the_papers_equations():
 def test_momentum_changes_are_the_integrals_they_stand_for():
     """(13) and (27) are exact integrals of (11); (12) is the trapezoid of gravity's torque."""
     a, t = np.zeros(COEFFICIENTS), 0.12
-    harmonic(a, 0.3, 0.96, 1.7, -0.2, K0 / P.mass, 0.97, -1.05, P.gravity)
+    harmonic(a, Launch(0.3, 0.96, 1.7, -0.2), -1.05, K0 / P.mass, 0.97, P.gravity)
 
     def polar(time):
         out = np.empty(6)
-        sample(STANCE, a, a, time, out)
+        sample(STANCE, Path(a, a), time, out)
         return np.hypot(out[0] - 0.3, out[1]), np.arctan2(out[1], out[0] - 0.3)
 
     mean_r = quad(lambda s: polar(s)[0], 0.0, t)[0] / t

@@ -8,18 +8,22 @@ gait and not beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.embedding.planners.step_search import FALL_PRICE, Law, linear, price, search
-from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.vocabulary import MapKind
+from template_control.embedding.planners.step_search import (
+    FALL_PRICE,
+    Law,
+    linear,
+    price,
+    search,
+)
 from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import kernel_model
+from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WALKING_SLOTS, WalkingGait, vlo_jacobians
 from template_control.slip.gaits.walking_family import WalkingFamily
 from template_control.slip.similarity import (
@@ -34,8 +38,28 @@ from template_control.slip.similarity import (
 
 Array = NDArray[np.float64]
 
-_EXACT = int(MapKind.EXACT)
-_NODE = AUTOMATON.index[STRIDE_START["w"]]
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How a step is searched for where the linear law's own is not good enough.
+
+    Attributes:
+        first_weight: of the cost-to-go after the first step beside that after the second:
+            where two steps end alike, the one that is nearer the gait half-way is taken.
+        coarse: points in alpha, kappa_1 and kappa_2 over all of their ranges; most in alpha,
+            which decides where the foot lands.
+        fine: points in alpha and kappa_2 of each finer grid about the best so far, at least 2;
+            kappa_1, which matters least there, gets two points beside its plane.
+        rounds: finer grids; with two, alphas end 0.03 rad apart.
+        narrowing: a finer grid's half-widths over those of the one before; at most the spacing
+            of its alphas, half of a half-width: what lies beyond has its neighbour's price.
+    """
+
+    first_weight: float = tuned(0.3)
+    coarse: tuple[int, int, int] = tuned((5, 3, 3))
+    fine: tuple[int, int] = tuned((5, 3))
+    rounds: int = tuned(2)
+    narrowing: float = tuned(0.4)
 
 
 _VLO_STATE = (SPEED, LENGTH, SPEED)
@@ -66,6 +90,7 @@ class LqrOptions:
             foot would touch down at once.
         trusted_price: the linear law's step is taken without a search below this price.
         spread: half-widths of the search in alpha [rad] and kappa_2 / k0.
+        search: points, rounds and weights of the search.
         second_steps: second steps that the search reckons with beside the law's own: alpha relative
             to the gait's [rad], kappa_1 and kappa_2 over k0. A leg that is stiffer before its
             virtual bottom than after takes energy out, the reverse puts some in.
@@ -85,6 +110,7 @@ class LqrOptions:
     top_margin: float = tuned(0.01)
     trusted_price: float = tuned(1.0)
     spread: tuple[float, float] = tuned((0.16, 0.25))
+    search: SearchOptions = field(default_factory=SearchOptions)
     second_steps: tuple[tuple[float, float, float], ...] = tuned(
         (
             (0.0, 1.5, 1.0),
@@ -116,20 +142,12 @@ class LqrPlanner:
         self.offset: Array = np.zeros(3)
         self._family = WalkingFamily(gait)
         self._scratch = new_scratch()
-        self._spread = np.array(self.options.spread)
+        grid, spread = self.options.search, self.options.spread
+        self._grid = Grid(grid.coarse, grid.fine, grid.rounds, *spread, grid.narrowing)
         self._settle_on(gait)
         # Compile now what a step would otherwise wait for.
         linear(self._law, gait.vlo, u := np.empty(3))
-        search(
-            AUTOMATON.tables,
-            _NODE,
-            self._law,
-            self._scratch,
-            gait.vlo,
-            self._spread,
-            u,
-            np.empty(3),
-        )
+        search(self._law, self._grid, self._scratch, gait.vlo, u, np.empty(3))
 
     def _settle_on(self, gait: WalkingGait) -> None:
         """Make ``gait`` the one that the law leads to."""
@@ -164,9 +182,10 @@ class LqrPlanner:
             upper=np.array([nominal[0] + o.angle_range[1], *[o.stiffness_range[1]] * 2]),
             second_steps=np.add(np.array(o.second_steps).reshape(-1, 3), (nominal[0], 0.0, 0.0)),
             enough=o.trusted_price,
+            first_weight=o.search.first_weight,
             top_margin=o.top_margin,
             stiffness=p.leg_stiffness,
-            model=kernel_model(p),
+            kernel=stride_kernel(p, "w"),
         )
 
     def decide(
@@ -188,10 +207,10 @@ class LqrPlanner:
             law = law._replace(lower=lower, upper=upper)
         u, first = np.empty(3), np.empty(3)
         linear(law, z, u)
-        cost = price(AUTOMATON.tables, _NODE, _EXACT, law, s, z, u, np.inf, first)
+        cost = price(law, None, s, z, u, np.inf, first)
         nominal = cost < self.options.trusted_price
         if not nominal:
-            cost = search(AUTOMATON.tables, _NODE, law, s, z, self._spread, u, first)
+            cost = search(law, self._grid, s, z, u, first)
         controls = self.gait.controls.copy()
         controls[WALKING_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)

@@ -8,18 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
-from template_control.slip.control.modified_walking import search_angle
+from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
 from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import kernel_model
+from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.walking_family import WalkingFamily
+from template_control.slip.maps.section_map import closed_form
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
-
-_NODE = AUTOMATON.index[STRIDE_START["w"]]
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class ModifiedPlanner:
         self.offset: Array = np.zeros(3)
         self._family = WalkingFamily(gait)
         self._scratch = new_scratch()
-        self._model = kernel_model(gait.parameters)
+        self._kernel = stride_kernel(gait.parameters, "w")
         k0 = gait.parameters.leg_stiffness
         self._stiffness = np.array(self.options.stiffness_range) * k0
 
@@ -77,19 +75,10 @@ class ModifiedPlanner:
         top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
         high = min(nominal + o.angle_range[1], top, max(angles[1], nominal + o.angle_range[0]))
         low = min(max(nominal + o.angle_range[0], angles[0]), high)
+        search = AngleSearch(min(max(nominal, low), high), low, high, p.leg_stiffness)
+        aim = Aim(self.gait.vlo, self._stiffness)
         outcome, alpha, kappa_2, residual = search_angle(
-            AUTOMATON.tables,
-            self._model,
-            int(o.map_kind),
-            _NODE,
-            z,
-            self.gait.vlo,
-            min(max(nominal, low), high),
-            np.array([low, high]),
-            p.leg_stiffness,
-            self._stiffness,
-            self._scratch,
-            predicted,
+            self._kernel, closed_form(o.map_kind), z, aim, search, self._scratch, predicted
         )
         controls = self.gait.controls.copy()
         controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2

@@ -14,17 +14,37 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.automaton.tables import Tables
-from template_control.slip.automaton.vocabulary import MapKind
-from template_control.slip.dynamics.kernel import Model, Scratch
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Slot
+from template_control.slip.dynamics.kernel import Scratch
+from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.section_map import RESULTS, section_map
 
 Array = NDArray[np.float64]
 
-# Numba would compile the maps once more for each literal int.
-_EXACT, _FAST = np.int64(MapKind.EXACT), np.int64(MapKind.IMPROVED)
+# Numba would compile the map once more for a literal int.
+_FAST = np.int64(MapKind.IMPROVED)
+_ANGLE, _K_SC, _K_SD = int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
+
+
+class Grid(NamedTuple):
+    """The controls that :func:`search` tries.
+
+    Attributes:
+        coarse: points in alpha, kappa_1, kappa_2 of the first grid, over all bounds.
+        fine: points in alpha and kappa_2 of the later ones, about the best found.
+        rounds: how many later ones.
+        width_alpha, width_kappa: half-widths of the first of these [rad, of k0].
+        narrowing: half-widths of each over those of the one before.
+    """
+
+    coarse: tuple[int, int, int]
+    fine: tuple[int, int]
+    rounds: int
+    width_alpha: float
+    width_kappa: float
+    narrowing: float
 
 
 class Law(NamedTuple):
@@ -39,9 +59,10 @@ class Law(NamedTuple):
         lower, upper: (3,) bounds of u.
         second_steps: (n, 3) other controls than u_s - K (z - z_s) for the second step.
         enough: a cost below which no other second step is tried.
+        first_weight: of the cost-to-go after the first step beside that after the second.
         top_margin: alpha stays this far [rad] below asin(y / l0).
         stiffness: k0 [N/m].
-        model: the template.
+        kernel: the template's walking step.
     """
 
     target: Array
@@ -53,9 +74,10 @@ class Law(NamedTuple):
     upper: Array
     second_steps: Array
     enough: float
+    first_weight: float
     top_margin: float
     stiffness: float
-    model: Model
+    kernel: Kernel
 
 
 @njit(cache=True)
@@ -63,7 +85,7 @@ def bounded(law: Law, z: Array, u: Array) -> None:
     """Clip controls ``u`` (3,) in place to what is admissible at VLO state ``z`` (3,)."""
     for i in range(3):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
-    top = np.arcsin(min(z[1] / law.model.rest_length, 1.0)) - law.top_margin
+    top = np.arcsin(min(z[1] / law.kernel.model.rest_length, 1.0)) - law.top_margin
     u[0] = min(u[0], top)
 
 
@@ -78,15 +100,13 @@ def linear(law: Law, z: Array, u: Array) -> None:
 
 
 @njit(cache=True)
-def step(
-    tables: Tables, node: int, kind: int, law: Law, s: Scratch, z: Array, u: Array, z_next: Array
-) -> int:
+def step(law: Law, kind: int | None, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
     """One step from ``z`` with controls ``u``, the robot's offset included; the Outcome."""
-    controls = np.zeros(5)
-    controls[0] = u[0]
-    controls[1], controls[2] = u[1] * law.stiffness, u[2] * law.stiffness
+    controls = np.zeros(NUM_SLOTS)
+    controls[_ANGLE] = u[0]
+    controls[_K_SC], controls[_K_SD] = u[1] * law.stiffness, u[2] * law.stiffness
     result = np.empty(RESULTS)
-    outcome = section_map(tables, law.model, kind, node, z, controls, s, result)
+    outcome = section_map(law.kernel, kind, z, controls, s, result)
     for i in range(3):
         z_next[i] = result[i] + law.offset[i]
     return outcome
@@ -103,112 +123,103 @@ def _cost_to_go(law: Law, z: Array) -> float:
 
 @njit(cache=True)
 def price(
-    tables: Tables,
-    node: int,
-    kind: int,
-    law: Law,
-    s: Scratch,
-    z: Array,
-    u: Array,
-    limit: float,
-    first: Array,
+    law: Law, kind: int | None, s: Scratch, z: Array, u: Array, limit: float, first: Array
 ) -> float:
     """Cost of taking ``u`` at ``z``; the state after one step into ``first`` (3,).
 
     Args:
-        kind: the MapKind.
+        law: what judges.
+        kind: of map, from :func:`~template_control.slip.maps.section_map.closed_form`.
+        s: overwritten.
+        z: (3,) VLO state.
+        u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
         limit: a cost known to be too much; the second step is not looked at beyond it.
+        first: overwritten.
     """
-    second = np.empty(3)
-    u2 = np.empty(3)
-    if step(tables, node, kind, law, s, z, u, first) != 0:
+    second, u2 = np.empty(3), np.empty(3)
+    if step(law, kind, s, z, u, first) != 0:
         return 2.0 * FALL_PRICE
     here = _cost_to_go(law, first)
-    if 0.3 * here >= limit:
-        return 0.3 * here
-    linear(law, first, u2)
+    share = law.first_weight * here
+    if share >= limit:
+        return share
     best = FALL_PRICE + here
-    if step(tables, node, kind, law, s, first, u2, second) == 0:
-        best = _cost_to_go(law, second) + 0.3 * here
-    for i in range(law.second_steps.shape[0]):
-        # The law's own step is good enough near the gait.
-        if best < law.enough:
-            break
-        u2[:] = law.second_steps[i]
-        bounded(law, first, u2)
-        if step(tables, node, kind, law, s, first, u2, second) == 0:
-            best = min(best, _cost_to_go(law, second) + 0.3 * here)
+    for i in range(-1, law.second_steps.shape[0]):
+        if i < 0:
+            linear(law, first, u2)
+        else:
+            # The law's own step is good enough near the gait.
+            if best < law.enough:
+                break
+            u2[:] = law.second_steps[i]
+            bounded(law, first, u2)
+        if step(law, kind, s, first, u2, second) == 0:
+            best = min(best, _cost_to_go(law, second) + share)
     return best
 
 
 @njit(cache=True)
-def _try(
-    tables: Tables,
-    node: int,
-    law: Law,
-    s: Scratch,
-    z: Array,
-    u: Array,
-    cheapest: float,
-    best: Array,
-    first: Array,
-    end: Array,
-) -> float:
-    """Price ``u`` once within bounds; if it is cheaper, it is the new best."""
-    bounded(law, z, u)
-    cost = price(tables, node, _FAST, law, s, z, u, cheapest, end)
-    if cost >= cheapest:
-        return cheapest
-    best[:] = u
-    first[:] = end
-    return cost
+def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
+    """Point ``i`` of the grid over all bounds into ``u`` (3,)."""
+    n0, n1, n2 = grid.coarse
+    u[0] = (i // (n1 * n2) + 0.5) / n0
+    u[1] = (i // n2 % n1 + 0.5) / n1
+    u[2] = (i % n2 + 0.5) / n2
+    for j in range(3):
+        u[j] = law.lower[j] + u[j] * (law.upper[j] - law.lower[j])
 
 
 @njit(cache=True)
-def search(
-    tables: Tables,
-    node: int,
-    law: Law,
-    s: Scratch,
-    z: Array,
-    spread: Array,
-    best: Array,
-    first: Array,
-) -> float:
+def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
+    """Point ``i`` of a grid about ``centre`` (3,) into ``u`` (3,).
+
+    A plane of points in alpha and kappa_2, then two in kappa_1.
+    """
+    n0, n2 = grid.fine
+    u[:] = centre
+    if i < n0 * n2:
+        u[0] += (i // n2 / (0.5 * (n0 - 1)) - 1.0) * widths[0]
+        u[2] += (i % n2 / (0.5 * (n2 - 1)) - 1.0) * widths[1]
+    else:
+        u[1] += (2 * (i - n0 * n2) - 1) * widths[1]
+
+
+@njit(cache=True)
+def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array) -> float:
     """Improve ``best`` (3,) in place: a coarse grid over all bounds, then finer ones about it.
 
     Far from the gait the good steps (hard braking, say, with a stiff leg before the virtual
     bottom and a soft one after) are not near what the linear law says.
 
     Args:
-        spread: (2,) half-widths of the first fine grid in alpha [rad] and kappa/k0.
+        law: what judges.
+        grid: what to try.
+        s: overwritten.
+        z: (3,) VLO state.
         best: start of the search, and its result.
         first: (3,) overwritten with the state after the step.
 
     Returns:
         The price of ``best``.
     """
-    u, end = np.empty(3), np.empty(3)
-    cheapest = price(tables, node, _FAST, law, s, z, best, np.inf, first)
-    for i in range(45):
-        u[0] = (i // 9 + 0.5) / 5.0
-        u[1] = (i // 3 % 3 + 0.5) / 3.0
-        u[2] = (i % 3 + 0.5) / 3.0
-        for j in range(3):
-            u[j] = law.lower[j] + u[j] * (law.upper[j] - law.lower[j])
-        cheapest = _try(tables, node, law, s, z, u, cheapest, best, first, end)
-    width_alpha, width_kappa = spread[0], spread[1]
-    for _ in range(2):
-        c0, c1, c2 = best[0], best[1], best[2]
-        for i in range(17):
-            # 5 x 3 points in alpha and kappa_2 about the centre, and two in kappa_1.
-            u[0], u[1], u[2] = c0, c1, c2
-            if i < 15:
-                u[0] += 0.5 * (i // 3 - 2) * width_alpha
-                u[2] += (i % 3 - 1) * width_kappa
+    u, end, centre = np.empty(3), np.empty(3), np.empty(3)
+    cheapest = price(law, _FAST, s, z, best, np.inf, first)
+    coarse = grid.coarse[0] * grid.coarse[1] * grid.coarse[2]
+    widths = grid.width_alpha, grid.width_kappa
+    for level in range(1 + grid.rounds):
+        count = coarse if level == 0 else grid.fine[0] * grid.fine[1] + 2
+        for i in range(count):
+            if level == 0:
+                _coarse(grid, law, i, u)
             else:
-                u[1] += (2 * i - 31) * width_kappa
-            cheapest = _try(tables, node, law, s, z, u, cheapest, best, first, end)
-        width_alpha *= 0.4
-        width_kappa *= 0.4
-    return price(tables, node, _EXACT, law, s, z, best, np.inf, first)
+                _fine(grid, centre, widths, i, u)
+            bounded(law, z, u)
+            cost = price(law, _FAST, s, z, u, cheapest, end)
+            if cost < cheapest:
+                cheapest = cost
+                best[:] = u
+                first[:] = end
+        centre[:] = best
+        if level > 0:
+            widths = grid.narrowing * widths[0], grid.narrowing * widths[1]
+    return price(law, None, s, z, best, np.inf, first)

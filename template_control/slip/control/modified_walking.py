@@ -6,16 +6,16 @@ energy at the next VLO for whatever touchdown angle is tried; the angle is searc
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
-from template_control.slip.dynamics.kernel import Model, Scratch, new_scratch
-from template_control.slip.dynamics.stride import kernel_model
-from template_control.slip.maps.section_map import RESULTS, section_map
+from template_control.slip.dynamics.kernel import Scratch, new_scratch
+from template_control.slip.dynamics.model import Kernel, Model, stride_kernel
+from template_control.slip.maps.section_map import RESULTS, closed_form, section_map
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -25,6 +25,49 @@ _K_SC = int(Slot.K_SC)
 _K_SD = int(Slot.K_SD)
 _STEP = 1e-20  # of a complex step
 _SECTION = int(Outcome.SECTION)
+
+
+class Aim(NamedTuple):
+    """What a step is to reach, and with what.
+
+    Attributes:
+        target: (3,) dx/dt, y, dy/dt wanted at the next VLO [m/s, m, m/s].
+        stiffness_range: (2,) bounds of kappa_2 [N/m].
+    """
+
+    target: Array
+    stiffness_range: Array
+
+
+class AngleSearch(NamedTuple):
+    """How :func:`search_angle` looks for the touchdown angle.
+
+    Attributes:
+        nominal: angle of the step after the first [rad].
+        least, greatest: angles to try [rad].
+        kappa_1: stiffness before the virtual bottom [N/m].
+        coarse, fine: angles of the first grid, over all of the range, and of each later one.
+        grids: how many, each about the best angle of the one before.
+        narrowing: half-width of a grid over the spacing of the one before: under 1, so that
+            its outer angles are not those just tried.
+        second_weight: of the squared residual after the second step beside the first's; small,
+            as the first is to reach the target.
+        failure: counts in place of it where the second step fails [m^2/s^2]; more than any
+            residual, so that a step after which the template walks on goes before.
+        fall: added where the first step itself fails [m^2/s^2].
+    """
+
+    nominal: float
+    least: float
+    greatest: float
+    kappa_1: float
+    coarse: int = 9
+    fine: int = 5
+    grids: int = 3
+    narrowing: float = 0.75
+    second_weight: float = 0.1
+    failure: float = 10.0
+    fall: float = 1e6
 
 
 @njit(cache=True)
@@ -55,122 +98,102 @@ def energy_stiffness(
 
 @njit(cache=True)
 def modified_step(
-    tables: Tables,
-    model: Model,
-    kind: int,
-    node: int,
+    kernel: Kernel,
+    kind: int | None,
     z: Array,
-    target: Array,
-    stiffness_range: Array,
+    aim: Aim,
     controls: Array,
     scratch: Scratch,
     result: Array,
 ) -> int:
-    """One step with kappa_2 of (38), kept within ``stiffness_range``.
+    """One step with kappa_2 of (38), kept within its bounds.
 
     Args:
-        kind: value of the MapKind.
-        target: (3,) the state wanted at the next VLO.
-        stiffness_range: (2,) bounds of kappa_2 [N/m].
+        aim: the VLO state wanted, and the bounds.
         controls: (NUM_SLOTS,) touchdown angle and kappa_1; kappa_2 is overwritten.
         The rest as in :func:`~template_control.slip.maps.section_map.section_map`.
 
     Returns:
         The Outcome's value.
     """
+    stiffness_range = aim.stiffness_range
     # The first pass finds the virtual bottom, which kappa_2 does not influence.
     controls[_K_SD] = controls[_K_SC]
-    outcome = section_map(tables, model, kind, node, z, controls, scratch, result)
+    outcome = section_map(kernel, kind, z, controls, scratch, result)
     rear, front = result[4], result[5]
     if not np.isfinite(rear.real):
         return outcome
-    wanted = energy_stiffness(z, target, front, rear, controls[_K_SC], model)
+    wanted = energy_stiffness(z, aim.target, front, rear, controls[_K_SC], kernel.model)
     if wanted.real < stiffness_range[0]:
         wanted = stiffness_range[0] + 0.0 * wanted
     elif wanted.real > stiffness_range[1]:
         wanted = stiffness_range[1] + 0.0 * wanted
     controls[_K_SD] = wanted
-    return section_map(tables, model, kind, node, z, controls, scratch, result)
+    return section_map(kernel, kind, z, controls, scratch, result)
 
 
 @njit(cache=True)
 def modified_many(
-    tables: Tables,
-    model: Model,
-    kind: int,
-    node: int,
-    z: Array,
-    target: Array,
-    stiffness_range: Array,
-    controls: Array,
-    scratch: Scratch,
-    result: Array,
-    outcome: IntArray,
-) -> None:
+    kernel: Kernel, kind: int | None, z: Array, aim: Aim, controls: Array, scratch: Scratch
+) -> tuple[Array, IntArray]:
     """:func:`modified_step` from one state for rows of ``controls`` (n, NUM_SLOTS)."""
-    for i in range(controls.shape[0]):
-        outcome[i] = modified_step(
-            tables, model, kind, node, z, target, stiffness_range, controls[i], scratch, result[i]
-        )
+    count = controls.shape[0]
+    result, outcome = np.empty((count, RESULTS)), np.empty(count, np.int64)
+    for i in range(count):
+        outcome[i] = modified_step(kernel, kind, z, aim, controls[i], scratch, result[i])
+    return result, outcome
 
 
 @njit(cache=True)
 def search_angle(
-    tables: Tables,
-    model: Model,
-    kind: int,
-    node: int,
+    kernel: Kernel,
+    kind: int | None,
     z: Array,
-    target: Array,
-    nominal_alpha: float,
-    angles: Array,
-    kappa_1: float,
-    stiffness_range: Array,
+    aim: Aim,
+    search: AngleSearch,
     scratch: Scratch,
     z_next: Array,
 ) -> tuple[int, float, float, float]:
     """Touchdown angle whose step ends nearest ``target``, equations (36) and (37).
 
-    A step is judged with the one after it (at ``nominal_alpha``), so that of two poor steps
+    A step is judged with the one after it (at the nominal angle), so that of two poor steps
     the one is taken from which the gait can be reached.
 
     Args:
-        angles: (2,) least and greatest angle to try [rad].
+        search: which angles, and what counts.
+        z_next: (3,) overwritten with the VLO state after the step.
         The rest as in :func:`modified_step`.
 
     Returns:
         Outcome, alpha [rad], kappa_2 [N/m], squared residual of the first step.
     """
     z1, z2, u = np.empty(RESULTS), np.empty(RESULTS), np.zeros(NUM_SLOTS)
-    best_cost, best_alpha, best_kappa, best_residual = np.inf, nominal_alpha, kappa_1, np.inf
+    target, nominal, kappa_1 = aim.target, search.nominal, search.kappa_1
+    best_cost, best_alpha, best_kappa, best_residual = np.inf, nominal, kappa_1, np.inf
     best_outcome = -1
-    low, high = angles[0], angles[1]
-    for level in range(3):
-        count = 9 if level == 0 else 5
+    low, high = search.least, search.greatest
+    for grid in range(search.grids):
+        count = search.coarse if grid == 0 else search.fine
         for i in range(count):
             alpha = low + (high - low) * i / (count - 1)
             u[0], u[_K_SC] = alpha, kappa_1
-            outcome = modified_step(
-                tables, model, kind, node, z, target, stiffness_range, u, scratch, z1
-            )
+            outcome = modified_step(kernel, kind, z, aim, u, scratch, z1)
             kappa_2 = u[_K_SD]
             residual = np.sum((z1[:3] - target) ** 2)
             if outcome != _SECTION:
-                cost = 1e6 + residual
+                cost = search.fall + residual
             else:
-                u[0] = nominal_alpha
-                following = modified_step(
-                    tables, model, kind, node, z1[:3], target, stiffness_range, u, scratch, z2
-                )
-                second = np.sum((z2[:3] - target) ** 2)
-                cost = residual + (0.1 * second if following == _SECTION else 10.0)
+                u[0] = nominal
+                following = modified_step(kernel, kind, z1[:3], aim, u, scratch, z2)
+                second = search.second_weight * np.sum((z2[:3] - target) ** 2)
+                cost = residual + (second if following == _SECTION else search.failure)
             if cost < best_cost or best_outcome < 0:
                 best_cost, best_alpha, best_kappa = cost, alpha, kappa_2
                 best_residual, best_outcome = residual, outcome
                 z_next[:] = z1[:3]
         width = (high - low) / (count - 1)
-        low = max(angles[0], best_alpha - 0.75 * width)
-        high = min(angles[1], best_alpha + 0.75 * width)
+        low = max(search.least, best_alpha - search.narrowing * width)
+        high = min(search.greatest, best_alpha + search.narrowing * width)
     return best_outcome, best_alpha, best_kappa, best_residual
 
 
@@ -196,23 +219,23 @@ class ModifiedMap:
         self.parameters = parameters
         self.target = np.zeros(3)
         self._range = np.array(stiffness_range)
-        node = AUTOMATON.index[STRIDE_START["w"]]
-        self._kernel = AUTOMATON.tables, kernel_model(parameters), int(kind), node
+        self._kernel = stride_kernel(parameters, "w"), closed_form(kind)
         self._scratch, self._complex_scratch = new_scratch(), new_scratch(complex)
+
+    @property
+    def _aim(self) -> Aim:
+        return Aim(self.target, self._range)
 
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
         """See :meth:`~template_control.slip.maps.return_map.ReturnMap.evaluate`."""
         result = np.empty(RESULTS)
-        outcome = modified_step(
-            *self._kernel, z, self.target, self._range, u, self._scratch, result
-        )
+        outcome = modified_step(*self._kernel, z, self._aim, u, self._scratch, result)
         return result, Outcome(outcome)
 
     def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
         """See :meth:`~template_control.slip.maps.return_map.ReturnMap.evaluate_many`."""
-        result, outcome = np.empty((len(u), RESULTS)), np.empty(len(u), dtype=np.int64)
-        modified_many(*self._kernel, z, self.target, self._range, u, self._scratch, result, outcome)
-        return result, outcome
+        found: tuple[Array, IntArray] = modified_many(*self._kernel, z, self._aim, u, self._scratch)
+        return found
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
         """See ``derivatives``; kappa_2 varies along with u."""
@@ -225,8 +248,6 @@ class ModifiedMap:
             uc = u.astype(complex)
             uc[column - 3] += 1j * _STEP
             step = np.empty(RESULTS, dtype=complex)
-            modified_step(
-                *self._kernel, zc, self.target, self._range, uc, self._complex_scratch, step
-            )
+            modified_step(*self._kernel, zc, self._aim, uc, self._complex_scratch, step)
             jacobian[:, c] = step.imag / _STEP
         return result, jacobian, outcome

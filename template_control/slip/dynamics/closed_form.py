@@ -9,13 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.dynamics.compiled import inner
-from template_control.slip.dynamics.kernel import Model, Scratch, apply_reset, note_bottom
-from template_control.slip.dynamics.locate import arm, first_event, root
-from template_control.slip.dynamics.path import FLIGHT, STANCE, sample
+from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_bottom
+from template_control.slip.dynamics.locate import Watch, arm, first_event, root
+from template_control.slip.dynamics.model import Kernel, Model
+from template_control.slip.dynamics.path import FLIGHT, STANCE, Path, sample
 from template_control.slip.dynamics.stance_map import (
+    Launch,
     axial_torsional,
     corrected,
     harmonic,
@@ -24,7 +25,6 @@ from template_control.slip.dynamics.stance_map import (
 )
 
 Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _GEYER = int(MapKind.GEYER)
 _PAPER = int(MapKind.PAPER)
@@ -41,60 +41,22 @@ _NODE_TIME = 1e-10  # [s], of the first path's event where it only places the co
 
 
 @inner
-def _follow(
-    kind: int,
-    a: Array,
-    events: IntArray,
-    edge: int,
-    t: float,
-    toes: Array,
-    model: Model,
-    touchdown_height: float,
-    out: Array,
-    values: Array,
-    armed: Array,
-) -> float:
+def _follow(path: Path, edge: int, t: float, watch: Watch) -> float:
     """Time of the same event on a corrected path, from its time on the first; -1 if none."""
-    event, guess = events[edge], t.real
-    t = root(
-        kind,
-        a,
-        a,
-        event,
-        guess,
-        0.5 * guess,
-        1.5 * guess,
-        _EVENT_TIME,
-        toes,
-        model.rest_length,
-        touchdown_height,
-        out,
-    )
+    event, guess = watch.events[edge], t.real
+    t = root(STANCE, path, event, guess, (0.5 * guess, 1.5 * guess), _EVENT_TIME, watch)
     if t.real >= 0.0:
         return t
-    values[0, event], armed[0] = -1.0, False
-    fired, t = first_event(
-        kind,
-        a,
-        a,
-        3.0 * guess,
-        0.1 * guess,
-        _EVENT_TIME,
-        events[edge : edge + 1],
-        toes,
-        model.rest_length,
-        touchdown_height,
-        values,
-        armed,
-        out,
-    )
+    watch.values[0, event], watch.armed[0] = -1.0, False
+    alone = Watch(watch.events[edge : edge + 1], *watch[1:])
+    fired, t = first_event(STANCE, path, 3.0 * guess, 0.1 * guess, _EVENT_TIME, alone)
     return t if fired >= 0 else 0.0 * t - 1.0
 
 
 @inner
 def _end_velocity(a: Array, momentum: float, t: float, state: Array, out: Array) -> None:
     """State at ``t``: position and radial speed of the path, angular rate p / (m r^2)."""
-    sample(STANCE, a, a, t, out)
+    sample(STANCE, Path(a, a), t, out)
     x, y = out[0] - a[0], out[1]
     r = np.sqrt(x * x + y * y)
     c, s = x / r, y / r
@@ -118,23 +80,14 @@ def _potential(state: Array, toes: Array, stiffness: Array, model: Model) -> flo
 
 @inner
 def _stance(
-    map_kind: int,
-    model: Model,
-    state: Array,
-    toes: Array,
-    stiffness: Array,
-    events: IntArray,
-    touchdown_height: float,
-    values: Array,
-    armed: Array,
-    a: Array,
-    out: Array,
+    map_kind: int, model: Model, state: Array, stiffness: Array, a: Array, watch: Watch
 ) -> int:
     """Carry ``state`` to the end of a stance phase; the edge that fires.
 
     ``_NO_EVENT`` if none does, ``_GOES_ON`` where the phase is too long for one path.
     """
     mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
+    toes, out = watch.toes, watch.out
     torsion = 0.0 * state[0]
     if stiffness[0] == 0.0 or stiffness[1] == 0.0:
         leg = 0 if stiffness[1] == 0.0 else 1
@@ -151,25 +104,14 @@ def _stance(
     radial = state[2] * c + state[3] * s
     momentum = r * (state[3] * c - state[2] * s)
     w2 = k / mass
-    harmonic(a, pivot, r, theta, radial, w2, length, momentum, gravity)
+    start = Launch(pivot, r, theta, radial)
+    harmonic(a, start, momentum, w2, length, gravity)
+    path = Path(a, a)
     horizon, accuracy = model.max_time + 0.0 * r, _EVENT_TIME
     if map_kind == _IMPROVED:
         horizon, accuracy = _PIECE / a[5], _NODE_TIME
-    edge, t = first_event(
-        STANCE,
-        a,
-        a,
-        horizon.real,
-        _SUBSTEP * np.sqrt(rest_length / gravity),
-        accuracy,
-        events,
-        toes,
-        rest_length,
-        touchdown_height,
-        values,
-        armed,
-        out,
-    )
+    substep = _SUBSTEP * np.sqrt(rest_length / gravity)
+    edge, t = first_event(STANCE, path, horizon.real, substep, accuracy, watch)
     if map_kind != _IMPROVED and edge < 0:
         return _NO_EVENT
     if edge >= 0 and t == 0.0:
@@ -178,14 +120,14 @@ def _stance(
         if edge < 0:
             edge = _GOES_ON
             t = _SAFE_SHARE * horizon
-        end = corrected(a, t, momentum, toes, stiffness, mass, gravity, rest_length, out)
+        end = corrected(a, t, momentum, toes, stiffness, model, out)
     elif map_kind == _PAPER:
         end = momentum + momentum_changes(a, t, gravity, torsion / mass)
-        harmonic(a, pivot, r, theta, radial, w2, length, end, gravity)
+        harmonic(a, start, end, w2, length, gravity)
     else:
         end = momentum
     if map_kind != _GEYER and edge >= 0:
-        t = _follow(STANCE, a, events, edge, t, toes, model, touchdown_height, out, values, armed)
+        t = _follow(path, edge, t, watch)
         if t.real < 0.0:
             return _NO_EVENT
     before = 0.5 * (state[2] ** 2 + state[3] ** 2) + _potential(state, toes, stiffness, model)
@@ -203,10 +145,8 @@ def _stance(
 
 @inner
 def closed_form_stride(
-    tables: Tables,
-    model: Model,
+    kernel: Kernel,
     map_kind: int,
-    node: int,
     state: Array,
     toes: Array,
     controls: Array,
@@ -221,8 +161,10 @@ def closed_form_stride(
     Returns:
         The Outcome's value.
     """
+    tables, model, node = kernel
     alpha = controls[0]
-    touchdown_height = model.rest_length * np.sin(alpha)
+    rest_length = model.rest_length
+    touchdown_height = rest_length * np.sin(alpha)
     a, out, stiffness = scratch.path, scratch.out, scratch.stiffness
     values, armed = scratch.values, scratch.armed
     for _ in range(_MAX_PIECES):
@@ -231,50 +173,27 @@ def closed_form_stride(
         stiffness[1] = controls[front] if front >= 0 else 0.0
         first_edge = tables.first_edge[node]
         guards = tables.event[first_edge : tables.first_edge[node + 1]]
-        arm(guards, state, toes, model.rest_length, touchdown_height, values, armed)
+        watch = Watch(guards, toes, rest_length, touchdown_height, values, armed, out)
+        arm(watch, state)
         if stiffness[0] == 0.0 and stiffness[1] == 0.0:
             for i in range(4):
                 a[i] = state[i]
             a[4] = model.gravity
-            edge, t = first_event(
-                FLIGHT,
-                a,
-                a,
-                model.max_time,
-                _SUBSTEP * np.sqrt(model.rest_length / model.gravity),
-                _EVENT_TIME,
-                guards,
-                toes,
-                model.rest_length,
-                touchdown_height,
-                values,
-                armed,
-                out,
-            )
-            sample(FLIGHT, a, a, t, out)
+            path = Path(a, a)
+            substep = _SUBSTEP * np.sqrt(rest_length / model.gravity)
+            edge, t = first_event(FLIGHT, path, model.max_time, substep, _EVENT_TIME, watch)
+            sample(FLIGHT, path, t, out)
             for i in range(4):
                 state[i] = out[i]
         else:
-            edge = _stance(
-                map_kind,
-                model,
-                state,
-                toes,
-                stiffness,
-                guards,
-                touchdown_height,
-                values,
-                armed,
-                a,
-                out,
-            )
+            edge = _stance(map_kind, model, state, stiffness, a, watch)
         if edge == _NO_EVENT or not np.isfinite(state[0].real + state[2].real):
             return _TIMEOUT
         if edge == _GOES_ON:
             continue
         edge += first_edge
         note_bottom(tables.event[edge], state, toes, scratch.bottom)
-        apply_reset(tables.reset[edge], state, toes, model.rest_length, alpha)
+        apply_reset(tables.reset[edge], state, toes, rest_length, alpha)
         if tables.outcome[edge] >= 0:
             return tables.outcome[edge]
         node = tables.target[edge]

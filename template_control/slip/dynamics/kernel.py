@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
 from template_control.slip.dynamics.compiled import inner
-from template_control.slip.dynamics.locate import arm, first_event
-from template_control.slip.dynamics.path import COEFFICIENTS, SERIES, sample
+from template_control.slip.dynamics.locate import Watch, arm, first_event
+from template_control.slip.dynamics.model import Kernel
+from template_control.slip.dynamics.path import COEFFICIENTS, SERIES, Path, sample
 from template_control.slip.dynamics.taylor import ORDER, expand
 
 Array = NDArray[np.float64]
@@ -33,15 +33,6 @@ MAX_SEGMENTS = 96
 MAX_EVENTS = 16
 _SUBSTEPS = 4
 _EVENT_TIME = 1e-14  # [s]
-
-
-class Model(NamedTuple):
-    """The template's physics as the kernel takes it, SI units."""
-
-    mass: float
-    gravity: float
-    rest_length: float
-    max_time: float
 
 
 class Scratch(NamedTuple):
@@ -78,19 +69,19 @@ class Scratch(NamedTuple):
 def new_scratch(dtype: type[float] | type[complex] = float) -> Scratch:
     """Fresh arrays for one thread; complex ones for complex steps."""
     return Scratch(
-        np.zeros((MAX_SEGMENTS, ORDER + 1), dtype),
-        np.zeros((MAX_SEGMENTS, ORDER + 1), dtype),
-        np.zeros((MAX_SEGMENTS, 7)),
-        np.zeros((MAX_EVENTS, 8)),
-        np.zeros((2, 4, ORDER + 1), dtype),
-        np.zeros(COEFFICIENTS, dtype),
-        np.zeros(6, dtype),
-        np.zeros(4, dtype),
-        np.zeros(2, dtype),
-        np.zeros(2, dtype),
-        np.zeros(2, dtype),
-        np.zeros((2, NUM_EVENTS)),
-        np.zeros(MAX_EDGES, dtype=np.bool_),
+        cx=np.zeros((MAX_SEGMENTS, ORDER + 1), dtype),
+        cy=np.zeros((MAX_SEGMENTS, ORDER + 1), dtype),
+        meta=np.zeros((MAX_SEGMENTS, 7)),
+        events=np.zeros((MAX_EVENTS, 8)),
+        work=np.zeros((2, 4, ORDER + 1), dtype),
+        path=np.zeros(COEFFICIENTS, dtype),
+        out=np.zeros(6, dtype),
+        state=np.zeros(4, dtype),
+        toes=np.zeros(2, dtype),
+        bottom=np.zeros(2, dtype),
+        stiffness=np.zeros(2, dtype),
+        values=np.zeros((2, NUM_EVENTS)),
+        armed=np.zeros(MAX_EDGES, dtype=np.bool_),
     )
 
 
@@ -117,21 +108,17 @@ def note_bottom(event: int, state: Array, toes: Array, bottom: Array) -> None:
 
 @inner
 def run_stride(
-    tables: Tables,
-    model: Model,
-    node: int,
+    kernel: Kernel,
     state: Array,
     toes: Array,
     controls: Array,
     record: bool,
     scratch: Scratch,
 ) -> tuple[int, int, int, int, float]:
-    """Run the automaton from ``node`` until a section or a failure.
+    """Run the automaton from the kernel's node until a section or a failure.
 
     Args:
-        tables: the packed automaton.
-        model: the template; a stride longer than its ``max_time`` counts as failed.
-        node: index of the first node.
+        kernel: automaton, template and first node.
         state: (4,) x, y, dx/dt, dy/dt [m, m/s], overwritten with the final state.
         toes: (2,) x of rear and front toe [m], overwritten.
         controls: (NUM_SLOTS,) u: touchdown angle [rad] and stiffnesses [N/m] by Slot.
@@ -144,8 +131,8 @@ def run_stride(
         Outcome, last node (the one entered, where the section was reached), number of
         segments, number of events, duration [s].
     """
-    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
-    max_time = model.max_time
+    tables, model, node = kernel
+    gravity, rest_length, max_time = model.gravity, model.rest_length, model.max_time
     cx, cy, meta, events, work = scratch[:5]
     out, stiffness, values, armed = scratch.out, scratch.stiffness, scratch.values, scratch.armed
     alpha = controls[0]
@@ -158,29 +145,17 @@ def run_stride(
         stiffness[1] = controls[front] if front >= 0 else 0.0
         first_edge = tables.first_edge[node]
         guards = tables.event[first_edge : tables.first_edge[node + 1]]
+        watch = Watch(guards, toes, rest_length, touchdown_height, values, armed, out)
         if entered:
-            arm(guards, state, toes, rest_length, touchdown_height, values, armed)
+            arm(watch, state)
             entered = False
         row = segments if record else 0
         px, py = cx[row], cy[row]
-        horizon = expand(state, toes, stiffness, mass, gravity, rest_length, px, py, work)
+        horizon = expand(state, toes, stiffness, model, px, py, work)
         horizon = min(horizon, max_time - time, 0.1 * np.sqrt(rest_length / gravity) * _SUBSTEPS)
-        fired, step = first_event(
-            SERIES,
-            px,
-            py,
-            horizon,
-            horizon / _SUBSTEPS,
-            _EVENT_TIME,
-            guards,
-            toes,
-            rest_length,
-            touchdown_height,
-            values,
-            armed,
-            out,
-        )
-        sample(SERIES, px, py, step, out)
+        path = Path(px, py)
+        fired, step = first_event(SERIES, path, horizon, horizon / _SUBSTEPS, _EVENT_TIME, watch)
+        sample(SERIES, path, step, out)
         for i in range(4):
             state[i] = out[i]
         meta[row, 0], meta[row, 1], meta[row, 2] = time, step.real, node

@@ -5,13 +5,15 @@ The exact kernel's polynomials and the closed-form maps share this code.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
 from template_control.slip.dynamics.compiled import inner
 from template_control.slip.dynamics.guards import all_guards, guard, guard_rate
-from template_control.slip.dynamics.path import sample
+from template_control.slip.dynamics.path import Path, sample
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,21 +28,36 @@ _CURVATURE = 1e4  # [1/s^3]; what the inverse cubic leaves over (step * last ste
 _ZERO = 1e-9  # of l0 (a bracket of no width around a jump holds no root)
 
 
+class Watch(NamedTuple):
+    """The guards of a phase, and what is kept while they are watched.
+
+    Attributes:
+        events: values of the node's Events, edge by edge.
+        toes: (2,) x of rear and front toe [m].
+        rest_length: l0 [m].
+        touchdown_height: l0 sin(alpha) [m].
+        values: (2, NUM_EVENTS) the guards at either end of a substep; from :func:`arm`.
+        armed: (MAX_EDGES,) which may fire; from :func:`arm`.
+        out: (6,) a sample of the path, overwritten; complex for complex steps.
+    """
+
+    events: IntArray
+    toes: Array
+    rest_length: float
+    touchdown_height: float
+    values: Array
+    armed: NDArray[np.bool_]
+    out: Array
+
+
 @inner
-def arm(
-    events: IntArray,
-    state: Array,
-    toes: Array,
-    rest_length: float,
-    touchdown_height: float,
-    values: Array,
-    armed: NDArray[np.bool_],
-) -> None:
-    """Prepare ``values`` (2, NUM_EVENTS) and ``armed`` (MAX_EDGES,) at the start of a phase.
+def arm(watch: Watch, state: Array) -> None:
+    """Prepare ``watch`` at the start of a phase, where the CoM is at ``state`` (4,).
 
     A guard that is zero there does not fire there; forbidden regions count at once.
     """
-    all_guards(state, toes, rest_length, touchdown_height, values[0])
+    events, values, armed = watch.events, watch.values, watch.armed
+    all_guards(state, watch.toes, watch.rest_length, watch.touchdown_height, values[0])
     for i in range(events.shape[0]):
         e = events[i]
         armed[i] = values[0, e] < -_ARMING or e in (_FALL, _BACKWARD)
@@ -58,36 +75,37 @@ def _inverse_hermite(t0: float, g0: float, r0: float, t1: float, g1: float, r1: 
 @inner
 def root(
     kind: int,
-    a: Array,
-    b: Array,
+    path: Path,
     event: int,
     start: float,
-    lo: float,
-    hi: float,
+    bracket: tuple[float, float],
     tolerance: float,
-    toes: Array,
-    rest_length: float,
-    touchdown_height: float,
-    out: Array,
+    watch: Watch,
 ) -> float:
-    """Time in [lo, hi] at which the guard rises through 0, -1 if it does not.
+    """Time within ``bracket`` at which the guard rises through 0, -1 if it does not.
 
     Newton's method, then the inverse cubic through the last two points, kept bracketed. In
     complex arithmetic the imaginary part carries the event time's derivative, which two
     more steps make exact.
 
     Args:
+        kind, path: on which the guard is taken.
+        event: value of the guard's Event.
         start: where to begin [s].
-        The rest as in :func:`first_event`.
+        bracket: earliest and latest time [s].
+        tolerance: of the time [s].
+        watch: toes and lengths; its ``out`` is overwritten.
     """
+    toes, rest_length, out = watch.toes, watch.rest_length, watch.out
+    lo, hi = bracket
     out[0] = 0.0
     t = start + out[0]  # of the path's type
     t_last = g_last = rate_last = t
     step_last = np.inf
     polish = 2 if np.iscomplexobj(out) else 0
     for _ in range(_ITERATIONS):
-        sample(kind, a, b, t, out)
-        g = guard(event, out, toes, rest_length, touchdown_height)
+        sample(kind, path, t, out)
+        g = guard(event, out, toes, rest_length, watch.touchdown_height)
         rate = guard_rate(event, out, toes)
         if g.real >= 0.0:
             hi = min(hi, t.real)
@@ -116,37 +134,21 @@ def root(
 
 @inner
 def first_event(
-    kind: int,
-    a: Array,
-    b: Array,
-    horizon: float,
-    substep: float,
-    tolerance: float,
-    events: IntArray,
-    toes: Array,
-    rest_length: float,
-    touchdown_height: float,
-    values: Array,
-    armed: NDArray[np.bool_],
-    out: Array,
+    kind: int, path: Path, horizon: float, substep: float, tolerance: float, watch: Watch
 ) -> tuple[int, float]:
     """First of a node's guards that fires within ``horizon``, and when.
 
     Args:
-        kind, a, b: the path, see :func:`~.path.sample`.
+        kind, path: the CoM's, see :func:`~.path.sample`.
         horizon: where to stop looking [s].
         substep: a guard is taken to rise through zero at most once within it [s].
         tolerance: of event times [s].
-        events: values of the node's Events, edge by edge.
-        toes: (2,) x of rear and front toe [m].
-        rest_length: l0 [m].
-        touchdown_height: l0 sin(alpha) [m].
-        values, armed: (2, NUM_EVENTS) and (MAX_EDGES,) from :func:`arm`; updated.
-        out: (6,) scratch of the path's type.
+        watch: the node's guards, once :func:`arm` has seen the phase's start; updated.
 
     Returns:
-        Which of ``events``, -1 if none fires, and the time [s].
+        Which of the watched events, -1 if none fires, and the time [s].
     """
+    events, values, armed, out = watch.events, watch.values, watch.armed, watch.out
     out[0] = 0.0
     fired, fired_at = -1, horizon + out[0]
     t_lo = 0.0
@@ -154,9 +156,9 @@ def first_event(
         t_hi = min(t_lo + substep, horizon)
         if t_hi > horizon - 1e-6 * substep:
             t_hi = horizon
-        sample(kind, a, b, t_hi, out)
+        sample(kind, path, t_hi, out)
         rose = False
-        all_guards(out, toes, rest_length, touchdown_height, values[1])
+        all_guards(out, watch.toes, watch.rest_length, watch.touchdown_height, values[1])
         for i in range(events.shape[0]):
             g = values[1, events[i]]
             if g < -_ARMING:
@@ -170,20 +172,8 @@ def first_event(
                     continue
                 t = t_lo + 0.0 * fired_at
                 if g_lo < 0.0:
-                    t = root(
-                        kind,
-                        a,
-                        b,
-                        events[i],
-                        t_lo - g_lo * (t_hi - t_lo) / (g_hi - g_lo),
-                        t_lo,
-                        t_hi,
-                        tolerance,
-                        toes,
-                        rest_length,
-                        touchdown_height,
-                        out,
-                    )
+                    start = t_lo - g_lo * (t_hi - t_lo) / (g_hi - g_lo)
+                    t = root(kind, path, events[i], start, (t_lo, t_hi), tolerance, watch)
                 if fired < 0 or t.real < fired_at.real:
                     fired, fired_at = i, t
         for i in range(NUM_EVENTS):

@@ -1,11 +1,13 @@
 """Paths of the CoM as functions of time that guards can be located on.
 
-Three kinds, told apart by a number so that one compiled :func:`sample` serves all:
-``SERIES`` (the exact kernel's Taylor polynomials), ``STANCE`` (the closed form (11) about a
-pivot) and ``FLIGHT`` (10).
+Three kinds: ``SERIES`` (the exact kernel's Taylor polynomials), ``STANCE`` (the closed form
+(11) about a pivot) and ``FLIGHT`` (10). Compiled code gives the kind as one of these
+constants, an argument of its own: Numba then compiles each kind without the others' branches.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,21 +20,32 @@ SERIES, STANCE, FLIGHT = 0, 1, 2
 COEFFICIENTS = 12
 
 
+class Path(NamedTuple):
+    """A path of the CoM in time, world frame, by its coefficients.
+
+    Attributes:
+        a, b: SERIES: those of the polynomials of x and y, constant term first. STANCE: a is
+            (12,), about a pivot at x = a0, r = a1 + a8 t + a9 t^2 + a2 sin(a5 t) + a3 cos(a5 t) and
+            theta = a4 + a6 t + a10 t^2 + a11 t^3 + a7 (a2 cos(a5 t) - a3 sin(a5 t)), which
+            is (11) where a8 to a11 are zero. FLIGHT: a is (5,) x, y, dx/dt, dy/dt at t = 0
+            and gravity. The latter two do not read b.
+    """
+
+    a: Array
+    b: Array
+
+
 @inner
-def sample(kind: int, a: Array, b: Array, t: float, out: Array) -> None:
+def sample(kind: int, path: Path, t: float, out: Array) -> None:
     """Write x, y and their first two derivatives at ``t`` [s] into ``out`` (6,).
 
     Args:
         kind: SERIES, STANCE or FLIGHT.
-        a, b: SERIES: polynomial coefficients of x and y, constant term first. STANCE: a is
-            (12,), about a pivot at x = a0,
-            r = a1 + a8 t + a9 t^2 + a2 sin(a5 t) + a3 cos(a5 t) and
-            theta = a4 + a6 t + a10 t^2 + a11 t^3 + a7 (a2 cos(a5 t) - a3 sin(a5 t)), which
-            is (11) where a8 to a11 are zero. FLIGHT: a is (5,) x, y, dx/dt, dy/dt at t = 0
-            and gravity.
+        path: its coefficients.
         t: since the start of the path [s].
         out: overwritten.
     """
+    a, b = path
     if kind == SERIES:
         x = y = u = v = ax = ay = 0.0 * a[0]
         for n in range(a.shape[0] - 1, -1, -1):

@@ -7,11 +7,14 @@ rate. Real or complex arithmetic alike.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.slip.dynamics.compiled import inner
-from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, sample
+from template_control.slip.dynamics.model import Model
+from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, Path, sample
 
 Array = NDArray[np.float64]
 
@@ -60,28 +63,41 @@ def axial_torsional(
     return k_r, top, k_t / (8.0 * rest_length**2)
 
 
+class Launch(NamedTuple):
+    """Where a stance phase begins, in polar coordinates.
+
+    Attributes:
+        pivot: x of their origin [m].
+        r, theta: the CoM [m, rad].
+        radial_speed: dr/dt [m/s].
+    """
+
+    pivot: float
+    r: float
+    theta: float
+    radial_speed: float
+
+
 @inner
 def harmonic(
     a: Array,
-    pivot: float,
-    r: float,
-    theta: float,
-    radial_speed: float,
+    start: Launch,
+    momentum: float,
     frequency_squared: float,
     length: float,
-    momentum: float,
     gravity: float,
 ) -> None:
-    """Coefficients of (11) into ``a`` (12,), see :func:`~.path.sample`.
+    """Coefficients of (11) into ``a`` (12,), see :class:`~.path.Path`.
 
     Args:
-        pivot: x of the pivot [m].
-        r, theta, radial_speed: at t = 0.
+        a: overwritten.
+        start: at t = 0, about the pivot.
+        momentum: p / m, constant over the phase [m^2/s].
         frequency_squared: omega_0^2 = k/m [1/s^2].
         length: l0, or l_r0 of the AT-SLIP [m].
-        momentum: p / m, constant over the phase [m^2/s].
         gravity: [m/s^2].
     """
+    pivot, r, theta, radial_speed = start
     omega = momentum / (length * length)
     w2 = frequency_squared + 3.0 * omega * omega
     w = np.sqrt(w2)
@@ -142,9 +158,7 @@ def corrected(
     momentum: float,
     toes: Array,
     stiffness: Array,
-    mass: float,
-    gravity: float,
-    rest_length: float,
+    model: Model,
     out: Array,
 ) -> float:
     """Improve the path ``a`` in place by one deferred correction; p/m at ``t``.
@@ -159,12 +173,13 @@ def corrected(
         t: time of the event that ends the phase on it [s].
         momentum: p/m at the start [m^2/s].
         toes, stiffness: (2,) of the legs; stiffness 0 for one in the air.
-        mass, gravity, rest_length: SI.
+        model: the template.
         out: (6,) scratch.
 
     Returns:
         p/m at ``t`` [m^2/s].
     """
+    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
     w2 = a[5] * a[5]
     # Radial defects and torques at 0, t/2 and t.
     pull_0 = pull_1 = pull_2 = torque_0 = torque_1 = torque_2 = 0.0 * a[0]
@@ -177,7 +192,7 @@ def corrected(
     x, y = a[0] + radius * c, radius * s
     for i in range(3):
         if i > 0:
-            sample(STANCE, a, a, 0.5 * i * t, out)
+            sample(STANCE, Path(a, a), 0.5 * i * t, out)
             x, y = out[0], out[1]
         d = x - a[0]
         r = np.sqrt(d * d + y * y)

@@ -12,22 +12,11 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset, Slot
-from template_control.slip.dynamics.kernel import Model, new_scratch, run_stride
+from template_control.slip.dynamics.kernel import new_scratch, run_stride
+from template_control.slip.dynamics.model import Kernel, kernel_model
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
-
-
-def kernel_model(parameters: SlipParameters, max_time: float | None = None) -> Model:
-    """``parameters`` as the kernel takes them.
-
-    Args:
-        parameters: the template.
-        max_time: time limit of a stride [s]; default 20 sqrt(l0/g).
-    """
-    p = parameters
-    limit = 20.0 * np.sqrt(p.rest_length / p.gravity) if max_time is None else max_time
-    return Model(p.mass, p.gravity, p.rest_length, float(limit))
 
 
 @dataclass(frozen=True)
@@ -190,9 +179,7 @@ class StrideSimulator:
         x = finite("state", state, 4)
         c = finite("toes", toes, 2)
         outcome, node, segments, events, duration = run_stride(
-            self.automaton.tables,
-            self._model,
-            self.automaton.index[start],
+            Kernel(self.automaton.tables, self._model, self.automaton.index[start]),
             x,
             c,
             finite("controls", u, NUM_SLOTS),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.slip.dynamics.compiled import inner
+from template_control.slip.dynamics.model import Model
 
 Array = NDArray[np.float64]
 
@@ -27,9 +28,7 @@ def expand(
     state: Array,
     toes: Array,
     stiffness: Array,
-    mass: float,
-    gravity: float,
-    rest_length: float,
+    model: Model,
     cx: Array,
     cy: Array,
     work: Array,
@@ -40,13 +39,14 @@ def expand(
         state: (4,) x, y, dx/dt, dy/dt [m, m/s] in the world frame (y up).
         toes: (2,) x of the rear and the front toe [m].
         stiffness: (2,) stiffness [N/m] of the rear and front leg, 0 for a leg in the air.
-        mass, gravity, rest_length: SI.
+        model: the template.
         cx, cy: (ORDER + 1,) overwritten with x(t) = sum cx[i] t^i, and y.
         work: (2, 4, ORDER + 1) scratch.
 
     Returns:
         The step h [s] within which the truncated series are exact to ``TOLERANCE``.
     """
+    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
     cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
     for n in range(ORDER - 1):
         ax = 0.0 * cx[0]

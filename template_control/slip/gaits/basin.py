@@ -12,12 +12,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.tables import Tables
-from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.dynamics.compiled import inner
-from template_control.slip.dynamics.kernel import Model, Scratch, new_scratch
-from template_control.slip.dynamics.stride import kernel_model
+from template_control.slip.dynamics.kernel import Scratch, new_scratch
+from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.section import VLO
 from template_control.slip.maps.section_map import RESULTS, section_map
 from template_control.slip.parameters import SlipParameters
@@ -25,8 +23,6 @@ from template_control.slip.parameters import SlipParameters
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# Numba would compile the maps once more for a literal int.
-_EXACT = np.int64(MapKind.EXACT)
 _SECTION = int(Outcome.SECTION)
 _WINDOW = 5
 _THERE = 0.01  # as near as this, it need not come nearer
@@ -51,9 +47,7 @@ def velocity_angle(z: Array) -> Array:
 
 @inner
 def _steps(
-    tables: Tables,
-    model: Model,
-    node: int,
+    kernel: Kernel,
     z: Array,
     controls: Array,
     goal: Array,
@@ -67,11 +61,11 @@ def _steps(
     """
     early = middle = late = 0.0
     for step in range(limit):
-        if section_map(tables, model, _EXACT, node, z, controls, scratch, result) != _SECTION:
+        if section_map(kernel, None, z, controls, scratch, result) != _SECTION:
             return step, False
         for i in range(3):
             z[i] = result[i]
-        height = (z[1] - goal[0]) / (_HEIGHT * model.rest_length)
+        height = (z[1] - goal[0]) / (_HEIGHT * kernel.model.rest_length)
         angle = (-np.arctan2(z[2], z[0]) - goal[1]) / _ANGLE
         distance = np.sqrt(height * height + angle * angle)
         if step < _WINDOW:
@@ -85,25 +79,17 @@ def _steps(
 
 @njit(cache=True)
 def _many(
-    tables: Tables,
-    model: Model,
-    node: int,
-    z: Array,
-    controls: Array,
-    goal: Array,
-    limit: int,
-    scratch: Scratch,
-    steps: IntArray,
-    converges: NDArray[np.bool_],
-) -> None:
+    kernel: Kernel, z: Array, controls: Array, goal: Array, limit: int, scratch: Scratch
+) -> tuple[IntArray, NDArray[np.bool_]]:
+    """:func:`_steps` for every row of ``z``, ``controls`` and ``goal``."""
+    steps, converges = np.zeros(z.shape[0], np.int64), np.zeros(z.shape[0], np.bool_)
     result = np.empty(RESULTS)
     for i in range(z.shape[0]):
-        steps[i] = 0
-        converges[i] = False
         if np.isfinite(z[i, 0]):
             steps[i], converges[i] = _steps(
-                tables, model, node, z[i], controls[i], goal[i], limit, scratch, result
+                kernel, z[i], controls[i], goal[i], limit, scratch, result
             )
+    return steps, converges
 
 
 @dataclass(frozen=True)
@@ -137,18 +123,13 @@ def steps_to_fall(
     """
     states = np.array(z, dtype=float)
     count = len(states)
-    steps, converges = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.bool_)
-    _many(
-        AUTOMATON.tables,
-        kernel_model(parameters),
-        AUTOMATON.index[STRIDE_START["w"]],
+    steps, converges = _many(
+        stride_kernel(parameters, "w"),
         states,
         np.ascontiguousarray(np.broadcast_to(controls, (count, np.shape(controls)[-1]))),
         np.ascontiguousarray(np.broadcast_to(goal, (count, 2))),
         limit,
         new_scratch(),
-        steps,
-        converges,
     )
     return StepsToFall(steps, converges, states)
 

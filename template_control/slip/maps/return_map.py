@@ -13,9 +13,16 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
 from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.stride import kernel_model
+from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.maps.section import PADDED, section_of
-from template_control.slip.maps.section_map import RESULTS, map_many, section_jacobian, section_map
+from template_control.slip.maps.section_map import (
+    RESULTS,
+    Derivatives,
+    closed_form,
+    map_many,
+    section_jacobian,
+    section_map,
+)
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -89,8 +96,7 @@ class ReturnMap:
         begin, end = automaton.sections(start)
         self.sections = section_of(begin), section_of(end)
         self.dimensions = self.sections[0].dimension, self.sections[1].dimension
-        node = automaton.index[start]
-        self._kernel = automaton.tables, kernel_model(parameters), int(self.kind), node
+        self._kernel = stride_kernel(parameters, stride, automaton), closed_form(self.kind)
         self._scratch = new_scratch()
         self._complex_scratch = new_scratch(complex)
 
@@ -134,18 +140,17 @@ class ReturnMap:
         Returns:
             (RESULTS,) as :meth:`evaluate`; its (RESULTS, c) derivatives; the outcome.
         """
-        result, jacobian = np.empty(RESULTS), np.empty((RESULTS, len(columns)))
-        full = self.sections[0].padded(z)
+        found = Derivatives(np.empty(RESULTS), np.empty((RESULTS, len(columns))))
         try:
             outcome = section_jacobian(
-                *self._kernel, full, u, columns, self._complex_scratch, result, jacobian
+                *self._kernel, self.sections[0].padded(z), u, columns, self._complex_scratch, found
             )
         except ZeroDivisionError:
             # Where a real division gives NaN, Numba's complex one raises. It happens in strides
             # that fail, such as on a leg without stiffness; there is no derivative to lose.
             result, ended = self.evaluate(z, u)
-            return result, np.full_like(jacobian, np.nan), ended
-        return result, jacobian, Outcome(outcome)
+            return result, np.full_like(found.jacobian, np.nan), ended
+        return *found, Outcome(outcome)
 
     def __call__(self, z: ArrayLike, u: ArrayLike) -> Mapped:
         """Strides from one state or many, with the same controls or each its own.

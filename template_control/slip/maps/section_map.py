@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.dynamics.closed_form import closed_form_stride
 from template_control.slip.dynamics.compiled import inner
-from template_control.slip.dynamics.kernel import Model, Scratch, run_stride
+from template_control.slip.dynamics.kernel import Scratch, run_stride
+from template_control.slip.dynamics.model import Kernel
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_EXACT = int(MapKind.EXACT)
 # Numba would compile the stride once more for a literal False.
 _LAST_ONLY = np.bool_(False)
 _STEP = 1e-20  # of a complex step: its square vanishes against 1
@@ -24,12 +25,30 @@ RESULTS = 6
 """Numbers a map yields: dx/dt, y, dy/dt, distance covered, legs' lengths at the bottom."""
 
 
+class Derivatives(NamedTuple):
+    """What :func:`section_jacobian` writes.
+
+    Attributes:
+        result: (RESULTS,) of the map.
+        jacobian: (RESULTS, c) its derivatives.
+    """
+
+    result: Array
+    jacobian: Array
+
+
+def closed_form(kind: MapKind) -> int | None:
+    """``kind`` as the compiled maps take it: its value, or None for the exact map.
+
+    None is a type of its own, so that only the maps which are asked for are compiled.
+    """
+    return None if kind is MapKind.EXACT else int(kind)
+
+
 @inner
 def section_map(
-    tables: Tables,
-    model: Model,
-    kind: int,
-    node: int,
+    kernel: Kernel,
+    kind: int | None,
     z: Array,
     controls: Array,
     scratch: Scratch,
@@ -38,10 +57,8 @@ def section_map(
     """One stride from section to section; returns the Outcome's value.
 
     Args:
-        tables: the packed automaton.
-        model: the template.
-        kind: value of the MapKind.
-        node: index of the stride's first node.
+        kernel: automaton, template and the stride's first node.
+        kind: from :func:`closed_form`.
         z: (3,) dx/dt, y, dy/dt at the section [m/s, m, m/s]; dy/dt is 0 at apex.
         controls: (NUM_SLOTS,) u by Slot.
         scratch: overwritten.
@@ -53,10 +70,10 @@ def section_map(
     state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
     toes[0] = toes[1] = 0.0
     bottom[0] = bottom[1] = np.nan
-    if kind == _EXACT:
-        outcome = run_stride(tables, model, node, state, toes, controls, _LAST_ONLY, scratch)[0]
+    if kind is None:
+        outcome = run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0]
     else:
-        outcome = closed_form_stride(tables, model, kind, node, state, toes, controls, scratch)
+        outcome = closed_form_stride(kernel, kind, state, toes, controls, scratch)
     result[0], result[1], result[2], result[3] = state[2], state[1], state[3], state[0]
     result[4], result[5] = bottom[0], bottom[1]
     return outcome
@@ -64,10 +81,8 @@ def section_map(
 
 @njit(cache=True)
 def map_many(
-    tables: Tables,
-    model: Model,
-    kind: int,
-    node: int,
+    kernel: Kernel,
+    kind: int | None,
     z: Array,
     controls: Array,
     scratch: Scratch,
@@ -76,21 +91,18 @@ def map_many(
 ) -> None:
     """:func:`section_map` for rows of ``z`` (n, 3) and ``controls`` (n, NUM_SLOTS)."""
     for i in range(z.shape[0]):
-        outcome[i] = section_map(tables, model, kind, node, z[i], controls[i], scratch, result[i])
+        outcome[i] = section_map(kernel, kind, z[i], controls[i], scratch, result[i])
 
 
 @njit(cache=True)
 def section_jacobian(
-    tables: Tables,
-    model: Model,
-    kind: int,
-    node: int,
+    kernel: Kernel,
+    kind: int | None,
     z: Array,
     controls: Array,
     columns: IntArray,
     scratch: Scratch,
-    result: Array,
-    jacobian: Array,
+    found: Derivatives,
 ) -> int:
     """:func:`section_map` with its derivatives, exact to rounding, by complex steps.
 
@@ -100,10 +112,10 @@ def section_jacobian(
     Args:
         columns: (c,) what to differentiate by: 0 to 2 the state, 3 + slot the controls.
         scratch: complex, from ``new_scratch(complex)``.
-        result: (RESULTS,) overwritten.
-        jacobian: (RESULTS, c) overwritten.
+        found: overwritten.
         The rest as in :func:`section_map`.
     """
+    result, jacobian = found
     zc, uc = z.astype(np.complex128), controls.astype(np.complex128)
     out = np.empty(RESULTS, np.complex128)
     outcome = 0
@@ -115,7 +127,7 @@ def section_jacobian(
             zc[j] += 1j * h
         else:
             uc[j - 3] += 1j * h
-        outcome = section_map(tables, model, kind, node, zc, uc, scratch, out)
+        outcome = section_map(kernel, kind, zc, uc, scratch, out)
         if j < 3:
             zc[j] = z[j]
         else:
