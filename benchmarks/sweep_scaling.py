@@ -32,7 +32,7 @@ from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.sweep.sweep import grid, sweep
+from template_control.sweep.sweep import SweepOptions, grid, sweep
 
 try:
     import distributed
@@ -84,7 +84,8 @@ def _loop() -> NDArray[np.float64]:
 
 
 def _sweep(executor: Executor) -> NDArray[np.float64]:
-    return sweep(batch, _items(), executor=executor, progress=False).column()
+    quiet = SweepOptions(progress=False)
+    return sweep(batch, _items(), executor=executor, options=quiet).column()
 
 
 def take_turns(methods: dict[str, Way]) -> dict[str, list[Turn]]:

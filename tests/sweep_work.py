@@ -5,7 +5,6 @@ import math
 import os
 import sys
 import time
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,15 @@ import numpy as np
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.sweep.sweep import sweep
+from template_control.sweep.sweep import SweepOptions, sweep
 
 P = SlipParameters()
 COUNT = 60
 
-quietly = partial(sweep, progress=False)
+
+def quietly(function, items, path=None, executor=None, seed=0, **options):
+    """A sweep without a bar; ``options`` are those of ``SweepOptions``."""
+    return sweep(function, items, path, executor, seed, SweepOptions(progress=False, **options))
 
 
 def square(x):

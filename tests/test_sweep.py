@@ -21,7 +21,7 @@ from template_control.slip.gaits.gait import gait_at
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import Segment, example_one
 from template_control.sweep.file import plain
-from template_control.sweep.sweep import grid, item_seed, sample, sweep
+from template_control.sweep.sweep import SweepOptions, grid, item_seed, sample, sweep
 
 
 def short_scenario(speed, kind):
@@ -139,7 +139,7 @@ def test_an_executor_that_was_shut_down_is_told():
         (square, [{"x": 1, "seed": 1}], {}, "item 0 is .* without 'seed'"),
         (square, [3], {}, "item 0 is 3: give a dictionary"),
         (square, [], {"seed": -1}, "seed is -1"),
-        (square, [], {"in_flight": 0}, "in_flight 0"),
+        (square, [], {"in_flight": 0}, "in_flight is 0"),
         (lambda x: x, [{"x": 1}], {}, "define it at the top level of a module"),
         (3, [{"x": 1}], {}, "3 shows no parameters: give a function"),
         (square, [{"x": P}], {"path": "s"}, "item 0 cannot be told in a file: a SlipParameters"),
@@ -161,7 +161,7 @@ def test_no_items_give_no_results(tmp_path):
 
 
 def test_the_bar_is_on_stderr(capfd):
-    sweep(fragile, grid(x=[1, 2, 9]), label="roots")
+    sweep(fragile, grid(x=[1, 2, 9]), options=SweepOptions(label="roots"))
     out, error = capfd.readouterr()
     assert out == ""
     for text in ("roots", "3/3", "1 failed"):

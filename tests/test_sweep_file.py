@@ -100,9 +100,9 @@ def test_numpy_and_not_finite_numbers_survive_the_file(tmp_path):
 
 KILLED = """
 from concurrent.futures import ProcessPoolExecutor
-from template_control.sweep.sweep import grid, sweep
-from sweep_work import COUNT, logged
-sweep(logged, grid(x=range(COUNT)), {path!r}, {executor}, seed=1, progress=False)
+from template_control.sweep import grid
+from sweep_work import COUNT, logged, quietly
+quietly(logged, grid(x=range(COUNT)), {path!r}, {executor}, seed=1)
 """
 
 

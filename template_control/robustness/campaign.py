@@ -31,7 +31,7 @@ from template_control.robustness.disturbances import (
 from template_control.run.record import Record
 from template_control.run.simulation import SimulationOptions, simulate
 from template_control.slip.gaits.gait import WalkingGait
-from template_control.sweep.sweep import Item, sweep
+from template_control.sweep.sweep import Item, SweepOptions, sweep
 
 SETTLED = 0.02
 """How near to the gait's mean speed and VLO height a walk must be to be back on it."""
@@ -215,9 +215,7 @@ def measure(
             items,
             None if folder is None else folder / f"trials-{stem}-{index + 1:02d}.jsonl",
             executor,
-            progress=progress,
-            label=f"level {index + 1}",
-            retry_failed=True,
+            options=SweepOptions(progress, label=f"level {index + 1}", retry_failed=True),
         )
         for i, reason in done.failures.items():
             raise SweepError(f"trial {items[i]} came to no end: {reason}")

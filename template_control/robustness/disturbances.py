@@ -76,6 +76,19 @@ class Situation:
 
 
 @dataclass(frozen=True)
+class Unit:
+    """What levels are shown in.
+
+    Attributes:
+        name: after the number; "" for a coefficient.
+        factor: units in one of SI; negative where a level is a share taken away.
+    """
+
+    name: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
 class Disturbance:
     """One kind of disturbance.
 
@@ -83,25 +96,23 @@ class Disturbance:
         name: on the command line.
         title: in tables and figures.
         unit: that levels are shown in.
-        factor: units in one of SI; negative where a level is a share taken away.
         levels: for the reference template [SI], from mild to severe.
         trials: at each level.
-        passing: it comes once and the walk must be back on its gait; otherwise it lasts from
-            the start and the walk must only go on.
         size: of a template's level over the reference's.
         options: of the run at a level [SI] and a trial's index.
+        passing: it comes once and the walk must be back on its gait; otherwise it lasts from
+            the start and the walk must only go on.
         grain: levels are whole multiples of it, at least one; 0 for any levels [SI].
     """
 
     name: str
     title: str
-    unit: str
-    factor: float
+    unit: Unit
     levels: tuple[float, ...]
     trials: int
-    passing: bool
     size: Callable[[SlipParameters], float]
     options: Callable[[Situation, float, int], SimulationOptions]
+    passing: bool = False
     grain: float = 0.0
 
     def levels_for(self, parameters: SlipParameters) -> list[float]:
@@ -114,7 +125,7 @@ class Disturbance:
 
     def shown(self, level: float) -> str:
         """A level with its unit."""
-        return f"{self.factor * level:.3g} {self.unit}".strip()
+        return f"{self.unit.factor * level:.3g} {self.unit.name}".strip()
 
 
 def _plain(_: SlipParameters) -> float:
@@ -202,65 +213,63 @@ def _ladder(step: float, count: int, start: float = 0.0) -> tuple[float, ...]:
 _PUSHES = _ladder(5.0, 30)
 _HEIGHTS = (0.005, *_ladder(0.01, 8))
 
-# Name, title, unit, its factor, levels, trials, passing, size, options.
+_NEWTON_SECONDS, _CENTIMETRES = Unit("N s"), Unit("cm", 100.0)
+_PER_CENT, _PER_CENT_LESS = Unit("%", 100.0), Unit("%", -100.0)
+
+# Name, title, unit, levels, trials, size, options.
 DISTURBANCES: tuple[Disturbance, ...] = (
     Disturbance(
-        "push-forward", "push forward", "N s", 1.0, _PUSHES, _PHASES, True, _impulse, _pushed
+        "push-forward",
+        "push forward",
+        _NEWTON_SECONDS,
+        _PUSHES,
+        _PHASES,
+        _impulse,
+        _pushed,
+        passing=True,
     ),
     Disturbance(
         "push-backward",
         "push backward",
-        "N s",
-        1.0,
+        _NEWTON_SECONDS,
         _PUSHES,
         _PHASES,
-        True,
         _impulse,
         _pushed_back,
-    ),
-    Disturbance("step-up", "step up", "cm", 100.0, _HEIGHTS, len(_EDGES), True, _length, _stepped),
-    Disturbance(
-        "step-down", "step down", "cm", 100.0, _HEIGHTS, len(_EDGES), True, _length, _stepped_down
+        passing=True,
     ),
     Disturbance(
-        "friction",
-        "friction",
-        "",
-        1.0,
-        _ladder(-0.05, 13, 0.7),
-        _STARTS,
-        False,
-        _plain,
-        _slippery,
+        "step-up", "step up", _CENTIMETRES, _HEIGHTS, len(_EDGES), _length, _stepped, passing=True
     ),
     Disturbance(
-        "heavier", "heavier", "%", 100.0, _ladder(0.1, 15), _STARTS, False, _plain, _other_mass
+        "step-down",
+        "step down",
+        _CENTIMETRES,
+        _HEIGHTS,
+        len(_EDGES),
+        _length,
+        _stepped_down,
+        passing=True,
     ),
     Disturbance(
-        "lighter", "lighter", "%", -100.0, _ladder(-0.1, 9), _STARTS, False, _plain, _other_mass
+        "friction", "friction", Unit(""), _ladder(-0.05, 13, 0.7), _STARTS, _plain, _slippery
+    ),
+    Disturbance("heavier", "heavier", _PER_CENT, _ladder(0.1, 15), _STARTS, _plain, _other_mass),
+    Disturbance(
+        "lighter", "lighter", _PER_CENT_LESS, _ladder(-0.1, 9), _STARTS, _plain, _other_mass
     ),
     Disturbance(
-        "torque",
-        "torque limits",
-        "%",
-        100.0,
-        _ladder(-0.05, 19, 1.0),
-        _STARTS,
-        False,
-        _plain,
-        _weak,
+        "torque", "torque limits", _PER_CENT, _ladder(-0.05, 19, 1.0), _STARTS, _plain, _weak
     ),
     Disturbance(
-        "noise", "sensor noise", "mrad", 1e3, _ladder(5e-4, 20), _STARTS, False, _plain, _noisy
+        "noise", "sensor noise", Unit("mrad", 1e3), _ladder(5e-4, 20), _STARTS, _plain, _noisy
     ),
     Disturbance(
         "delay",
         "control delay",
-        "ms",
-        1e3,
+        Unit("ms", 1e3),
         _ladder(2e-3, 25),
         _STARTS,
-        False,
         _time,
         _late,
         grain=_TIME_STEP,

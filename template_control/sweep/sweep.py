@@ -87,6 +87,30 @@ class SweepResult:
         return table
 
 
+@dataclass(frozen=True)
+class SweepOptions:
+    """How a sweep goes about its items.
+
+    Attributes:
+        progress: show a bar on stderr.
+        label: of the bar, and of what goes wrong.
+        retry_failed: run items again that the file has as failed.
+        in_flight: how many items are with the executor at a time; at least its workers.
+
+    Raises:
+        SweepError: if no item may be in flight.
+    """
+
+    progress: bool = True
+    label: str = "sweep"
+    retry_failed: bool = False
+    in_flight: int = 1000
+
+    def __post_init__(self) -> None:
+        if self.in_flight < 1:
+            raise SweepError(f"in_flight is {self.in_flight}: give at least 1")
+
+
 def grid(**axes: Iterable[Any]) -> list[Item]:
     """Every combination of the axes' values, the last axis changing fastest.
 
@@ -137,11 +161,7 @@ def sweep(
     path: str | Path | None = None,
     executor: Executor | None = None,
     seed: int = 0,
-    *,
-    progress: bool = True,
-    label: str = "sweep",
-    retry_failed: bool = False,
-    in_flight: int = 1000,
+    options: SweepOptions = SweepOptions(),
 ) -> SweepResult:
     """Call ``function(**item)`` for every item; one that fails is recorded and ends nothing.
 
@@ -157,25 +177,22 @@ def sweep(
         path: of the results file (JSON lines); None keeps the results in memory only.
         executor: where to run; None for one process a core, for the sweep's time.
         seed: what the items' seeds come from, not negative.
-        progress: show a bar on stderr.
-        label: of the bar.
-        retry_failed: run items again that the file has as failed.
-        in_flight: how many items are with the executor at a time; at least its workers.
+        options: bar, label, whether to retry, how many items at a time.
 
     Raises:
         SweepError: if function and items do not fit, the file is another's or cannot be
             written, or the executor breaks down (what finished by then is in the file).
     """
-    takes_seed, rows = _checked(function, items, seed, in_flight)
+    takes_seed, rows = _checked(function, items, seed)
     check_pickles(function, executor)
     seeds = tuple(item_seed(seed, i) for i in range(len(rows)))
     book = nullcontext() if path is None else SweepFile(path, header(function, seed, rows))
-    with book as file, _bar(progress) as bar:
+    with book as file, _bar(options.progress) as bar:
         ledger: dict[int, Outcome] = {} if file is None else file.finished
-        if retry_failed:
+        if options.retry_failed:
             ledger = {i: outcome for i, outcome in ledger.items() if outcome.error is None}
         failed = sum(outcome.error is not None for outcome in ledger.values())
-        task = bar.add_task(label, total=len(rows), completed=len(ledger), failed=failed)
+        task = bar.add_task(options.label, total=len(rows), completed=len(ledger), failed=failed)
 
         def keep(index: int, outcome: Outcome) -> None:
             nonlocal failed
@@ -189,7 +206,7 @@ def sweep(
         calls = ((i, rows[i] | ({"seed": seeds[i]} if takes_seed else {})) for i in waiting)
         try:
             if waiting:
-                run_calls(function, calls, executor, in_flight, keep, bar.refresh)
+                run_calls(function, calls, executor, options.in_flight, keep, bar.refresh)
         except ExecutorLostError as error:
             kept = (
                 "nothing is kept: give a path, to go on from there the next time"
@@ -197,18 +214,20 @@ def sweep(
                 else f"{len(ledger)} of {len(rows)} results are safe in {path}: run the same"
                 " sweep again, it goes on from there"
             )
-            raise SweepError(f"{label}: the executor broke down ({error}); {kept}") from None
+            raise SweepError(
+                f"{options.label}: the executor broke down ({error}); {kept}"
+            ) from None
     outcomes = [ledger[i] for i in range(len(rows))]
     results = tuple(outcome.result for outcome in outcomes)
     return SweepResult(tuple(rows), seeds, results, tuple(outcome.error for outcome in outcomes))
 
 
 def _checked(
-    function: Callable[..., Any], items: Iterable[Mapping[str, Any]], seed: int, in_flight: int
+    function: Callable[..., Any], items: Iterable[Mapping[str, Any]], seed: int
 ) -> tuple[bool, list[Item]]:
     """Whether the function takes a seed; the items, each of which it can be called with."""
-    if seed < 0 or in_flight < 1:
-        raise SweepError(f"seed is {seed}, in_flight {in_flight}: give at least 0 and 1")
+    if seed < 0:
+        raise SweepError(f"seed is {seed}: give at least 0")
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):

@@ -41,18 +41,20 @@ def robustness_figure(found: Robustness) -> Figure:
 
 def _panel(axes: Axes, finding: Finding) -> None:
     d = finding.disturbance
-    levels = d.factor * np.array([level.level for level in finding.levels])
+    levels = d.unit.factor * np.array([level.level for level in finding.levels])
     rates = 100.0 * np.array([level.rate for level in finding.levels])
     if d.passing:
         standing = 100.0 * np.array([level.standing for level in finding.levels])
         axes.plot(levels, standing, ".-", color=_STANDING, linewidth=1.2)
     axes.plot(levels, rates, "o-", color=_RATE, markersize=3.5, linewidth=1.2)
     if finding.breaking_point is not None:
-        axes.axvline(d.factor * finding.breaking_point, color=_POINT, linestyle="--", linewidth=1.0)
+        axes.axvline(
+            d.unit.factor * finding.breaking_point, color=_POINT, linestyle="--", linewidth=1.0
+        )
     axes.axhline(50.0, color="0.85", linewidth=0.8, zorder=0)
     if len(levels) > 1 and levels[-1] < levels[0]:
         axes.invert_xaxis()
     axes.set_ylim(-5.0, 105.0)
     axes.set_title(d.title, fontsize=9)
-    axes.set_xlabel(d.unit or "coefficient", fontsize=8)
+    axes.set_xlabel(d.unit.name or "coefficient", fontsize=8)
     axes.tick_params(labelsize=8)
