@@ -74,9 +74,8 @@ def test_running_path_knows_where_either_foot_lands():
 
 @given(time=st.floats(0.0, 0.32), scale=st.floats(0.97, 1.03))
 @settings(max_examples=50, deadline=None)
-def test_phase_look_up_inverts_the_path(time, scale):
-    gait = gait_for_speed(P, 1.2)
-    u = gait.controls
+def test_phase_look_up_inverts_the_path(brisk_gait, time, scale):
+    gait, u = brisk_gait, brisk_gait.controls
     curve = join(
         [simulate_stride(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)]
     ).curve

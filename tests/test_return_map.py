@@ -18,7 +18,6 @@ from template_control.slip.dynamics.stance_map import (
     momentum_changes,
 )
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.gait import gait_at
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
@@ -34,11 +33,6 @@ STRIDES = {
 }
 CASES = [(stride, kind) for stride in STRIDES for kind in MapKind]
 walking = st.tuples(st.floats(0.95, 1.25), st.floats(0.965, 0.985), st.floats(-0.05, 0.05))
-
-
-@pytest.fixture(scope="module")
-def gait():
-    return gait_at(P, np.radians(66.0), 1.1)
 
 
 @pytest.mark.parametrize(("stride", "kind"), CASES)

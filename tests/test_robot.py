@@ -57,6 +57,37 @@ def test_jacobians_and_biases_match_finite_differences(any_robot, random_states)
         assert momentum == pytest.approx(any_robot.angular_momentum, abs=1e-12)
 
 
+def momentum_row(robot, height):
+    """Row and bias of s = dx/dt + L / (m y): the rate of s at acceleration a is row @ a + bias.
+
+    y is ``height``, of the CoM over ground at rest [m].
+    """
+    weight = robot.mass * height
+    row = robot.com_jacobian[0] + robot.angular_momentum_jacobian / weight
+    sinking = robot.angular_momentum * robot.com_velocity[1] / height
+    return row, robot.com_bias[0] + (robot.angular_momentum_bias - sinking) / weight
+
+
+@pytest.mark.parametrize("ground", [0.0, -0.03])
+def test_momentum_row_and_bias_match_finite_differences(any_robot, random_states, ground):
+    """The momentum about the foot over m y, along short motions with an acceleration."""
+    rng, h = np.random.default_rng(11), 1e-6
+
+    def speed(q, v):
+        any_robot.update(q, v)
+        height = any_robot.com[1] - ground
+        about_com = any_robot.angular_momentum / (any_robot.mass * height)
+        return any_robot.com_velocity[0] + about_com
+
+    for q, v in random_states:
+        a = rng.normal(0.0, 20.0, any_robot.nv)
+        ahead, behind = (speed(q + t * v + 0.5 * t**2 * a, v + t * a) for t in (h, -h))
+        now = speed(q, v)
+        row, bias = momentum_row(any_robot, any_robot.com[1] - ground)
+        assert row @ v == pytest.approx(now, abs=1e-12)
+        assert row @ a + bias == pytest.approx((ahead - behind) / (2.0 * h), rel=1e-6, abs=1e-5)
+
+
 def test_foot_rows_are_those_of_a_rolling_sphere(any_robot, random_states):
     for q, v in random_states:
         foot = differentiate(any_robot, lambda: any_robot.foot_velocity, q, v)

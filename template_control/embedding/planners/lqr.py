@@ -17,6 +17,7 @@ from scipy.linalg import solve_discrete_are
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.step_search import (
     FALL_PRICE,
+    Grid,
     Law,
     linear,
     price,
