@@ -25,6 +25,7 @@ from template_control.robot.library import load_robot
 from template_control.run.simulation import SimulationOptions, simulate
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.parameters import SlipParameters
 
 
 @pytest.fixture(scope="module")
