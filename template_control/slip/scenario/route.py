@@ -1,0 +1,264 @@
+"""Routes: which stride comes next, and towards which state.
+
+One type for all that follow one: the template's :func:`~.run.simulate_scenario` and a robot's
+controller ask the same question at each section they come to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.errors import ParameterError
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.dynamics.stride import finite
+from template_control.slip.maps.section import APEX, VLO, Section, section_of
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.scenario import Gait, Scenario, Segment
+
+Array = NDArray[np.float64]
+
+_STRIDES: dict[tuple[Section, Gait], str] = {
+    (VLO, "walk"): "w",
+    (VLO, "run"): "wr",
+    (APEX, "run"): "r",
+    (APEX, "walk"): "rw",
+}
+_TRANSITIONS = ("wr", "rw")
+_FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
+
+
+@dataclass(frozen=True)
+class StrideGoal:
+    """What a route asks for at a section.
+
+    Attributes:
+        stride: key of ``STRIDE_START``: the kind of stride that comes next.
+        target: (n,) state wanted at the section the stride ends at.
+        wanted_speed: of the profile there [m/s].
+        segment: of the scenario, from 0.
+    """
+
+    stride: str
+    target: Array
+    wanted_speed: float
+    segment: int = 0
+
+
+class Route(Protocol):
+    """Which stride comes next, at every section."""
+
+    @property
+    def parameters(self) -> SlipParameters:
+        """The template that the route is for."""
+
+    @property
+    def start(self) -> Array:
+        """(n,) state at :attr:`section` to begin in."""
+
+    @property
+    def section(self) -> Section:
+        """The section that a run begins at."""
+
+    def reset(self) -> None:
+        """Go back to the beginning; a run calls it first."""
+
+    def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """Go on from a section; call it once at each, in order.
+
+        Args:
+            section: where the run is.
+            z: (n,) its state there.
+            now: time [s].
+
+        Returns:
+            The stride that begins here, None where the route ends.
+        """
+
+    def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """What :meth:`next` would return here; the route does not go on."""
+
+
+class SteadyRoute:
+    """The same stride to the same target for ever.
+
+    Args:
+        parameters: the template.
+        stride: key of the automaton's ``starts``; it ends at the section it begins at.
+        target: (n,) state wanted there.
+        start: (n,) state to begin in; the target by default.
+        automaton: that the stride is of.
+
+    Raises:
+        ParameterError: for a stride that is unknown or cannot follow itself, and for a state
+            of a wrong shape or with a number that is not finite.
+    """
+
+    def __init__(
+        self,
+        parameters: SlipParameters,
+        stride: str,
+        target: Sequence[float] | Array,
+        start: Sequence[float] | Array | None = None,
+        automaton: Automaton = AUTOMATON,
+    ) -> None:
+        begin, end = automaton.sections(automaton.start(stride).name)
+        if begin is not end:
+            raise ParameterError(
+                f"stride {stride!r} leads from {begin.name} to {end.name} and cannot follow itself:"
+                " give one that ends where it begins"
+            )
+        self.parameters = parameters
+        self.section = section_of(begin)
+        size = self.section.dimension
+        aim = finite("target", target, size)
+        self.start = aim.copy() if start is None else finite("start", start, size)
+        self._goal = StrideGoal(stride, aim, float(aim[0]))
+
+    def reset(self) -> None:
+        """Nothing to go back to: every stride is alike."""
+
+    def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """See :meth:`Route.next`."""
+        return self._goal
+
+    def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """See :meth:`Route.ahead`."""
+        return self._goal
+
+
+@dataclass(frozen=True)
+class _Progress:
+    """Where in a scenario a run is.
+
+    Attributes:
+        speed: of the profile where the segment begins [m/s].
+        began: when that was, None before the run [s].
+        index: of the segment.
+        strides: done in the segment, transitions not counted.
+        duration: of the last stride of each kind [s].
+        last: kind of the stride under way, and when it began; None at the start.
+        took: how long it took, None if the times are to tell [s].
+        over: past the last segment.
+    """
+
+    speed: float
+    began: float | None = None
+    index: int = 0
+    strides: int = 0
+    duration: Mapping[str, float] = field(default_factory=dict)
+    last: tuple[str, float] | None = None
+    took: float | None = None
+    over: bool = False
+
+    def arrived(self, now: float) -> _Progress:
+        """At a section: the stride that was under way is done."""
+        if self.last is None:
+            return replace(self, began=now)
+        kind, left = self.last
+        took = now - left if self.took is None else self.took
+        here = replace(self, duration={**self.duration, kind: took}, last=None, took=None)
+        if kind in _TRANSITIONS:
+            # The transition leads to where the segment's profile begins.
+            return replace(here, began=now)
+        return replace(here, strides=self.strides + 1)
+
+    def profile(self, segment: Segment, now: float) -> float:
+        """The segment's profile, whatever ends it [m/s]."""
+        return self.speed + segment.acceleration * (now - (self.began or 0.0))
+
+    def wanted(self, segment: Segment, now: float) -> float:
+        """The profile's speed, which stops rising at ``until_speed`` [m/s]."""
+        value = self.profile(segment, now)
+        if segment.until_speed is not None and segment.acceleration > 0.0:
+            return min(value, segment.until_speed)
+        return max(value, 0.0)
+
+    def ends(self, segment: Segment, now: float, speed: float) -> bool:
+        """Whether the segment ends at a section passed at ``now`` with ``speed``."""
+        if segment.duration is not None and now - (self.began or 0.0) >= segment.duration:
+            return True
+        if segment.steps is not None and self.strides >= segment.steps:
+            return True
+        if segment.until_speed is None:
+            return False
+        wanted = self.profile(segment, now)
+        if segment.acceleration > 0.0:
+            return wanted >= segment.until_speed
+        return wanted <= segment.until_speed and speed < segment.until_speed
+
+
+class ScenarioRoute:
+    """The route of a :class:`~.scenario.Scenario`: its speed profile and its gaits.
+
+    The times of the calls tell how long strides take, how many were made, and when a
+    transition has led to the segment that it belongs to.
+
+    Args:
+        scenario: the profile.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.parameters = scenario.parameters
+        self.section = VLO
+        self.start = np.array(scenario.start, dtype=float)
+        p = self.parameters
+        self._guess = _FIRST_DURATION * np.sqrt(p.rest_length / p.gravity)
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the beginning."""
+        self._progress = _Progress(self.scenario.segments[0].speed or 0.0)
+
+    def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """See :meth:`Route.next`."""
+        self._progress, goal = self._go(section, z, now)
+        return goal
+
+    def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """See :meth:`Route.ahead`."""
+        return self._go(section, z, now)[1]
+
+    def took(self, duration: float) -> None:
+        """Tell how long the stride under way took [s], before the section it ends at.
+
+        Nobody need do it. It spares who knows the duration the rounding of two times' difference.
+        """
+        self._progress = replace(self._progress, took=duration)
+
+    def _go(self, section: Section, z: Array, now: float) -> tuple[_Progress, StrideGoal | None]:
+        here = self._segment(self._progress.arrived(now), float(z[0]), now)
+        if here.over:
+            return here, None
+        s = self.scenario
+        segment = s.segments[here.index]
+        kind = _STRIDES[section, segment.gait]
+        # A transition aims at where the profile begins, the others at where they will end.
+        ahead = 0.0 if kind in _TRANSITIONS else here.duration.get(kind, self._guess)
+        speed = here.wanted(segment, now + ahead)
+        target = (speed, s.apex_height) if segment.gait == "run" else (speed, *s.vlo)
+        goal = StrideGoal(kind, np.array(target), speed, here.index)
+        return replace(here, last=(kind, now)), goal
+
+    def _segment(self, here: _Progress, speed: float, now: float) -> _Progress:
+        """Enter the segment that holds at ``now``."""
+        segments = self.scenario.segments
+        while not here.over and here.ends(segments[here.index], now, speed):
+            wanted = here.wanted(segments[here.index], now)
+            if here.index + 1 == len(segments):
+                return replace(here, over=True)
+            given = segments[here.index + 1].speed
+            here = replace(
+                here,
+                speed=wanted if given is None else given,
+                began=now,
+                index=here.index + 1,
+                strides=0,
+            )
+        return here
