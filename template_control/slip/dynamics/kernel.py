@@ -92,10 +92,11 @@ def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha
         toes[0] = state[0] + rest_length * np.cos(alpha)
     elif reset == _PLACE_FRONT:
         toes[1] = state[0] + rest_length * np.cos(alpha)
-    elif reset == _SHIFT:
+    elif reset in (_SHIFT, _SWAP):
+        rear = toes[0]
         toes[0] = toes[1]
-    elif reset == _SWAP:
-        toes[0], toes[1] = toes[1], toes[0]
+        if reset == _SWAP:
+            toes[1] = rear
 
 
 @inner

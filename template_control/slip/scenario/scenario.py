@@ -71,6 +71,11 @@ class Scenario:
     def __post_init__(self) -> None:
         _check(self)
 
+    @property
+    def gaits(self) -> frozenset[Gait]:
+        """The gaits of its segments."""
+        return frozenset(segment.gait for segment in self.segments)
+
 
 def _number(where: str, value: Any, low: float = -math.inf, high: float = math.inf) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float):
