@@ -24,10 +24,10 @@ from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
 from .robot.library import load_robot as load_robot
 from .robot.planar_biped import PlanarBiped as PlanarBiped
+from .run.options import Push as Push
+from .run.options import SimulationOptions as SimulationOptions
 from .run.record import Record as Record
 from .run.sensing import SensorOptions as SensorOptions
-from .run.simulation import Push as Push
-from .run.simulation import SimulationOptions as SimulationOptions
 from .run.simulation import simulate as simulate
 from .slip.automaton.vocabulary import MapKind as MapKind
 from .slip.control.controllers import ActiveRunning as ActiveRunning

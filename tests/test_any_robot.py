@@ -14,7 +14,8 @@ from template_control.errors import RobotError
 from template_control.robot.five_link import FiveLink, Link
 from template_control.robot.library import ROBOTS, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.options import SimulationOptions
+from template_control.run.simulation import simulate
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 

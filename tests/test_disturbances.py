@@ -13,9 +13,10 @@ from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
+from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.sensing import SensorOptions, Sensors
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.simulation import simulate
 from template_control.view.figures import stick_diagram
 
 

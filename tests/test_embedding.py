@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from template_control.embedding.guards import GuardOptions, RobotGuards
-from template_control.embedding.load import LoadEstimate, LoadOptions
+from template_control.embedding.learners.load import LoadEstimate, LoadOptions
 from template_control.embedding.phases import Clock
-from template_control.embedding.references import leg_forces
+from template_control.embedding.references.leg_forces import leg_forces
+from template_control.embedding.references.template_path import LOCATE, at_direction, join, sample
 from template_control.embedding.sensing import Sensed
-from template_control.embedding.template_path import LOCATE, at_direction, join, sample
 from template_control.errors import GaitError, RobotError
 from template_control.robot.start import state_at_vlo
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START

@@ -22,7 +22,8 @@ from template_control.paper.example_two import (
 from template_control.paper.example_two_figures import beginning, liftoff
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.options import SimulationOptions
+from template_control.run.simulation import simulate
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.parameters import SlipParameters

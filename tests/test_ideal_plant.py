@@ -12,8 +12,9 @@ from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.plant import open_plant, plant_name
 from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
+from template_control.run.options import Push, SimulationOptions
 from template_control.run.record import Record
-from template_control.run.simulation import Push, SimulationOptions, simulate
+from template_control.run.simulation import simulate
 
 NOTHING = np.zeros(4)
 

@@ -14,7 +14,8 @@ from template_control.robot.library import load_robot
 from template_control.robustness import campaign as robustness
 from template_control.robustness.campaign import Finding, Level, measure, off_gait, trial
 from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.options import SimulationOptions
+from template_control.run.simulation import simulate
 from template_control.slip.parameters import SlipParameters
 from template_control.view.robustness_figure import robustness_figure
 

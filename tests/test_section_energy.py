@@ -8,23 +8,13 @@ from hypothesis import strategies as st
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.gait import vlo_energy
-from template_control.slip.gaits.gait_branch import section_energy
+from template_control.slip.gaits.gait_branch import energy_gradient
+from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
 K0, L0 = P.leg_stiffness, P.rest_length
 stiffnesses = st.floats(0.8 * K0, 1.3 * K0)
-
-
-def energy(z, stiffness):
-    """Of a state at VLO (3,) or at an apex (2,) [J]."""
-    return section_energy(P, z, stiffness)[0]
-
-
-def derivatives(z, stiffness):
-    """Of ``energy`` by the state, and by the stiffness."""
-    return section_energy(P, z, stiffness)[1:]
 
 
 def path_energy(stride, time):
@@ -47,14 +37,14 @@ def test_vlo_energy_is_that_of_the_stride(speed, height, vertical, k):
     u = controls(np.radians(68.0), *k)
     stride = simulate_stride(P, STRIDE_START["w"], [0.0, height, speed, vertical], u)
     assume(stride.completed)
-    z0, z1 = np.array([speed, height, vertical]), stride.state[[2, 1, 3]]
+    z0, z1 = np.array([speed, height, vertical]), VLO.of(stride.state)
     for z, time, slot in ((z0, 0.0, Slot.K_SC), (z1, stride.duration, Slot.K_SD)):
         expected = path_energy(stride, time)
-        assert energy(z, u[slot]) == pytest.approx(expected, rel=1e-11)
+        assert VLO.energy(P, z, u[slot]) == pytest.approx(expected, rel=1e-11)
         # The stance leg's stiffness is k0 again in the next stride.
         reset = 0.5 * (K0 - u[slot]) * (L0 - z[1]) ** 2
-        assert vlo_energy(P, z) == pytest.approx(expected + reset, rel=1e-11)
-        check_derivatives(z, u[slot])
+        assert VLO.energy(P, z) == pytest.approx(expected + reset, rel=1e-11)
+        check_derivatives(VLO, z, u[slot])
 
 
 @given(speed=st.floats(2.0, 6.0), height=st.floats(0.96, 1.05), k=st.floats(20e3, 35e3))
@@ -63,19 +53,19 @@ def test_apex_energy_is_that_of_the_stride(speed, height, k):
     u = controls(np.radians(68.0), k, 1.1 * k)
     stride = simulate_stride(P, STRIDE_START["r"], [0.0, height, speed, 0.0], u)
     assume(stride.completed)
-    for z, time in (([speed, height], 0.0), (stride.state[[2, 1]], stride.duration)):
+    for z, time in (([speed, height], 0.0), (APEX.of(stride.state), stride.duration)):
         z = np.array(z)
-        assert energy(z, k) == pytest.approx(path_energy(stride, time), rel=1e-11)
-        assert derivatives(z, k)[1] == 0.0
-        check_derivatives(z, k)
+        assert APEX.energy(P, z, k) == pytest.approx(path_energy(stride, time), rel=1e-11)
+        assert energy_gradient(APEX, P, z, k)[1] == 0.0
+        check_derivatives(APEX, z, k)
 
 
-def check_derivatives(z, stiffness):
+def check_derivatives(section, z, stiffness):
     """Against central differences."""
-    gradient, by_stiffness = derivatives(z, stiffness)
+    gradient, by_stiffness = energy_gradient(section, P, z, stiffness)
     h = 1e-5
     for i, unit in enumerate(np.eye(len(z))):
-        ahead, behind = (energy(z + s * h * unit, stiffness) for s in (1, -1))
+        ahead, behind = (section.energy(P, z + s * h * unit, stiffness) for s in (1, -1))
         assert gradient[i] == pytest.approx((ahead - behind) / (2 * h), abs=1e-4)
-    ahead, behind = (energy(z, stiffness + s) for s in (1.0, -1.0))
+    ahead, behind = (section.energy(P, z, stiffness + s) for s in (1.0, -1.0))
     assert by_stiffness == pytest.approx((ahead - behind) / 2.0, abs=1e-9)

@@ -26,7 +26,7 @@ STAGES = (
 )
 SLIP_STAGES = (
     ("parameters", "automaton"),
-    ("dynamics",),
+    ("dynamics", "similarity"),
     ("maps",),
     ("control",),
     ("gaits",),

@@ -15,7 +15,8 @@ from sweep_work import P, drawn, fragile, other, quietly, square, walking_step
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import SweepError
 from template_control.robot.library import load_robot
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.options import SimulationOptions
+from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.scenario.run import simulate_scenario

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.swing_foot import SwingFoot, SwingOptions, quintic_step
+from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions, quintic_step
 
 
 def test_quintic_arrives():

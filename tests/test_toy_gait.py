@@ -16,8 +16,9 @@ from template_control.embedding.phases import Clock, PhaseControl
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.robot.library import load_robot
 from template_control.robot.start import Pose
+from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.simulation import simulate
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Phase, Reset, Slot
 from template_control.slip.dynamics.stride import simulate_stride

@@ -12,8 +12,9 @@ from template_control.plant.ground import GroundStep
 from template_control.robot.library import load_robot
 from template_control.robustness.campaign import off_gait
 from template_control.robustness.disturbances import Situation
+from template_control.run.options import Push, SimulationOptions
 from template_control.run.record import Record
-from template_control.run.simulation import Push, SimulationOptions, perturbed_start, simulate
+from template_control.run.simulation import perturbed_start, simulate
 from template_control.run.summary import summarise
 from template_control.slip.gaits.gait import gait_for_speed
 from template_control.slip.parameters import SlipParameters

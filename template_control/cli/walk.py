@@ -24,8 +24,9 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
-from template_control.run.simulation import SimulationOptions, perturbed_start, simulate
+from template_control.run.simulation import perturbed_start, simulate
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.gaits.gait import WalkingGait, gait_for_speed

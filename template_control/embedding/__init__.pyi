@@ -1,7 +1,7 @@
 from .controller import EmbeddingController as EmbeddingController
 from .guards import GuardOptions as GuardOptions
-from .load import LoadOptions as LoadOptions
-from .momentum_trim import TrimOptions as TrimOptions
+from .learners.load import LoadOptions as LoadOptions
+from .learners.momentum_trim import TrimOptions as TrimOptions
 from .options import EmbeddingOptions as EmbeddingOptions
 from .phases import PHASES as PHASES
 from .phases import Clock as Clock
@@ -13,10 +13,10 @@ from .planners.modified import ModifiedOptions as ModifiedOptions
 from .planners.modified import ModifiedPlanner as ModifiedPlanner
 from .planners.planner import Decision as Decision
 from .planners.planner import Planner as Planner
-from .references import UnloadOptions as UnloadOptions
+from .references.leg_forces import UnloadOptions as UnloadOptions
+from .references.swing_foot import SwingOptions as SwingOptions
 from .robot_template import default_gait as default_gait
 from .robot_template import paper_gait as paper_gait
 from .robot_template import template_for as template_for
+from .section_report import SectionReport as SectionReport
 from .stride_planning import ReplanOptions as ReplanOptions
-from .stride_planning import SectionReport as SectionReport
-from .swing_foot import SwingOptions as SwingOptions

@@ -14,65 +14,35 @@ centimetres.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.feet import Feet
 from template_control.embedding.guards import PLACED, RobotGuards
-from template_control.embedding.load import LoadEstimate
-from template_control.embedding.momentum_trim import MomentumTrim
+from template_control.embedding.learners.load import LoadEstimate
+from template_control.embedding.learners.momentum_trim import MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.phases import PhaseControl, phase_control
 from template_control.embedding.planners.planner import Planner, Planners
-from template_control.embedding.references import leg_forces
+from template_control.embedding.references.feet import Feet
+from template_control.embedding.references.leg_forces import leg_forces
+from template_control.embedding.references.template_path import LOCATE
+from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
-from template_control.embedding.stride_planning import (
-    Learnt,
-    SectionReport,
-    StridePlanning,
-)
-from template_control.embedding.template_path import LOCATE
+from template_control.embedding.station import stations
+from template_control.embedding.stride_planning import StridePlanning
 from template_control.errors import ParameterError
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Event, Leg
+from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
-from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.solver import Solution, Stance, WholeBodyQp
-from template_control.whole_body.task import TaskStack
 from template_control.whole_body.wanted import Wanted
 
 Array = NDArray[np.float64]
 
 _PITCH = 2  # place of the trunk's pitch in q
-
-
-@dataclass(frozen=True)
-class _Station:
-    """A node of the automaton, with all that the controller looks up for it.
-
-    Attributes:
-        node: of the automaton.
-        control: the phase's entry in the table.
-        tasks: its rows.
-        com: the task that follows the template's CoM, None without.
-        ways: edges to other nodes, in order.
-        awaited: the leg that is to touch down, None where none is.
-        trimmed: the momentum trim acts somewhere in the stride.
-    """
-
-    node: Node
-    control: PhaseControl
-    tasks: TaskStack
-    com: ComTask | None
-    ways: tuple[Edge, ...]
-    awaited: Leg | None
-    trimmed: bool
 
 
 class EmbeddingController:
@@ -132,7 +102,7 @@ class EmbeddingController:
         self._rear_shift = 0.0
         self._sensed = Sensed()
         self._guards = RobotGuards(self.parameters, o.guards)
-        self._stations = _stations(automaton, robot.nv, o)
+        self._stations = stations(automaton, robot.nv, o.phases)
         self.station = next(iter(self._stations.values()))
 
     @property
@@ -375,27 +345,3 @@ class EmbeddingController:
             cap[leg] = self.options.unload.cap(forces[leg, 1], weight)
         feet = tuple(self.feet.of[leg] for leg in legs)
         return Stance(feet, forces[: len(legs)].ravel(), cap)
-
-
-def _stations(automaton: Automaton, nv: int, options: EmbeddingOptions) -> dict[str, _Station]:
-    """Everything that is looked up for a node, by its name."""
-    trimmed = {
-        node.name
-        for start in automaton.starts.values()
-        if any(phase_control(options.phases, other).trims for other in automaton.stride(start))
-        for node in automaton.stride(start)
-    }
-    found = {}
-    for node in automaton.nodes:
-        control = phase_control(options.phases, node)
-        touchdown = node.edge(Event.TOUCHDOWN)
-        found[node.name] = _Station(
-            node=node,
-            control=control,
-            tasks=TaskStack(control.tasks, nv),
-            com=next((task for task in control.tasks if isinstance(task, ComTask)), None),
-            ways=tuple(edge for edge in node.edges if isinstance(edge.target, str)),
-            awaited=PLACED[touchdown.reset] if touchdown is not None else None,
-            trimmed=node.name in trimmed,
-        )
-    return found

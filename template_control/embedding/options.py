@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from template_control.embedding.guards import GuardOptions
-from template_control.embedding.load import LoadOptions
-from template_control.embedding.momentum_trim import TrimOptions
+from template_control.embedding.learners.load import LoadOptions
+from template_control.embedding.learners.momentum_trim import TrimOptions
 from template_control.embedding.phases import PHASES, PhaseControl
-from template_control.embedding.references import UnloadOptions
+from template_control.embedding.references.leg_forces import UnloadOptions
+from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.embedding.stride_planning import ReplanOptions
-from template_control.embedding.swing_foot import SwingOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
 from template_control.whole_body.solver import QpOptions

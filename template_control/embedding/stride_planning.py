@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import Decision, Planner, Planners
+from template_control.embedding.references.template_path import Landing, TemplatePath, join
+from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
-from template_control.embedding.template_path import Landing, TemplatePath, join
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -51,44 +52,6 @@ class ReplanOptions:
     agility: float = tuned(8.0, RATE_SQUARED)
     calmer: tuple[float, ...] = tuned((0.5, 0.0))
     highest: float = tuned(0.99)
-
-
-@dataclass(frozen=True)
-class Learnt:
-    """What the controller's learners know at a section.
-
-    Attributes:
-        load: the load factor.
-        trim: the momentum trim [m/s^2].
-    """
-
-    load: float
-    trim: float
-
-
-@dataclass(frozen=True)
-class SectionReport:
-    """What the controller knew and chose at a section.
-
-    Attributes:
-        time: of the section [s].
-        section: which.
-        state: (3,) dx/dt (as the phase before senses it), y, dy/dt.
-        goal: the stride that begins, and where it is to lead.
-        decision: the planner's choice for it.
-        offset: (3,) the planner's offset estimate.
-        learnt: what the learners knew.
-        plan_seconds: wall-clock time of the plan.
-    """
-
-    time: float
-    section: Section
-    state: Array
-    goal: StrideGoal
-    decision: Decision
-    offset: Array
-    learnt: Learnt
-    plan_seconds: float
 
 
 class StridePlanning:
@@ -192,7 +155,16 @@ class StridePlanning:
         seconds = time.perf_counter() - begin
         offset = self.planner_of(goal).offset.copy()
         self.reports.append(
-            SectionReport(now, section, section.padded(z), goal, decision, offset, learnt, seconds)
+            SectionReport(
+                time=now,
+                section=section,
+                state=section.padded(z),
+                goal=goal,
+                decision=decision,
+                offset=offset,
+                learnt=learnt,
+                plan_seconds=seconds,
+            )
         )
         node = self.automaton.start(goal.stride)
         state = sensed.state.copy()

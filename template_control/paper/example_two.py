@@ -28,8 +28,9 @@ from template_control.paper.reproduction import Reproduction
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
+from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.gaits.basin import velocity_angle, vlo_state
 from template_control.slip.gaits.gait import WalkingGait

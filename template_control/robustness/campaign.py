@@ -28,8 +28,9 @@ from template_control.robustness.disturbances import (
     Disturbance,
     Situation,
 )
+from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.simulation import simulate
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.sweep.sweep import Item, SweepOptions, sweep
 

@@ -18,8 +18,9 @@ from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.run.options import Push, SimulationOptions
 from template_control.run.sensing import SensorOptions
-from template_control.run.simulation import Push, SimulationOptions, perturbed_start, simulate
+from template_control.run.simulation import perturbed_start, simulate
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale

@@ -5,25 +5,23 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.errors import ParameterError
-from template_control.plant.bullet import PlantOptions
-from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.start import Pose, state_at_vlo, state_in
+from template_control.robot.start import state_at_vlo, state_in
+from template_control.run.options import Push, SimulationOptions
 from template_control.run.record import Record
 from template_control.run.recorder import Recorder, Truth
-from template_control.run.sensing import SensorOptions, Sensors, TorqueDelay
+from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import WalkingGait
@@ -33,93 +31,6 @@ from template_control.slip.scenario.route import Route
 Array = NDArray[np.float64]
 
 _STEPS = 50  # of a run on a route that does not end, where the options do not say
-_LONGEST_DELAY = 1.0  # [s]
-
-
-@dataclass(frozen=True)
-class Push:
-    """A horizontal force on the trunk.
-
-    Attributes:
-        impulse: [N s], forward positive.
-        step: the push begins in this step (0 is the first) ...
-        phase: ... this share of the gait's step duration after its VLO.
-        duration: [s].
-    """
-
-    impulse: float
-    step: int = 10
-    phase: float = 0.0
-    duration: float = 0.1
-
-
-@dataclass(frozen=True)
-class FallOptions:
-    """When a foot touches the ground, and when a robot counts as fallen.
-
-    Attributes:
-        contact_force: of the weight: what a foot must carry to count as touching. Less is the
-            rattle of a contact solver.
-        height: of the template's rest length: the hips nearer to the ground than that.
-        pitch: of the trunk [rad].
-        patience: durations of the gait's step without a section.
-    """
-
-    contact_force: float = 0.005
-    height: float = 0.35
-    pitch: float = float(np.radians(60.0))
-    patience: float = 4.0
-
-
-@dataclass(frozen=True)
-class SimulationOptions:
-    """How a run goes.
-
-    Attributes:
-        steps: from section to section, how many at most; None: to the end of the route, or 50
-            where it has none.
-        plant: the world; the type of its options says which.
-        embedding: the controller's tuning.
-        start: (3,) VLO state to start in; None for the route's.
-        pose: CoM and feet to start with; None: over the stance foot at VLO. A route that
-            begins at another section needs it.
-        pushes: disturbances.
-        sensors: noise on the state the controller gets; the plant and the record have the
-            true one.
-        delay: from a measurement to the torques computed from it [s], a whole number of
-            physics steps.
-        record_every: keep every n-th sample.
-        falls: when the robot counts as fallen.
-    """
-
-    steps: int | None = None
-    plant: PlantOptions | IdealOptions = field(default_factory=PlantOptions)
-    embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
-    start: tuple[float, float, float] | None = None
-    pose: Pose | None = None
-    pushes: tuple[Push, ...] = ()
-    sensors: SensorOptions = field(default_factory=SensorOptions)
-    delay: float = 0.0
-    record_every: int = 1
-    falls: FallOptions = field(default_factory=FallOptions)
-
-    def __post_init__(self) -> None:
-        if self.steps is not None and self.steps < 1:
-            raise ParameterError(f"steps is {self.steps}: give at least 1")
-        if self.record_every < 1:
-            raise ParameterError(f"record_every is {self.record_every}: give at least 1")
-        step = self.plant.time_step
-        whole = np.isfinite(self.delay) and abs(self.delay / step - self.delay_ticks) < 1e-6
-        if not (whole and 0.0 <= self.delay <= _LONGEST_DELAY):
-            raise ParameterError(
-                f"delay is {self.delay!r} s: give a multiple of the time step, {step:g} s, from 0"
-                f" to {_LONGEST_DELAY:g} s"
-            )
-
-    @property
-    def delay_ticks(self) -> int:
-        """The delay in physics steps."""
-        return round(self.delay / self.plant.time_step) if np.isfinite(self.delay) else 0
 
 
 def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:

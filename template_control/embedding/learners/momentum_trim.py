@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.template_path import TemplatePath
+from template_control.embedding.references.template_path import TemplatePath
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait, vlo_jacobians
 from template_control.slip.parameters import SlipParameters

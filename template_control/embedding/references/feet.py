@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.swing_foot import SwingFoot, SwingOptions
+from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton.vocabulary import Leg, Reset
 

@@ -1,0 +1,52 @@
+"""What the controller knew and chose at a section."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import Decision
+from template_control.slip.maps.section import Section
+from template_control.slip.scenario.route import StrideGoal
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What the controller's learners know at a section.
+
+    Attributes:
+        load: the load factor.
+        trim: the momentum trim [m/s^2].
+    """
+
+    load: float
+    trim: float
+
+
+@dataclass(frozen=True)
+class SectionReport:
+    """What the controller knew and chose at a section.
+
+    Attributes:
+        time: of the section [s].
+        section: which.
+        state: (3,) dx/dt (as the phase before senses it), y, dy/dt.
+        goal: the stride that begins, and where it is to lead.
+        decision: the planner's choice for it.
+        offset: (3,) the planner's offset estimate.
+        learnt: what the learners knew.
+        plan_seconds: wall-clock time of the plan.
+    """
+
+    time: float
+    section: Section
+    state: Array
+    goal: StrideGoal
+    decision: Decision
+    offset: Array
+    learnt: Learnt
+    plan_seconds: float

@@ -1,0 +1,65 @@
+"""A node of the automaton with all that the controller looks up for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from template_control.embedding.guards import PLACED
+from template_control.embedding.phases import PhaseControl, Phases, phase_control
+from template_control.slip.automaton.hybrid import Automaton, Edge, Node
+from template_control.slip.automaton.vocabulary import Event, Leg
+from template_control.whole_body.com_task import ComTask
+from template_control.whole_body.task import TaskStack
+
+
+@dataclass(frozen=True)
+class Station:
+    """Where the robot is on the automaton, and what that asks for.
+
+    Attributes:
+        node: of the automaton.
+        control: the phase's entry in the table.
+        tasks: its rows.
+        com: the task that follows the template's CoM, None without.
+        ways: edges to other nodes, in order.
+        awaited: the leg that is to touch down, None where none is.
+        trimmed: the momentum trim acts somewhere in the stride.
+    """
+
+    node: Node
+    control: PhaseControl
+    tasks: TaskStack
+    com: ComTask | None
+    ways: tuple[Edge, ...]
+    awaited: Leg | None
+    trimmed: bool
+
+
+def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station]:
+    """A station for each node, by its name.
+
+    Args:
+        automaton: of the nodes.
+        nv: degrees of freedom of the robot.
+        phases: what the controller does in each.
+    """
+    trimmed = {
+        node.name
+        for start in automaton.starts.values()
+        if any(phase_control(phases, other).trims for other in automaton.stride(start))
+        for node in automaton.stride(start)
+    }
+    found = {}
+    for node in automaton.nodes:
+        control = phase_control(phases, node)
+        touchdown = node.edge(Event.TOUCHDOWN)
+        found[node.name] = Station(
+            node=node,
+            control=control,
+            tasks=TaskStack(control.tasks, nv),
+            com=next((task for task in control.tasks if isinstance(task, ComTask)), None),
+            ways=tuple(edge for edge in node.edges if isinstance(edge.target, str)),
+            awaited=PLACED[touchdown.reset] if touchdown is not None else None,
+            trimmed=node.name in trimmed,
+        )
+    return found
