@@ -2,43 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind, Slot
+from template_control.slip.control.design import (
+    ACTIVE_RUNNING,
+    ACTIVE_WALKING,
+    MODIFIED_WALKING,
+    RUN_TO_WALK,
+    WALK_TO_RUN,
+    Design,
+)
 from template_control.slip.control.modified_walking import ModifiedMap
-from template_control.slip.control.step_solver import StepProblem, StepSolution, Unknowns
-from template_control.slip.dynamics.stride import controls, finite
+from template_control.slip.control.step_solver import Step, StepProblem, StepSolution
+from template_control.slip.dynamics.stride import finite
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
-_ANGLES = (np.radians(45.0), np.radians(89.9))
-_STIFFNESS = (0.05, 20.0)  # of k0
-_SEEDS = 3
-_ANGLE, _K = Slot.TOUCHDOWN_ANGLE, (Slot.K_SC, Slot.K_SD)
-
 
 class Controller:
-    """Finds the controls of one stride; see the subclasses' constructors.
+    """Finds the controls of one stride by least squares on a return map, (36).
 
     Args:
-        problem: least squares on a return map.
-        grid: (n, NUM_SLOTS) controls to begin from when no guess is given or it fails.
-        dense: whether the grid shows every minimum; then only a guess that reaches the
-            target is taken without looking at it.
+        parameters: the template.
+        kind: of return map.
+        weights: (m,) rho of (36), one a number of the target; 1 each by default.
+
+    Attributes:
+        design: the stride, its free controls, and where the search begins.
     """
 
-    def __init__(self, problem: StepProblem, grid: Array, dense: bool = False) -> None:
-        self._problem = problem
-        self._grid = grid
-        self._dense = dense
-        self._content = problem.tolerance if dense else problem.acceptable
+    design: ClassVar[Design]
+
+    def __init__(
+        self,
+        parameters: SlipParameters,
+        kind: MapKind = MapKind.EXACT,
+        weights: Sequence[float] | None = None,
+    ) -> None:
+        self._search_on(ReturnMap(parameters, self.design.stride, kind), weights)
+
+    def _search_on(
+        self, step: Step, weights: Sequence[float] | None, compression: float | None = None
+    ) -> None:
+        """Make the problem; ``compression`` is the leg's wanted length at the bottom [m]."""
+        unknowns = self.design.unknowns(step.parameters)
+        self._problem = StepProblem(step, unknowns, weights, compression)
+        self._grid = self.design.grid(step.parameters)
 
     def solve(
         self,
@@ -56,24 +74,26 @@ class Controller:
         Raises:
             ParameterError: if a state is not finite, or the target is beyond any stride.
         """
-        n, m = self._problem.step.dimensions
+        problem, design = self._problem, self.design
+        n, m = problem.step.dimensions
         start, aim = finite("section state", z, n), finite("target", target, m)
         self._check(aim)
-        near = None if guess is None else self._problem.solve(start, aim, [guess])
-        if near is not None and near.residual <= self._content:
+        near = None if guess is None else problem.solve(start, aim, [guess])
+        content = problem.tolerance if design.dense else problem.acceptable
+        if near is not None and near.residual <= content:
             return near
-        costs = self._problem.costs(start, aim, self._grid)
+        costs = problem.costs(start, aim, self._grid)
         # Where the grid is dense, a seed worse than what is found leads nowhere better.
-        limit = near.residual**2 if near is not None and self._dense else np.inf
-        seeds = [self._grid[i] for i in np.argsort(costs)[:_SEEDS] if costs[i] <= limit]
+        limit = near.residual**2 if near is not None and design.dense else np.inf
+        seeds = [self._grid[i] for i in np.argsort(costs)[: design.seeds] if costs[i] <= limit]
         if near is not None and not seeds:
             return near
-        far = self._problem.solve(start, aim, seeds or [self._grid[0]])
+        far = problem.solve(start, aim, seeds or [self._grid[0]])
         return far if near is None or far.residual < near.residual else near
 
     def _check(self, target: Array) -> None:
         p = self._problem.step.parameters
-        lowest = p.rest_length * np.sin(_ANGLES[0])
+        lowest = p.rest_length * np.sin(np.radians(self.design.angles[0]))
         if not target[0] > 0.0:
             raise ParameterError(f"target speed is {target[0]:g} m/s: give a positive one")
         if target[1] <= lowest:
@@ -88,80 +108,33 @@ class Controller:
             )
 
 
-def _unknowns(parameters: SlipParameters, slots: tuple[Slot, ...]) -> Unknowns:
-    k0 = parameters.leg_stiffness
-    angle = [s is _ANGLE for s in slots]
-    return Unknowns(
-        slots,
-        np.where(angle, _ANGLES[0], _STIFFNESS[0] * k0),
-        np.where(angle, _ANGLES[1], _STIFFNESS[1] * k0),
-        np.where(angle, 1.0, k0),
-    )
-
-
-def _grid(parameters: SlipParameters, base: Array, axes: Mapping[Slot, ArrayLike]) -> Array:
-    """Controls over the product of ``axes`` (degrees, multiples of k0), else ``base``."""
-    mesh = np.meshgrid(*map(np.asarray, axes.values()), indexing="ij")
-    grid = np.tile(base, (mesh[0].size, 1))
-    for slot, values in zip(axes, mesh, strict=True):
-        scale = np.pi / 180.0 if slot is _ANGLE else parameters.leg_stiffness
-        grid[:, slot] = values.ravel() * scale
-    return grid
-
-
-def _nominal(parameters: SlipParameters) -> Array:
-    k0 = parameters.leg_stiffness
-    return controls(np.radians(70.0), k0, k0, k0, k0)
-
-
 class ActiveRunning(Controller):
     """Apex to apex with both stiffnesses and the angle: (34) to (36).
 
     Args:
         parameters: the template.
         kind: of return map.
-        weights: (3,) rho of dx/dt, y and the leg's compression.
+        weights: (3,) rho of dx/dt, y and the leg's compression; 1 each by default.
         compression: length of the leg at the bottom over its rest length.
     """
 
+    design = ACTIVE_RUNNING
+
     def __init__(
         self,
         parameters: SlipParameters,
         kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] = (1.0, 1.0, 1.0),
+        weights: Sequence[float] | None = None,
         compression: float = 0.9,
     ) -> None:
-        slots = (_ANGLE, *_K)
         length = compression * parameters.rest_length
-        step = ReturnMap(parameters, "r", kind)
-        passive = _grid(
-            parameters,
-            _nominal(parameters),
-            {_ANGLE: np.arange(52.0, 81.0, 4.0), Slot.K_SC: (0.7, 1.0, 1.4, 2.0, 3.0)},
-        )
-        passive[:, Slot.K_SD] = passive[:, Slot.K_SC]
-        super().__init__(StepProblem(step, _unknowns(parameters, slots), weights, length), passive)
+        self._search_on(ReturnMap(parameters, self.design.stride, kind), weights, length)
 
 
 class ActiveWalking(Controller):
-    """VLO to VLO with kappa_1, kappa_2 and the angle: (36) and (37)."""
+    """VLO to VLO with kappa_1, kappa_2 and the angle: (36) and (37); see :class:`Controller`."""
 
-    def __init__(
-        self,
-        parameters: SlipParameters,
-        kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] = (1.0, 1.0, 1.0),
-    ) -> None:
-        axes: dict[Slot, ArrayLike] = {
-            _ANGLE: np.arange(60.0, 79.0, 2.0),
-            Slot.K_SD: (0.8, 1.0, 1.2),
-        }
-        super().__init__(
-            StepProblem(
-                ReturnMap(parameters, "w", kind), _unknowns(parameters, (_ANGLE, *_K)), weights
-            ),
-            _grid(parameters, _nominal(parameters), axes),
-        )
+    design = ACTIVE_WALKING
 
 
 class ModifiedWalking(Controller):
@@ -170,33 +143,31 @@ class ModifiedWalking(Controller):
     Args:
         parameters: the template.
         kind: of return map.
-        weights: (3,) rho.
+        weights: (3,) rho; 1 each by default.
         kappa_1: stiffness until the virtual bottom [N/m]; k0 by default.
         stiffness_range: bounds of kappa_2 over k0.
         top_margin: the angle stays this far [rad] below asin(y / l0), at which the front leg
             would touch down at once.
     """
 
+    design = MODIFIED_WALKING
+
     def __init__(
         self,
         parameters: SlipParameters,
         kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] = (1.0, 1.0, 1.0),
+        weights: Sequence[float] | None = None,
         kappa_1: float | None = None,
         stiffness_range: tuple[float, float] = (0.5, 1.5),
         top_margin: float = 0.05,
     ) -> None:
-        base = _nominal(parameters)
-        if kappa_1 is not None:
-            base[Slot.K_SC] = kappa_1
         k0 = parameters.leg_stiffness
         step = ModifiedMap(parameters, kind, (stiffness_range[0] * k0, stiffness_range[1] * k0))
-        super().__init__(
-            StepProblem(step, _unknowns(parameters, (_ANGLE,)), weights),
-            _grid(parameters, base, {_ANGLE: np.arange(58.0, 81.0, 1.0)}),
-            dense=True,
-        )
+        self._search_on(step, weights)
+        if kappa_1 is not None:
+            self._grid[:, Slot.K_SC] = kappa_1
         self._modified = step
+        self._steepest = self._problem.unknowns.upper
         self._top_margin = top_margin
 
     def solve(
@@ -210,7 +181,7 @@ class ModifiedWalking(Controller):
         p = self._modified.parameters
         top = np.arcsin(min(float(z[1]) / p.rest_length, 1.0)) - self._top_margin
         self._problem.unknowns = replace(
-            self._problem.unknowns, upper=np.array([min(top, _ANGLES[1])])
+            self._problem.unknowns, upper=np.minimum(top, self._steepest)
         )
         return super().solve(z, target, guess)
 
@@ -221,28 +192,22 @@ class WalkToRun(Controller):
     Args:
         parameters: the template.
         kind: of return map.
-        weights: (2,) rho.
+        weights: (2,) rho; 1 each by default.
         simplified: ignore the rear leg after the virtual bottom, as the paper's controller
             does; its reference then has to be tuned (Table IV).
     """
+
+    design = WALK_TO_RUN
 
     def __init__(
         self,
         parameters: SlipParameters,
         kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] = (1.0, 1.0),
+        weights: Sequence[float] | None = None,
         simplified: bool = False,
     ) -> None:
-        slots = (Slot.K_SC_WR, Slot.K_SD_WR)
-        axes: dict[Slot, ArrayLike] = {
-            Slot.K_SC_WR: (0.4, 0.6, 0.9, 1.2, 1.6, 2.2),
-            Slot.K_SD_WR: (0.8, 1.4, 2.0, 2.6, 3.5, 6.0),
-        }
-        step = ReturnMap(parameters, "wr*" if simplified else "wr", kind)
-        super().__init__(
-            StepProblem(step, _unknowns(parameters, slots), weights),
-            _grid(parameters, _nominal(parameters), axes),
-        )
+        stride = self.design.stride + ("*" if simplified else "")
+        self._search_on(ReturnMap(parameters, stride, kind), weights)
 
     def solve(
         self,
@@ -264,22 +229,6 @@ class WalkToRun(Controller):
 
 
 class RunToWalk(Controller):
-    """Apex to VLO with both stiffnesses and the angle: (42) to (44)."""
+    """Apex to VLO with both stiffnesses and the angle: (42) to (44); see :class:`Controller`."""
 
-    def __init__(
-        self,
-        parameters: SlipParameters,
-        kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] = (1.0, 1.0, 1.0),
-    ) -> None:
-        axes: dict[Slot, ArrayLike] = {
-            _ANGLE: np.arange(60.0, 79.0, 3.0),
-            Slot.K_SC: (1.0, 2.0, 3.5, 5.5),
-            Slot.K_SD: (0.8, 1.1, 1.5),
-        }
-        super().__init__(
-            StepProblem(
-                ReturnMap(parameters, "rw", kind), _unknowns(parameters, (_ANGLE, *_K)), weights
-            ),
-            _grid(parameters, _nominal(parameters), axes),
-        )
+    design = RUN_TO_WALK
