@@ -192,10 +192,10 @@ class LqrPlanner:
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
-        """Controls for a step from VLO state ``z`` (3,); see :class:`~.planner.Planner`.
+        """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO.
 
-        The law leads to the symmetric gait with the target's speed; the target's height is
-        that gait's.
+        The law leads to the symmetric gait with the target's speed. That gait, not the target,
+        says how high the CoM is.
         """
         gait = self._family.towards(self.gait, target)
         if gait is not self.gait:
@@ -217,7 +217,7 @@ class LqrPlanner:
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
 
     def observe(self, decision: Decision, z: Array) -> None:
-        """Learn from the VLO state ``z`` (3,) in which the step of ``decision`` ended."""
+        """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
         if not (decision.feasible and decision.nominal):
             return  # far from the gait the surprise says little about it
         o = self.options
