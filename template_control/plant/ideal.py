@@ -98,7 +98,7 @@ class IdealPlant:
         self._trunk_corners = _trunk_corners(self.robot)
 
     def reset(self, q: Array, v: Array) -> None:
-        """Place the robot at (q, v); only for the start of a run.
+        """See :meth:`~.plant.Plant.reset`.
 
         A foot within 1 um of the ground that does not leave it is on it, and stops at once.
         """
@@ -112,7 +112,7 @@ class IdealPlant:
         self.impacts.clear()
 
     def read(self, q: Array, v: Array) -> None:
-        """Write the configuration and velocity (nv,) into ``q`` and ``v``."""
+        """See :meth:`~.plant.Plant.read`."""
         q[:], v[:] = self._q, self._v
 
     def contact_forces(self, out: Array) -> None:
