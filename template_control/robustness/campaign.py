@@ -49,7 +49,7 @@ class Level:
     """What came of one disturbance at one level.
 
     Attributes:
-        level: [SI], of the robot.
+        level: the disturbance's size for this robot [SI].
         succeeded, fell, astray: how many trials; astray is on its feet but not on its gait.
     """
 
@@ -74,7 +74,7 @@ class Finding:
     """What one disturbance does to a robot.
 
     Attributes:
-        disturbance: which.
+        disturbance: the one that was raised.
         levels: those tried, from mild to severe.
     """
 
@@ -129,7 +129,15 @@ class Robustness:
 
 
 def off_gait(record: Record, gait: WalkingGait) -> tuple[float, float]:
-    """Mean forward speed and VLO height of the last 5 steps over the gait's, less one."""
+    """How far a walk's last 5 steps are from its gait, relative to the gait.
+
+    Args:
+        record: a run of at least 5 steps, without a fall.
+        gait: the gait to compare with.
+
+    Returns:
+        Mean forward speed over the gait's, less one; mean VLO height over the gait's, less one.
+    """
     x = np.interp(record.section_time[[-1 - _LAST, -1]], record.time, record.com[:, 0])
     speed = (x[1] - x[0]) / (record.section_time[-1] - record.section_time[-1 - _LAST])
     height = record.section_state[-_LAST:, 1].mean()
@@ -141,9 +149,9 @@ def trial(robot: str, disturbance: str, level: float, number: int) -> dict[str, 
 
     Args:
         robot: name or URDF path.
-        disturbance: name.
-        level: [SI].
-        number: of the trial.
+        disturbance: name of the disturbance.
+        level: the disturbance's size for this robot [SI].
+        number: of the trial, from 0; trials of a level differ by it.
 
     Returns:
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
