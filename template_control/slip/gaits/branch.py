@@ -134,12 +134,26 @@ class Branch(ABC):
 
     @abstractmethod
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:
-        """One of the free quantities, and its (n + 1,) gradient in X."""
+        """One of the quantities that vary along the branch, and its gradient in X.
+
+        Args:
+            x: (n + 1,) X.
+            name: of the quantity, one of :attr:`free`.
+
+        Returns:
+            The value [SI, angles in rad]; the (n + 1,) gradient, not scaled.
+        """
 
     def correct(self, x: Array, direction: Array | None = None) -> Array:
-        """The gait nearest X along the plane through it normal to ``direction`` (scaled).
+        """Find the gait nearest X in the plane through X that is normal to a direction.
 
-        Without a direction the least change of X is made.
+        Args:
+            x: (n + 1,) guess of X.
+            direction: (n + 1,) normal of the plane, in scaled coordinates; None: any X will do, and
+                it is changed as little as possible.
+
+        Returns:
+            (n + 1,) X of the gait.
 
         Raises:
             GaitError: if Newton's method does not converge.

@@ -93,7 +93,7 @@ class ControlledFamily(Branch):
         )
 
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:
-        """The target, and its (n + 1,) gradient in X."""
+        """See :meth:`~.branch.Branch.quantity`; the only quantity is the controller's target."""
         return float(x[-1]), np.eye(self.n + 1)[-1]
 
     def _closed(self, x: Array) -> tuple[Linearisation, Array, Array]:
@@ -102,7 +102,12 @@ class ControlledFamily(Branch):
 
 
 def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisation, Array, Array]:
-    """The exact stride from ``z`` (n,) with a policy's controls.
+    """Take the exact stride from a state with a policy's controls, and differentiate it.
+
+    Args:
+        step: the map z moves on; the exact one, whatever map the policy computes with.
+        policy: controls (NUM_SLOTS,) at a state (n,).
+        z: (n,) state at the section.
 
     Returns:
         The map at z and u; the (n, n) derivative of the closed loop; u (NUM_SLOTS,).

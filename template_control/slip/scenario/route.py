@@ -86,7 +86,10 @@ class Route(Protocol):
         """
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
-        """What :meth:`next` would return here; the route does not go on."""
+        """What :meth:`next` would return here; the route does not go on.
+
+        Arguments as for :meth:`next`.
+        """
 
 
 class SteadyRoute:
