@@ -139,12 +139,12 @@ def settles(
 def inside_share(
     found: DeadbeatSet, settled: NDArray[np.bool_], least_angles: Array
 ) -> tuple[Array, float]:
-    """Share of the set that settles, of the states whose step has at least a given angle.
+    """Share of the set's states that settle, among those with at least a given touchdown angle.
 
     Args:
         found: the set.
         settled: (n,) from :func:`settles`.
-        least_angles: (m,) alpha_min [rad].
+        least_angles: (m,) alpha_min, the least touchdown angle of the step [rad].
 
     Returns:
         (m,) shares, NaN where no state is left; the least angle from which all settle [rad].

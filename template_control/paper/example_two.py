@@ -135,9 +135,7 @@ def robot_walk(
 def template_walk(planner: str, steps: int = STEPS) -> Walk:
     """Let the template itself walk from z_0, integrated exactly, with a planner of the robot's.
 
-    Args:
-        planner: key of :data:`PLANNERS`.
-        steps: how many at most.
+    Arguments as for :func:`robot_walk`.
     """
     gait = _gait()
     chooses, step = PLANNERS[planner](gait), ReturnMap(gait.parameters)

@@ -93,12 +93,12 @@ def states_figure(
     plants: tuple[str, ...],
     target: Array,
 ) -> Figure:
-    """y, phi, E at VLO by step; a row a plant, a line a planner.
+    """y, phi and E at VLO over the steps: a row of panels for each plant, a line for each planner.
 
     Args:
-        states: (steps + 1, 3) y [m], phi [rad], E [J] by planner and plant.
-        planners, plants: in order.
-        target: (3,) the equilibrium.
+        states: (steps + 1, 3) y [m], phi [rad], E [J] of each walk, by (planner, plant).
+        planners, plants: names in the order they are drawn in.
+        target: (3,) y, phi, E of the equilibrium.
     """
     figure = Figure(figsize=(9.5, 1.7 * len(plants) + 0.6), layout="constrained")
     panels = figure.subplots(len(plants), 3, sharex=True, sharey="col", squeeze=False)

@@ -61,8 +61,9 @@ class PlantOptions:
     Attributes:
         friction: Coulomb coefficient between foot and ground.
         time_step: physics step [s].
-        mass_scale: every link's mass and inertia times this (the controller is not told).
-        ground_step: a step of the ground (the controller is not told); None for flat ground.
+        mass_scale: factor of every link's mass and inertia; the controller does not know it.
+        ground_step: a step of the ground, which the controller does not know; None for flat
+            ground.
     """
 
     friction: float = 0.7

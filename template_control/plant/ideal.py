@@ -33,11 +33,11 @@ _DRIFT = 1e-12  # constraint error [m, m/s] that is projected away
 
 @dataclass(frozen=True)
 class IdealOptions:
-    """What the ideal world is like; friction is not modelled, stance feet stick.
+    """What the ideal world is like. Friction is not modelled: stance feet stick.
 
     Attributes:
         time_step: period of the torques [s]; one step of the integrator.
-        mass_scale: every link's mass and inertia times this (the controller is not told).
+        mass_scale: factor of every link's mass and inertia; the controller does not know it.
     """
 
     time_step: float = 1e-3
@@ -159,7 +159,7 @@ class IdealPlant:
         self._commit(*self._flow(left))
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """See :class:`~.plant.Plant`; there is nothing to give back."""
 
     def __enter__(self) -> IdealPlant:
         return self

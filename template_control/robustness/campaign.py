@@ -83,22 +83,25 @@ class Finding:
 
     @property
     def breaking_point(self) -> float | None:
-        """The severest level up to which all trials of all levels succeed; None: not one."""
+        """The severest level up to which every trial of each level succeeds, or None."""
         return _last(self.levels, [level.rate >= 1.0 for level in self.levels])
 
     @property
     def half_point(self) -> float | None:
-        """The severest level up to which half of the trials of each level succeed, or more."""
+        """The severest level up to which at least half of each level's trials succeed, or None."""
         return _last(self.levels, [level.rate >= _HALF for level in self.levels])
 
     @property
     def standing_point(self) -> float | None:
-        """The severest level up to which no trial falls."""
+        """The severest level up to which no trial falls, or None."""
         return _last(self.levels, [level.fell == 0 for level in self.levels])
 
     @property
     def broken(self) -> bool:
-        """Whether it need not be raised further: all fall, or twice more than half."""
+        """Whether the disturbance need not be raised further.
+
+        All trials of the last level fell, or more than half of the trials at each of the last two.
+        """
         rates = [level.standing for level in self.levels]
         twice = len(rates) > 1 and max(rates[-2:]) < _HALF
         return bool(rates) and (rates[-1] == 0.0 or twice)

@@ -70,7 +70,7 @@ class MomentumTrim:
 
         Args:
             path: from this VLO to the next; None where nothing is to be learnt from it.
-            gait: about which the direction is taken that the controls leave alone.
+            gait: the stride's gait; :func:`uncontrolled` tells the direction that counts.
         """
         self._path = path
         if path is not None and gait is not self._gait:

@@ -62,7 +62,7 @@ class ModifiedPlanner:
         self._stiffness = np.array(self.options.stiffness_range) * k0
 
     def reset(self) -> None:
-        """The paper's planner learns nothing."""
+        """See :class:`~.planner.Planner`; the paper's planner learns nothing."""
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE

@@ -32,11 +32,11 @@ class Grid(NamedTuple):
     """The controls that :func:`search` tries.
 
     Attributes:
-        coarse: points in alpha, kappa_1, kappa_2 of the first grid, over all bounds.
-        fine: points in alpha and kappa_2 of the later ones, about the best found.
-        rounds: how many later ones.
+        coarse: numbers of points in alpha, kappa_1, kappa_2 of the first grid, over all bounds.
+        fine: numbers of points in alpha and kappa_2 of the later grids, about the best found.
+        rounds: number of later grids.
         width_alpha, width_kappa: half-widths of the first of these [rad, of k0].
-        narrowing: half-widths of each over those of the one before.
+        narrowing: half-widths of each grid over those of the one before.
     """
 
     coarse: tuple[int, int, int]

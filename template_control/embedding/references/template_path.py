@@ -65,7 +65,7 @@ class TemplatePath:
             start of the path.
         toes: x of the rear and the front toe at the start [m].
         section_state: (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex.
-        outcome: how it ends.
+        outcome: how the first stride ends.
         duration: end of the last segment [s].
     """
 

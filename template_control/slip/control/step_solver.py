@@ -45,9 +45,9 @@ class Unknowns:
     """Which controls are free, and between which bounds.
 
     Attributes:
-        slots: of the control vector.
+        slots: the free slots of the control vector.
         lower, upper: (len(slots),) bounds [rad, N/m].
-        scale: (len(slots),) sizes that count as alike [rad, N/m].
+        scale: (len(slots),) changes of each that count as equally large [rad, N/m].
     """
 
     slots: tuple[Slot, ...]

@@ -51,11 +51,11 @@ class BranchPoint:
         energy: at the section [J].
         target: what a controller is asked for, in the quantity it is varied in; None where
             there is no controller.
-        eigenvalues: of the stride: within its energy shell if passive, all of them if
-            controlled.
+        eigenvalues: of the stride's map. A passive gait has those within its energy shell, a
+            controlled one has all of them.
         kind: stable, saddle or unstable.
         tangent: of the branch, in scaled coordinates.
-        special: what happens here, None at an ordinary point.
+        special: what happens here; None at an ordinary point.
     """
 
     x: Array
@@ -75,7 +75,7 @@ class BranchPoint:
 
     @property
     def stiffness(self) -> float:
-        """Of the leg that lands, from touchdown on [N/m]."""
+        """Stiffness of the leg that lands, from touchdown on [N/m]."""
         return float(self.controls[Slot.K_SC])
 
     def quantity(self, name: str) -> float:
@@ -113,10 +113,10 @@ class Branch(ABC):
     Attributes:
         scale: (n + 1,) natural size of each coordinate.
         free: quantities that vary along it.
-        noise: to which eigenvalues are known; one that close to the unit circle does not
-            cross it.
-        anchor: (n + 1,) direction that the first gait is not moved in from its guess (scaled);
-            None where the nearest gait will do.
+        noise: how exactly eigenvalues are known. One that is this close to the unit circle does
+            not count as crossing it.
+        anchor: (n + 1,) scaled direction in which the first gait stays where its guess is; None
+            where the nearest gait will do.
     """
 
     scale: Array

@@ -115,12 +115,12 @@ class Section:
     def calmer(self, z: Array, share: float, highest: float) -> Array:
         """A state (n,) that the template can go on from more easily than from ``z``.
 
+        At apex dy/dt is 0 already, and no leg limits the height: there it is ``z``.
+
         Args:
             z: (n,) state at the section.
             share: of dy/dt that is left.
             highest: height that it may have at most [m].
-
-        At apex dy/dt is 0 already, and no leg limits the height: there it is ``z``.
         """
         calm = np.array(z, dtype=float)
         for place, quantity in enumerate(self.order):
