@@ -14,8 +14,14 @@ INTERRUPTED = 130
 
 
 @contextmanager
-def progress_bar(console: Console, text: str, total: float) -> Iterator[Any]:
-    """A progress bar; yields the function that sets how much is done."""
+def progress_bar(console: Console, text: str, total: float | None) -> Iterator[Any]:
+    """A progress bar; yields the function that sets how much is done.
+
+    Args:
+        console: where it is shown.
+        text: what is going on.
+        total: how much there is to do, None where nobody knows.
+    """
     # Here, because whoever only asks for help should not wait for it.
     from rich.progress import (
         BarColumn,
