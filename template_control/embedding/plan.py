@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import Event, Outcome
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.dynamics.taylor import ORDER
@@ -81,7 +81,7 @@ def chain(strides: Sequence[Stride]) -> Plan:
     )
 
 
-@njit(cache=True)
+@compiled
 def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     """Value, first and second derivative at ``t`` into out[first], out[first+2], ..."""
     p = d = dd = 0.0
@@ -92,7 +92,7 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     out[first], out[first + 2], out[first + 4] = p, d, 2.0 * dd
 
 
-@njit(cache=True)
+@compiled
 def sample(cx: Array, cy: Array, meta: Array, time: float, out: Array) -> int:
     """Path at ``time`` into out (6,): x, y and their two derivatives; returns the segment."""
     row = 0
@@ -105,7 +105,7 @@ def sample(cx: Array, cy: Array, meta: Array, time: float, out: Array) -> int:
     return row
 
 
-@njit(cache=True)
+@compiled
 def at_phase(
     cx: Array, cy: Array, meta: Array, toe: float, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from template_control.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -12,7 +13,7 @@ _CAP_SHARE = 1.3
 _CAP_FLOOR = 0.025  # of the weight
 
 
-@njit(cache=True)
+@compiled
 def pd(
     acceleration: float,
     position: float,
@@ -26,7 +27,7 @@ def pd(
     return acceleration + kp * (position - measured) + kd * (velocity - rate)
 
 
-@njit(cache=True)
+@compiled
 def leg_forces(
     meta_row: Array, com_x: float, com_y: float, rest_length: float, forces: Array
 ) -> None:

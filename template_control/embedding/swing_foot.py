@@ -12,8 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from template_control.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ class SwingOptions:
     reach: float = 0.98
 
 
-@njit(cache=True)
+@compiled
 def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
     """Advance (position, velocity, acceleration) by ``dt`` along the quintic to its target.
 

@@ -15,9 +15,9 @@ Hessian is the identity, and constraint rows of unit length.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.whole_body.elimination import cholesky, eliminate
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ _FAR = 1e20  # ProxQP's infinity
 _GRID = 2.0**24  # steps of a torque up to its limit
 
 
-@njit(cache=True)
+@compiled
 def assemble(
     mass_matrix: Array,
     nonlinear_effects: Array,
@@ -135,7 +135,7 @@ def assemble(
     return True
 
 
-@njit(cache=True)
+@compiled
 def _forward(factor: Array, vector: Array) -> None:
     """vector = L^-1 vector, in place."""
     for i in range(vector.shape[0]):
@@ -144,7 +144,7 @@ def _forward(factor: Array, vector: Array) -> None:
         vector[i] /= factor[i, i]
 
 
-@njit(cache=True)
+@compiled
 def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
     """Joint torques [N m] of the QP's solution: tau_max * (L^-T w), kept within tau_max.
 
@@ -163,7 +163,7 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
         out[i] = share * torque_limit[i]
 
 
-@njit(cache=True)
+@compiled
 def _add_square(
     row: Array, row_weight: float, scale: Array, hessian: Array, gradient: Array
 ) -> None:
@@ -176,7 +176,7 @@ def _add_square(
             hessian[i, j] += left * row[j] * scale[j]
 
 
-@njit(cache=True)
+@compiled
 def affine(matrix: Array, tau: Array, out: Array) -> None:
     """out = matrix[:, :-1] tau + matrix[:, -1]."""
     n = tau.shape[0]

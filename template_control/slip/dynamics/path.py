@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.dynamics.compiled import inner
+from template_control.compiled import inner
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,8 @@ class Path(NamedTuple):
     """A path of the CoM in time, world frame, by its coefficients.
 
     Attributes:
-        a, b: SERIES: those of the polynomials of x and y, constant term first. STANCE: a is (12,), about a pivot at x = a0,
+        a, b: SERIES: those of the polynomials of x and y, constant term first. STANCE: a is
+            (12,), about a pivot at x = a0,
             r = a1 + a8 t + a9 t^2 + a2 sin(a5 t) + a3 cos(a5 t) and
             theta = a4 + a6 t + a10 t^2 + a11 t^3 + a7 (a2 cos(a5 t) - a3 sin(a5 t)), which
             is (11) where a8 to a11 are zero. FLIGHT: a is (5,) x, y, dx/dt, dy/dt at t = 0
