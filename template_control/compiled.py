@@ -21,10 +21,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from numba import njit
-from numba.core import config
+from numba.core import config, event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache, _CacheLocator
 from numba.core.dispatcher import Dispatcher
 from numba.misc.appdirs import AppDirs
+
+from template_control.compiling import TELLER
 
 Decorator = Callable[[Callable[..., Any]], Any]
 
@@ -112,6 +114,16 @@ def _folders(function: Callable[..., Any]) -> tuple[Path, ...]:
     return (_PACKAGE,) if not path or Path(path[0]) == _PACKAGE else (_PACKAGE, Path(path[0]))
 
 
+def _own_stamp(function: Callable[..., Any]) -> str:
+    """Digest of the file of a function that belongs to no package, such as a script's; or ""."""
+    if "." in function.__module__:
+        return ""
+    try:
+        return sha256(Path(function.__code__.co_filename).read_bytes()).hexdigest()
+    except OSError:
+        return "no file"
+
+
 def _places(folder: Path) -> list[Path]:
     """Where the cache of a package may lie, best first."""
     own = f"{folder.name}-{sha256(str(folder.resolve()).encode()).hexdigest()[:12]}"
@@ -158,7 +170,7 @@ class _Locator(_CacheLocator):
         return str(cache_folder(self._folders))
 
     def get_source_stamp(self) -> str:
-        return stamp(self._folders).digest
+        return stamp(self._folders).digest + _own_stamp(self._function)
 
     def get_disambiguator(self) -> str:
         return f"{self._function.__module__}-{self._function.__code__.co_firstlineno}"
@@ -166,7 +178,7 @@ class _Locator(_CacheLocator):
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Locator | None:
         folders = _folders(py_func)
-        return cls(py_func, folders) if cache_folder(folders) else None
+        return cls(py_func, folders)
 
 
 class _CacheImpl(CompileResultCacheImpl):
@@ -194,10 +206,23 @@ class _Cache(FunctionCache):
             _LOG.debug("%s is not written to the cache: %s", self._name, error)
 
 
+class _Listener(event.Listener):
+    """Passes on that Numba compiles a function; one read from the cache is no event."""
+
+    def on_start(self, event: Any) -> None:
+        TELLER.begin()
+
+    def on_end(self, event: Any) -> None:
+        TELLER.end()
+
+
+event.register("numba:compile", _Listener())
+
+
 def _cached(dispatcher: Any) -> Any:
-    dispatcher._cache = (
-        _Cache(dispatcher.py_func) if cache_folder(_folders(dispatcher.py_func)) else NullCache()
-    )
+    function = dispatcher.py_func
+    known = cache_folder(_folders(function)) and _own_stamp(function) != "no file"
+    dispatcher._cache = _Cache(function) if known else NullCache()
     return dispatcher
 
 

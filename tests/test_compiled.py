@@ -11,7 +11,16 @@ import pytest
 from template_control import compiled
 from template_control.slip.dynamics.guards import guard
 
-_FACTOR = "from template_control.compiled import inner\n\nUNIT = {unit}\n\n\n@inner\ndef factor(x):\n    return {factor} * x\n"
+_FACTOR = """\
+from template_control.compiled import inner
+
+UNIT = {unit}
+
+
+@inner
+def factor(x):
+    return {factor} * x
+"""
 _CALLER = """\
 from template_control.compiled import compiled
 from toy.factor import UNIT, factor
@@ -45,11 +54,11 @@ def toy(tmp_path):
     return write
 
 
-def call(package, **environment):
-    """Value, cache hits and cache folder of ``scaled(1.0)`` in a new process."""
+def call(package, run=_RUN, **environment):
+    """Value, cache hits and cache folder of ``scaled(1.0)`` in a new process, by ``run``."""
     root = str(Path(compiled.__file__).parents[1])
     done = subprocess.run(
-        [sys.executable, "-c", _RUN],
+        [sys.executable, "-c", run],
         env={
             **{k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"},
             "PYTHONDONTWRITEBYTECODE": "1",
@@ -96,6 +105,15 @@ def test_where_nothing_is_writable_functions_work_without_a_cache(toy, tmp_path)
     blocked = tmp_path / "blocked"
     blocked.write_text("a file: no folder can be made here")
     assert call(toy(2.0), NUMBA_CACHE_DIR=str(blocked)) == (2.0, 0, None)
+
+
+def test_a_script_is_its_own_source(toy, tmp_path):
+    script = tmp_path / "script.py"
+    for value in (2.0, 3.0):
+        toy(2.0)
+        script.write_text(_CALLER.replace("UNIT *", f"{value} *"))
+        run = _RUN.replace("toy.caller", "script")
+        assert call(tmp_path / "toy", run)[:2] == (2.0 * value, 0)
 
 
 def test_the_stamp_covers_compiled_modules_and_what_they_import():

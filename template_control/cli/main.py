@@ -6,6 +6,8 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from rich.console import Console
+
 from template_control.cli import (
     automaton,
     gaits,
@@ -17,6 +19,7 @@ from template_control.cli import (
     walk,
 )
 from template_control.cli.output import INTERRUPTED
+from template_control.compiling import compiling
 from template_control.errors import TemplateControlError
 from template_control.paper import command as reproduce
 
@@ -43,7 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = build_parser().parse_args(arguments)
     try:
-        return int(options.run(options))
+        with compiling(Console(stderr=True)):
+            return int(options.run(options))
     except TemplateControlError as error:
         print(f"template-control: {error}", file=sys.stderr)
         return _USER_ERROR

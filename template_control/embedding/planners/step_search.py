@@ -81,6 +81,13 @@ class Law(NamedTuple):
 
 
 @compiled
+def _copy(source: Array, target: Array) -> None:
+    """A slice would take Numba seconds to compile: it prepares what to say of wrong shapes."""
+    for i in range(3):
+        target[i] = source[i]
+
+
+@compiled
 def bounded(law: Law, z: Array, u: Array) -> None:
     """Clip controls ``u`` (3,) in place to what is admissible at VLO state ``z`` (3,)."""
     for i in range(3):
@@ -151,7 +158,7 @@ def price(
             # The law's own step is good enough near the gait.
             if best < law.enough:
                 break
-            u2[:] = law.second_steps[i]
+            _copy(law.second_steps[i], u2)
             bounded(law, first, u2)
         if step(law, kind, s, first, u2, second) == 0:
             best = min(best, _cost_to_go(law, second) + share)
@@ -176,7 +183,7 @@ def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Arr
     A plane of points in alpha and kappa_2, then two in kappa_1.
     """
     n0, n2 = grid.fine
-    u[:] = centre
+    _copy(centre, u)
     if i < n0 * n2:
         u[0] += (i // n2 / (0.5 * (n0 - 1)) - 1.0) * widths[0]
         u[2] += (i % n2 / (0.5 * (n2 - 1)) - 1.0) * widths[1]
@@ -217,9 +224,9 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
             cost = price(law, _FAST, s, z, u, cheapest, end)
             if cost < cheapest:
                 cheapest = cost
-                best[:] = u
-                first[:] = end
-        centre[:] = best
+                _copy(u, best)
+                _copy(end, first)
+        _copy(best, centre)
         if level > 0:
             widths = grid.narrowing * widths[0], grid.narrowing * widths[1]
     return price(law, None, s, z, best, np.inf, first)

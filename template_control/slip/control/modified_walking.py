@@ -190,7 +190,8 @@ def search_angle(
             if cost < best_cost or best_outcome < 0:
                 best_cost, best_alpha, best_kappa = cost, alpha, kappa_2
                 best_residual, best_outcome = residual, outcome
-                z_next[:] = z1[:3]
+                for j in range(3):
+                    z_next[j] = z1[j]
         width = (high - low) / (count - 1)
         low = max(search.least, best_alpha - search.narrowing * width)
         high = min(search.greatest, best_alpha + search.narrowing * width)
