@@ -13,13 +13,14 @@ then hold to machine precision whatever the QP's tolerance.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from template_control.compiled import compiled
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@compiled
 def cholesky(matrix: Array, size: int) -> bool:
     """Factor the leading ``size`` block in place (lower triangle); False if not positive."""
     for j in range(size):
@@ -38,7 +39,7 @@ def cholesky(matrix: Array, size: int) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
     """Solve in place for every column of ``columns`` (size, n) with a factor from above."""
     for c in range(columns.shape[1]):
@@ -54,7 +55,7 @@ def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
             columns[i, c] = value / factor[i, i]
 
 
-@njit(cache=True)
+@compiled
 def eliminate(
     mass_matrix: Array,
     nonlinear_effects: Array,

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.embedding.phases import Clock
 from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.stride import Stride
@@ -137,7 +137,7 @@ def _landings(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[Landi
     return found.get(Leg.REAR, never), found.get(Leg.FRONT, never)
 
 
-@njit(cache=True)
+@compiled
 def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     """Value, first and second derivative at ``t`` into out[first], out[first+2], ..."""
     p = d = dd = 0.0
@@ -148,7 +148,7 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     out[first], out[first + 2], out[first + 4] = p, d, 2.0 * dd
 
 
-@njit(cache=True)
+@compiled
 def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
     """Path at ``time`` into out (6,): x from ``toe``, y, and their two derivatives.
 
@@ -167,7 +167,7 @@ def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
     return row
 
 
-@njit(cache=True)
+@compiled
 def at_direction(
     curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
@@ -198,7 +198,7 @@ def at_direction(
     return t, sample(curve, toe, t, out)
 
 
-@njit(cache=True)
+@compiled
 def at_time(
     curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
