@@ -13,13 +13,14 @@ then hold to machine precision whatever the QP's tolerance.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from template_control.compiled import compiled
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@compiled
 def cholesky(matrix: Array, size: int) -> bool:
     """Factor the leading block of a symmetric matrix in place; its lower triangle becomes L.
 
@@ -46,7 +47,7 @@ def cholesky(matrix: Array, size: int) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
     """Solve L L^T x = b in place for several right-hand sides b.
 
@@ -68,7 +69,7 @@ def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
             columns[i, c] = value / factor[i, i]
 
 
-@njit(cache=True)
+@compiled
 def eliminate(
     mass_matrix: Array,
     nonlinear_effects: Array,

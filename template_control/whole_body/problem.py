@@ -17,9 +17,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.whole_body.elimination import cholesky, eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
@@ -67,7 +67,7 @@ class Matrices(NamedTuple):
     upper: Array
 
 
-@njit(cache=True)
+@compiled
 def assemble(
     mass_matrix: Array,
     nonlinear_effects: Array,
@@ -159,7 +159,7 @@ def assemble(
     return True
 
 
-@njit(cache=True)
+@compiled
 def _forward(factor: Array, vector: Array) -> None:
     """vector = L^-1 vector, in place."""
     for i in range(vector.shape[0]):
@@ -168,7 +168,7 @@ def _forward(factor: Array, vector: Array) -> None:
         vector[i] /= factor[i, i]
 
 
-@njit(cache=True)
+@compiled
 def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
     """Write the joint torques of the QP's solution, tau_max * (L^-T w), into ``out``.
 
@@ -194,7 +194,7 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
         out[i] = share * torque_limit[i]
 
 
-@njit(cache=True)
+@compiled
 def _add_square(
     row: Array, row_weight: float, scale: Array, hessian: Array, gradient: Array
 ) -> None:
@@ -207,7 +207,7 @@ def _add_square(
             hessian[i, j] += left * row[j] * scale[j]
 
 
-@njit(cache=True)
+@compiled
 def follow(maps: Matrices, tau: Array, acceleration: Array, force: Array) -> None:
     """Write the accelerations and contact forces that joint torques bring about.
 
@@ -221,7 +221,7 @@ def follow(maps: Matrices, tau: Array, acceleration: Array, force: Array) -> Non
     _affine(maps.f_map, tau, force)
 
 
-@njit(cache=True)
+@compiled
 def _affine(matrix: Array, tau: Array, out: Array) -> None:
     """out = matrix[:, :-1] tau + matrix[:, -1]."""
     n = tau.shape[0]

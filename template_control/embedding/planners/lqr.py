@@ -194,10 +194,11 @@ class LqrPlanner:
     ) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO.
 
-        The law leads to the symmetric gait with the target's speed. That gait, not the target,
-        says how high the CoM is.
+        The law leads to the symmetric gait with the target's speed, and with that gait's
+        height. Where no gait is that slow or fast it leads to the nearest, and the decision is
+        not nominal.
         """
-        gait = self._family.towards(self.gait, target)
+        gait, reachable = self._family.towards(self.gait, target)
         if gait is not self.gait:
             self._settle_on(gait)
         law, s = self._law, self._scratch
@@ -214,6 +215,7 @@ class LqrPlanner:
             cost = search(law, self._grid, s, z, u, first)
         controls = self.gait.controls.copy()
         controls[WALKING_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
+        nominal = nominal and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
 
     def observe(self, decision: Decision, z: Array) -> None:

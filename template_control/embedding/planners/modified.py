@@ -68,7 +68,7 @@ class ModifiedPlanner:
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO."""
-        self.gait = self._family.towards(self.gait, target)
+        self.gait, reachable = self._family.towards(self.gait, target)
         p, o = self.gait.parameters, self.options
         predicted = np.empty(3)
         nominal = float(self.gait.controls[Slot.TOUCHDOWN_ANGLE])
@@ -83,7 +83,7 @@ class ModifiedPlanner:
         controls = self.gait.controls.copy()
         controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2
         feasible = outcome == Outcome.SECTION
-        nominal = feasible and residual < o.tolerance**2
+        nominal = reachable and feasible and residual < o.tolerance**2
         return Decision(controls, predicted, feasible, feasible, nominal)
 
     def observe(self, decision: Decision, z: Array) -> None:

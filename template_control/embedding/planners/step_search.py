@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Slot
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
@@ -80,7 +80,14 @@ class Law(NamedTuple):
     kernel: Kernel
 
 
-@njit(cache=True)
+@compiled
+def _copy(source: Array, target: Array) -> None:
+    """A slice would take Numba seconds to compile: it prepares what to say of wrong shapes."""
+    for i in range(3):
+        target[i] = source[i]
+
+
+@compiled
 def bounded(law: Law, z: Array, u: Array) -> None:
     """Clip controls in place to what is admissible at a VLO state.
 
@@ -95,7 +102,7 @@ def bounded(law: Law, z: Array, u: Array) -> None:
     u[0] = min(u[0], top)
 
 
-@njit(cache=True)
+@compiled
 def linear(law: Law, z: Array, u: Array) -> None:
     """Write the law's controls, within their bounds, into ``u``.
 
@@ -111,7 +118,7 @@ def linear(law: Law, z: Array, u: Array) -> None:
     bounded(law, z, u)
 
 
-@njit(cache=True)
+@compiled
 def step(law: Law, kind: int | None, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
     """Take one walking step of the template, and add the robot's offset to where it ends.
 
@@ -136,7 +143,7 @@ def step(law: Law, kind: int | None, s: Scratch, z: Array, u: Array, z_next: Arr
     return outcome
 
 
-@njit(cache=True)
+@compiled
 def _cost_to_go(law: Law, z: Array) -> float:
     total = 0.0
     for i in range(3):
@@ -145,7 +152,7 @@ def _cost_to_go(law: Law, z: Array) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled
 def price(
     law: Law, kind: int | None, s: Scratch, z: Array, u: Array, limit: float, first: Array
 ) -> float:
@@ -175,14 +182,14 @@ def price(
             # The law's own step is good enough near the gait.
             if best < law.enough:
                 break
-            u2[:] = law.second_steps[i]
+            _copy(law.second_steps[i], u2)
             bounded(law, first, u2)
         if step(law, kind, s, first, u2, second) == 0:
             best = min(best, _cost_to_go(law, second) + share)
     return best
 
 
-@njit(cache=True)
+@compiled
 def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
     """Point ``i`` of the grid over all bounds into ``u`` (3,)."""
     n0, n1, n2 = grid.coarse
@@ -193,14 +200,14 @@ def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
         u[j] = law.lower[j] + u[j] * (law.upper[j] - law.lower[j])
 
 
-@njit(cache=True)
+@compiled
 def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
     """Point ``i`` of a grid about ``centre`` (3,) into ``u`` (3,).
 
     A plane of points in alpha and kappa_2, then two in kappa_1.
     """
     n0, n2 = grid.fine
-    u[:] = centre
+    _copy(centre, u)
     if i < n0 * n2:
         u[0] += (i // n2 / (0.5 * (n0 - 1)) - 1.0) * widths[0]
         u[2] += (i % n2 / (0.5 * (n2 - 1)) - 1.0) * widths[1]
@@ -208,7 +215,7 @@ def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Arr
         u[1] += (2 * (i - n0 * n2) - 1) * widths[1]
 
 
-@njit(cache=True)
+@compiled
 def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array) -> float:
     """Improve ``best`` (3,) in place: a coarse grid over all bounds, then finer ones about it.
 
@@ -241,9 +248,9 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
             cost = price(law, _FAST, s, z, u, cheapest, end)
             if cost < cheapest:
                 cheapest = cost
-                best[:] = u
-                first[:] = end
-        centre[:] = best
+                _copy(u, best)
+                _copy(end, first)
+        _copy(best, centre)
         if level > 0:
             widths = grid.narrowing * widths[0], grid.narrowing * widths[1]
     return price(law, None, s, z, best, np.inf, first)

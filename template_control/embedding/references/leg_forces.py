@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.similarity import tuned
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ class UnloadOptions:
         return self.share * template_force + self.floor * weight
 
 
-@njit(cache=True)
+@compiled
 def leg_forces(
     meta_row: Array, com_x: float, com_y: float, rest_length: float, forces: Array
 ) -> None:

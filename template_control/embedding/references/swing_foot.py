@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, tuned
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ class SwingOptions:
     leg_share: float = tuned(0.98)
 
 
-@njit(cache=True)
+@compiled
 def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
     """Advance (position, velocity, acceleration) by ``dt`` along the quintic to its target.
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.embedding.phases import Clock
 from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.stride import Stride
@@ -147,7 +147,7 @@ def _landings(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[Landi
     return found.get(Leg.REAR, never), found.get(Leg.FRONT, never)
 
 
-@njit(cache=True)
+@compiled
 def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     """Value, first and second derivative at ``t`` into out[first], out[first+2], ..."""
     p = d = dd = 0.0
@@ -158,7 +158,7 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     out[first], out[first + 2], out[first + 4] = p, d, 2.0 * dd
 
 
-@njit(cache=True)
+@compiled
 def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
     """Write the path at a time into ``out``.
 
@@ -184,7 +184,7 @@ def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
     return row
 
 
-@njit(cache=True)
+@compiled
 def at_direction(
     curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
@@ -215,7 +215,7 @@ def at_direction(
     return t, sample(curve, toe, t, out)
 
 
-@njit(cache=True)
+@compiled
 def at_time(
     curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
