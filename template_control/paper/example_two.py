@@ -119,6 +119,9 @@ def robot_walk(
         plant: key of :data:`PLANTS`.
         steps: how many at most.
         beta: predefined liftoff direction, from forward horizontal [rad]; None for the template's.
+
+    Returns:
+        VLO states, and the whole record.
     """
     gait = _gait()
     world, tuning = PLANTS[plant]

@@ -64,6 +64,9 @@ class PlantOptions:
         mass_scale: factor of every link's mass and inertia; the controller does not know it.
         ground_step: a step of the ground, which the controller does not know; None for flat
             ground.
+
+    Raises:
+        ParameterError: if a number is not positive and finite.
     """
 
     friction: float = 0.7

@@ -38,6 +38,9 @@ class IdealOptions:
     Attributes:
         time_step: period of the torques [s]; one step of the integrator.
         mass_scale: factor of every link's mass and inertia; the controller does not know it.
+
+    Raises:
+        ParameterError: if a number is not positive and finite.
     """
 
     time_step: float = 1e-3

@@ -57,11 +57,11 @@ class SimulationOptions:
     """How a run goes.
 
     Attributes:
-        steps: from section to section, how many at most; None: to the end of the route, or 50
-            where it has none.
+        steps: largest number of steps from section to section. None: the run goes to the end of
+            the route, or makes 50 steps where the route has no end.
         plant: the world; the type of its options says which.
         embedding: the controller's tuning.
-        start: (3,) VLO state to start in; None for the route's.
+        start: (3,) VLO state to start in [m/s, m, m/s]; None for the route's.
         pose: CoM and feet to start with; None: over the stance foot at VLO. A route that
             begins at another section needs it.
         pushes: disturbances.
@@ -71,6 +71,10 @@ class SimulationOptions:
             physics steps.
         record_every: keep every n-th sample.
         falls: when the robot counts as fallen.
+
+    Raises:
+        ParameterError: if a number is less than 1, or the delay is not a whole number of physics
+            steps up to 1 s.
     """
 
     steps: int | None = None

@@ -126,9 +126,7 @@ def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisatio
 def controlled_fixed_point(
     step: ReturnMap, policy: Policy, start: Array, iterations: int = 30
 ) -> tuple[Array, NDArray[np.complex128]]:
-    """Where a controlled stride settles, and the eigenvalues of the closed loop there.
-
-    Newton's method on z = P(z, u(z)).
+    """Find where a controlled stride settles: Newton's method on z = P(z, u(z)).
 
     Args:
         step: the map z moves on; the exact one, whatever map the policy computes with.
@@ -136,6 +134,9 @@ def controlled_fixed_point(
             ``lambda z: controller.solve(z, target).controls``.
         start: (n,) first guess.
         iterations: of Newton's method at most.
+
+    Returns:
+        (n,) the state; (n,) eigenvalues of the closed loop there.
 
     Raises:
         GaitError: if a stride fails on the way, or there is no convergence.
