@@ -136,7 +136,11 @@ def modified_step(
 def modified_many(
     kernel: Kernel, kind: int | None, z: Array, aim: Aim, controls: Array, scratch: Scratch
 ) -> tuple[Array, IntArray]:
-    """:func:`modified_step` from one state for rows of ``controls`` (n, NUM_SLOTS)."""
+    """As :func:`modified_step`, from one state with rows of ``controls`` (n, NUM_SLOTS).
+
+    Returns:
+        (n, RESULTS) results and (n,) values of the outcomes.
+    """
     count = controls.shape[0]
     result, outcome = np.empty((count, RESULTS)), np.empty(count, np.int64)
     for i in range(count):
@@ -228,18 +232,18 @@ class ModifiedMap:
         return Aim(self.target, self._range)
 
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
-        """See :meth:`~template_control.slip.maps.return_map.ReturnMap.evaluate`."""
+        """See :meth:`~.step_solver.Step.evaluate`."""
         result = np.empty(RESULTS)
         outcome = modified_step(*self._kernel, z, self._aim, u, self._scratch, result)
         return result, Outcome(outcome)
 
     def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
-        """See :meth:`~template_control.slip.maps.return_map.ReturnMap.evaluate_many`."""
+        """See :meth:`~.step_solver.Step.evaluate_many`."""
         found: tuple[Array, IntArray] = modified_many(*self._kernel, z, self._aim, u, self._scratch)
         return found
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
-        """See ``derivatives``; kappa_2 varies along with u."""
+        """See :meth:`~.step_solver.Step.derivatives`; kappa_2 varies along with u."""
         jacobian = np.empty((RESULTS, len(columns)))
         result, outcome = self.evaluate(z, u)
         if outcome is not Outcome.SECTION:

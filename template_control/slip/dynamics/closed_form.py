@@ -156,7 +156,7 @@ def closed_form_stride(
 
     Args:
         map_kind: value of a MapKind other than EXACT.
-        The rest as there; ``state`` and ``toes`` are overwritten.
+        The rest as in :func:`~.kernel.run_stride`; ``state`` and ``toes`` are overwritten.
 
     Returns:
         The Outcome's value.

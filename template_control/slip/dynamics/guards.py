@@ -65,9 +65,16 @@ def guard(
 def all_guards(
     state: Array, toes: Array, rest_length: float, touchdown_height: float, values: Array
 ) -> None:
-    """Real parts of all guards at once, by Event, into ``values`` (NUM_EVENTS,).
+    """Write the real parts of all guards at once into ``values``.
 
-    Without a branch, and so faster than :func:`guard` for a few of them.
+    There is no branch in it, which makes it faster than :func:`guard` for a few of them.
+
+    Args:
+        state: (4 or more,) x, y, dx/dt, dy/dt [m, m/s].
+        toes: (2,) x of rear and front toe [m].
+        rest_length: l0 [m].
+        touchdown_height: l0 sin(alpha) [m].
+        values: (NUM_EVENTS,) overwritten, by Event.
     """
     x, y, u, v = state[0].real, state[1].real, state[2].real, state[3].real
     rear, front = x - toes[0].real, x - toes[1].real

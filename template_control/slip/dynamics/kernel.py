@@ -87,7 +87,15 @@ def new_scratch(dtype: type[float] | type[complex] = float) -> Scratch:
 
 @inner
 def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha: float) -> None:
-    """Move the toes (2,) as the ``Reset`` with this value says."""
+    """Move the toes as a reset of the automaton says.
+
+    Args:
+        reset: value of the Reset.
+        state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s].
+        toes: (2,) x of rear and front toe [m], overwritten.
+        rest_length: l0 [m].
+        alpha: touchdown angle, from the ground to the leg [rad].
+    """
     if reset == _PLACE_REAR:
         toes[0] = state[0] + rest_length * np.cos(alpha)
     elif reset == _PLACE_FRONT:
@@ -101,7 +109,14 @@ def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha
 
 @inner
 def note_bottom(event: int, state: Array, toes: Array, bottom: Array) -> None:
-    """At a bottom, virtual or not, write the legs' lengths to ``bottom`` (2,)."""
+    """Take note of the legs' lengths if the event is a bottom, virtual or not.
+
+    Args:
+        event: value of the Event that fires.
+        state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s].
+        toes: (2,) x of rear and front toe [m].
+        bottom: (2,) lengths of rear and front leg [m], overwritten at a bottom only.
+    """
     if event in (_BOTTOM, _VIRTUAL_BOTTOM):
         for leg in range(2):
             bottom[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)

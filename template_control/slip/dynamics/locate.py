@@ -52,9 +52,13 @@ class Watch(NamedTuple):
 
 @inner
 def arm(watch: Watch, state: Array) -> None:
-    """Prepare ``watch`` at the start of a phase, where the CoM is at ``state`` (4,).
+    """Prepare ``watch`` at the start of a phase.
 
     A guard that is zero there does not fire there; forbidden regions count at once.
+
+    Args:
+        watch: the phase's guards; its ``values`` and ``armed`` are overwritten.
+        state: (4,) x, y, dx/dt, dy/dt of the CoM at the start [m, m/s].
     """
     events, values, armed = watch.events, watch.values, watch.armed
     all_guards(state, watch.toes, watch.rest_length, watch.touchdown_height, values[0])

@@ -23,7 +23,15 @@ _NEWTON = 6
 
 @inner
 def polar(x: float, y: float) -> tuple[float, float]:
-    """Radius and angle of (x, y), y > 0; the angle by atan2, differentiable."""
+    """Radius and angle of a point above the ground; a complex step goes through both.
+
+    Args:
+        x: horizontal distance from the pivot [m].
+        y: height over it, positive [m].
+
+    Returns:
+        The radius [m]; the angle, from forward horizontal [rad].
+    """
     angle = np.arctan2(y.real, x.real)
     # The first-order term carries a complex step; it is zero for real numbers.
     angle = angle + (y * x.real - x * y.real) / (x.real**2 + y.real**2)

@@ -100,7 +100,13 @@ class Stride:
 def controls(
     touchdown_angle: float, k_sc: float, k_sd: float, k_sc_wr: float = 0.0, k_sd_wr: float = 0.0
 ) -> Array:
-    """Control vector u (5,) of a stride: angle [rad] and stiffnesses [N/m] by Slot.
+    """Control vector u (5,) of a stride, by Slot.
+
+    Args:
+        touchdown_angle: alpha, from the ground to the leg [rad].
+        k_sc: stiffness before the stride's (virtual) bottom [N/m].
+        k_sd: stiffness after it [N/m].
+        k_sc_wr, k_sd_wr: the same of the front leg in a walk-to-run stride [N/m].
 
     Raises:
         ParameterError: if the angle is not in (0, pi/2) or a stiffness is negative or NaN.
@@ -119,7 +125,15 @@ def controls(
 
 
 def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
-    """``values`` as a new array of this size.
+    """Copy numbers into a new array after a check.
+
+    Args:
+        name: what they are, for the error's message.
+        values: the numbers.
+        size: how many there must be.
+
+    Returns:
+        (size,) the numbers.
 
     Raises:
         ParameterError: if its shape is another, or a number is not finite.

@@ -30,9 +30,16 @@ _HEIGHT, _ANGLE = 0.01, np.radians(1.0)  # what counts as equally far, per l0 an
 
 
 def vlo_state(parameters: SlipParameters, y: ArrayLike, phi: ArrayLike, energy: ArrayLike) -> Array:
-    """VLO states (..., 3) dx/dt, y, dy/dt from height [m], velocity angle [rad], energy [J].
+    """VLO states from height, direction of the velocity and energy; shapes broadcast.
 
-    The speeds are NaN where the energy does not suffice.
+    Args:
+        parameters: the template; the stance leg has its stiffness k0.
+        y: (...) height of the CoM [m].
+        phi: (...) angle of the velocity, positive downward [rad].
+        energy: (...) mechanical energy [J].
+
+    Returns:
+        (..., 3) dx/dt, y, dy/dt; the speeds are NaN where the energy does not suffice.
     """
     y, phi, energy = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (y, phi, energy)))
     v = VLO.speed(parameters, y, energy)

@@ -88,7 +88,15 @@ def map_many(
     result: Array,
     outcome: IntArray,
 ) -> None:
-    """:func:`section_map` for rows of ``z`` (n, 3) and ``controls`` (n, NUM_SLOTS)."""
+    """As :func:`section_map`, stride by stride.
+
+    Args:
+        kernel, kind, scratch: as for :func:`section_map`.
+        z: (n, 3) states at the section.
+        controls: (n, NUM_SLOTS) u of each stride.
+        result: (n, RESULTS) overwritten.
+        outcome: (n,) overwritten with the Outcomes' values.
+    """
     for i in range(z.shape[0]):
         outcome[i] = section_map(kernel, kind, z[i], controls[i], scratch, result[i])
 
