@@ -214,7 +214,12 @@ def _gait(options: argparse.Namespace, robot: PlanarBiped) -> WalkingGait:
 
 
 def print_table(figures: dict[str, Any], record: Record) -> None:
-    """The summary as a table on standard output."""
+    """The summary as a table on standard output.
+
+    Args:
+        figures: of the run, from :func:`~template_control.run.summary.summarise`.
+        record: the run; it knows whether Ctrl-C ended it.
+    """
     table = Table(title=f"{figures['robot']}, gait {figures['gait']}", show_header=False)
     table.add_column()
     table.add_column(justify="right")

@@ -36,7 +36,15 @@ _STEPS = 50  # of a run on a route that does not end, where the options do not s
 
 
 def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:
-    """The gait's VLO state with up to 5 % more or less speed and 2 % of l0 in height, drawn."""
+    """The gait's VLO state with up to 5 % more or less speed and 2 % of l0 in height, drawn.
+
+    Args:
+        gait: whose VLO state is changed.
+        seed: of the draws.
+
+    Returns:
+        dx/dt, y, dy/dt [m/s, m, m/s].
+    """
     z, length = gait.vlo, gait.parameters.rest_length
     draw = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
     height = z[1] + 0.02 * draw[1] * length

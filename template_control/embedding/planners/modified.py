@@ -62,12 +62,12 @@ class ModifiedPlanner:
         self._stiffness = np.array(self.options.stiffness_range) * k0
 
     def reset(self) -> None:
-        """The paper's planner learns nothing."""
+        """See :class:`~.planner.Planner`; the paper's planner learns nothing."""
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
-        """Controls for a step from VLO state ``z`` (3,); see :class:`~.planner.Planner`."""
+        """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO."""
         self.gait, reachable = self._family.towards(self.gait, target)
         p, o = self.gait.parameters, self.options
         predicted = np.empty(3)
@@ -87,4 +87,4 @@ class ModifiedPlanner:
         return Decision(controls, predicted, feasible, feasible, nominal)
 
     def observe(self, decision: Decision, z: Array) -> None:
-        """The paper's planner plans every step afresh."""
+        """See :meth:`~.planner.Planner.observe`; the paper's planner learns nothing."""

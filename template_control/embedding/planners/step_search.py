@@ -32,11 +32,11 @@ class Grid(NamedTuple):
     """The controls that :func:`search` tries.
 
     Attributes:
-        coarse: points in alpha, kappa_1, kappa_2 of the first grid, over all bounds.
-        fine: points in alpha and kappa_2 of the later ones, about the best found.
-        rounds: how many later ones.
+        coarse: numbers of points in alpha, kappa_1, kappa_2 of the first grid, over all bounds.
+        fine: numbers of points in alpha and kappa_2 of the later grids, about the best found.
+        rounds: number of later grids.
         width_alpha, width_kappa: half-widths of the first of these [rad, of k0].
-        narrowing: half-widths of each over those of the one before.
+        narrowing: half-widths of each grid over those of the one before.
     """
 
     coarse: tuple[int, int, int]
@@ -89,7 +89,13 @@ def _copy(source: Array, target: Array) -> None:
 
 @compiled
 def bounded(law: Law, z: Array, u: Array) -> None:
-    """Clip controls ``u`` (3,) in place to what is admissible at VLO state ``z`` (3,)."""
+    """Clip controls in place to what is admissible at a VLO state.
+
+    Args:
+        law: its bounds and its ``top_margin`` count.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0; overwritten.
+    """
     for i in range(3):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
     top = np.arcsin(min(z[1] / law.kernel.model.rest_length, 1.0)) - law.top_margin
@@ -98,7 +104,13 @@ def bounded(law: Law, z: Array, u: Array) -> None:
 
 @compiled
 def linear(law: Law, z: Array, u: Array) -> None:
-    """The law's bounded controls at ``z`` into ``u``."""
+    """Write the law's controls, within their bounds, into ``u``.
+
+    Args:
+        law: u = u_s - K (z - z_s), and the bounds.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (3,) overwritten with alpha [rad], kappa_1/k0, kappa_2/k0.
+    """
     for i in range(3):
         u[i] = law.control[i]
         for j in range(3):
@@ -108,7 +120,19 @@ def linear(law: Law, z: Array, u: Array) -> None:
 
 @compiled
 def step(law: Law, kind: int | None, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
-    """One step from ``z`` with controls ``u``, the robot's offset included; the Outcome."""
+    """Take one walking step of the template, and add the robot's offset to where it ends.
+
+    Args:
+        law: the template's step and the offset.
+        kind: of map, from :func:`~template_control.slip.maps.section_map.closed_form`.
+        s: overwritten.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
+        z_next: (3,) overwritten with the next VLO state.
+
+    Returns:
+        The Outcome's value; ``z_next`` means nothing where that is not SECTION.
+    """
     controls = np.zeros(NUM_SLOTS)
     controls[_ANGLE] = u[0]
     controls[_K_SC], controls[_K_SD] = u[1] * law.stiffness, u[2] * law.stiffness
@@ -132,16 +156,16 @@ def _cost_to_go(law: Law, z: Array) -> float:
 def price(
     law: Law, kind: int | None, s: Scratch, z: Array, u: Array, limit: float, first: Array
 ) -> float:
-    """Cost of taking ``u`` at ``z``; the state after one step into ``first`` (3,).
+    """Cost of taking ``u`` at ``z``.
 
     Args:
-        law: what judges.
+        law: says what a state costs.
         kind: of map, from :func:`~template_control.slip.maps.section_map.closed_form`.
         s: overwritten.
-        z: (3,) VLO state.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
         u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
         limit: a cost known to be too much; the second step is not looked at beyond it.
-        first: overwritten.
+        first: (3,) overwritten with the state after one step.
     """
     second, u2 = np.empty(3), np.empty(3)
     if step(law, kind, s, z, u, first) != 0:

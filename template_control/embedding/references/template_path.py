@@ -43,9 +43,11 @@ class Curve(NamedTuple):
 
 
 class Landing(NamedTuple):
-    """Where and when a leg next touches down: x of its toe [m] and time on the path [s].
+    """Where and when a leg next touches down; (nan, inf) if it does not land on this path.
 
-    A leg that does not land on this path has (nan, inf).
+    Attributes:
+        x: of its toe in the world [m].
+        time: on the path [s].
     """
 
     x: float
@@ -63,7 +65,7 @@ class TemplatePath:
             start of the path.
         toes: x of the rear and the front toe at the start [m].
         section_state: (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex.
-        outcome: how it ends.
+        outcome: how the first stride ends.
         duration: end of the last segment [s].
     """
 
@@ -80,12 +82,20 @@ class TemplatePath:
 
         Args:
             event: the guard.
-            passed: so many of the path's events are over.
+            passed: number of the path's events that are over already.
         """
         return next((time for time, found in self.events[passed:] if found is event), np.inf)
 
     def after(self, event: Event, passed: int) -> int:
-        """How many of the path's events are over once ``event`` is."""
+        """How many of the path's events are over once the next ``event`` is.
+
+        Args:
+            event: the guard that fires.
+            passed: number of the path's events that are over already.
+
+        Returns:
+            The new number; ``passed`` where no such event is left.
+        """
         for i in range(passed, len(self.events)):
             if self.events[i][1] is event:
                 return i + 1
@@ -150,10 +160,17 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
 
 @compiled
 def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
-    """Path at ``time`` into out (6,): x from ``toe``, y, and their two derivatives.
+    """Write the path at a time into ``out``.
+
+    Args:
+        curve: the path.
+        toe: x of the template's rear toe [m].
+        time: on the path [s]. The path goes on for a moment past either end, then stops.
+        out: (6,) overwritten: x from ``toe``, y, and their first and second derivatives
+            [m, m/s, m/s^2].
 
     Returns:
-        The segment.
+        The index of the path's segment at that time.
     """
     meta = curve.meta
     row = 0
