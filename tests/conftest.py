@@ -9,7 +9,7 @@ import pytest
 import template_control as tc
 from template_control.cli.main import main
 from template_control.robot.library import load_robot
-from template_control.slip.gaits.gait import gait_at, gait_from_energy
+from template_control.slip.gaits.gait import gait_at, gait_for_speed, gait_from_energy
 from template_control.slip.parameters import SlipParameters
 
 PACKAGE = Path(__file__).parents[1] / "template_control"
@@ -38,6 +38,18 @@ def gait():
 
 
 @pytest.fixture(scope="session")
+def default_gait():
+    """What the five-link robot walks with unless told otherwise: ``gait``, but for rounding."""
+    return tc.default_gait(load_robot("five-link"))
+
+
+@pytest.fixture(scope="session")
+def brisk_gait():
+    """1.2 m/s on average, for tests that draw many states and cannot make it for each."""
+    return gait_for_speed(SlipParameters(), 1.2)
+
+
+@pytest.fixture(scope="session")
 def paper_gait():
     """The paper's walking equilibrium: 0.9818 m and 826 J."""
     return gait_from_energy(SlipParameters(), 0.9818, 826.0)
@@ -53,11 +65,10 @@ def random_states():
 
 
 @pytest.fixture(scope="session")
-def short_walk():
+def short_walk(default_gait):
     """Four steps of the five-link robot on its default gait, recorded."""
     robot = tc.load_robot("five-link")
-    gait = tc.default_gait(robot)
-    return tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=4))
+    return tc.simulate(robot, tc.LqrPlanner(default_gait), tc.SimulationOptions(steps=4))
 
 
 @pytest.fixture

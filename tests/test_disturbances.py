@@ -1,5 +1,7 @@
 """What may disturb a walk: an unseen step of the ground, noisy sensors, late torques."""
 
+from functools import cache
+
 import numpy as np
 import pybullet
 import pytest
@@ -9,6 +11,7 @@ from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ground import GroundStep
+from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
 from template_control.run.record import Record
 from template_control.run.sensing import SensorOptions, Sensors
@@ -20,9 +23,17 @@ def walk(robot, gait, **options):
     return simulate(robot, LqrPlanner(gait), SimulationOptions(**options))
 
 
-def on_step(robot, gait, height, steps=9):
-    step = GroundStep.at_step(gait, height, 5)
-    return step, walk(robot, gait, steps=steps, plant=PlantOptions(ground_step=step))
+@pytest.fixture(scope="module")
+def on_step(gait):
+    """Nine steps over a step of the ground of this height before the fifth foothold."""
+
+    @cache
+    def walked(height):
+        step = GroundStep.at_step(gait, height, 5)
+        options = PlantOptions(ground_step=step)
+        return step, walk(load_robot("five-link"), gait, steps=9, plant=options)
+
+    return walked
 
 
 @pytest.mark.parametrize("height", [0.04, -0.07])
@@ -39,8 +50,8 @@ def test_rays_meet_the_ground_where_it_is_said_to_be(robot, height, edge):
 
 
 @pytest.mark.parametrize("height", [0.005, -0.005])
-def test_a_step_nobody_told_of_moves_the_feet(robot, gait, height):
-    step, record = on_step(robot, gait, height)
+def test_a_step_nobody_told_of_moves_the_feet(on_step, robot, height):
+    step, record = on_step(height)
     assert not record.fell
     at = np.searchsorted(record.time, record.vlo_time)[1:]
     foot = record.foot[at, record.rear[at]]
@@ -52,9 +63,9 @@ def test_a_step_nobody_told_of_moves_the_feet(robot, gait, height):
     assert np.all(force > 0.3 * robot.mass * robot.gravity)
 
 
-def test_momentum_changes_by_the_forces_on_both_levels(robot, gait):
+def test_momentum_changes_by_the_forces_on_both_levels(on_step, robot):
     """Weight and reported contact forces; a body of ground not counted would show."""
-    _, record = on_step(robot, gait, 0.005)
+    _, record = on_step(0.005)
     force = record.contact_force[1:].sum(axis=1)
     force[:, 1] -= robot.mass * robot.gravity
     dt = record.time[1] - record.time[0]
@@ -94,14 +105,14 @@ def test_the_hip_is_measured_from_the_ground_below_it(robot, gait, monkeypatch):
     assert record.q[-2, 0] <= 1.0 < record.q[-1, 0]
 
 
-def test_the_stick_diagram_draws_the_step(robot, gait, tmp_path):
-    step, record = on_step(robot, gait, 0.005)
+def test_the_stick_diagram_draws_the_step(on_step, short_walk, tmp_path):
+    step, record = on_step(0.005)
     record = Record.load(record.save(tmp_path / "run.npz"))
     (axes,) = stick_diagram(record, seconds=4.0).axes
     ground = axes.lines[-1].get_xydata()
     np.testing.assert_allclose(ground[:, 1], [0.0, 0.0, 0.005, 0.005])
     np.testing.assert_allclose(ground[1:3, 0], step.x)
-    (axes,) = stick_diagram(walk(robot, gait, steps=2)).axes
+    (axes,) = stick_diagram(short_walk).axes
     assert np.all(axes.lines[-1].get_ydata() == 0.0)
 
 

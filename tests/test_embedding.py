@@ -40,9 +40,8 @@ def test_chained_plan_is_continuous_and_knows_its_events(gait):
 
 @given(time=st.floats(0.0, 0.32), scale=st.floats(0.97, 1.03))
 @settings(max_examples=50, deadline=None)
-def test_phase_look_up_inverts_the_path(time, scale):
-    gait = gait_for_speed(P, 1.2)
-    u = gait.controls
+def test_phase_look_up_inverts_the_path(brisk_gait, time, scale):
+    gait, u = brisk_gait, brisk_gait.controls
     plan = chain([simulate_stride(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)])
     state, found = np.empty(6), np.empty(6)
     sample(plan.cx, plan.cy, plan.meta, time, state)

@@ -1,5 +1,7 @@
 """Example II: start, liftoff rules, and what is reported of it."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -21,31 +23,34 @@ from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
 from template_control.run.simulation import SimulationOptions, simulate
 from template_control.slip.automaton.vocabulary import Event
-from template_control.slip.gaits.gait import gait_from_energy
-from template_control.slip.parameters import SlipParameters
-
-GAIT = gait_from_energy(SlipParameters(), 0.9818, 826.0)
 
 
-def first_steps(beta=None, planner=LqrPlanner):
-    options = SimulationOptions(
-        steps=2, plant=IdealOptions(), embedding=EmbeddingOptions(liftoff_angle=beta)
-    )
-    return simulate(load_robot("five-link"), planner(GAIT), options)
+@pytest.fixture(scope="module")
+def first_steps(paper_gait):
+    """Two steps on the ideal plant, with a predefined liftoff direction or the template's."""
+
+    @cache
+    def walk(beta=None):
+        options = SimulationOptions(
+            steps=2, plant=IdealOptions(), embedding=EmbeddingOptions(liftoff_angle=beta)
+        )
+        return simulate(load_robot("five-link"), LqrPlanner(paper_gait), options)
+
+    return walk
 
 
-def test_z0_is_the_papers():
-    z = np.array(start_state(GAIT))
+def test_z0_is_the_papers(paper_gait):
+    z = np.array(start_state(paper_gait))
     assert z[0] > 0.0 > z[2], "downward"
-    np.testing.assert_allclose(sections(GAIT, z[None])[0], START, rtol=1e-12)
-    p = GAIT.parameters
+    np.testing.assert_allclose(sections(paper_gait, z[None])[0], START, rtol=1e-12)
+    p = paper_gait.parameters
     spring = 0.5 * p.leg_stiffness * (p.rest_length - z[1]) ** 2
     kinetic = 0.5 * p.mass * (z[0] ** 2 + z[2] ** 2)
     assert kinetic + p.mass * p.gravity * z[1] + spring == pytest.approx(821.55)
 
 
-def test_the_template_alone_shows_what_a_map_costs():
-    target = sections(GAIT, GAIT.vlo[None])[0]
+def test_the_template_alone_shows_what_a_map_costs(paper_gait):
+    target = sections(paper_gait, paper_gait.vlo[None])[0]
     settled = {name: template_walk(name).settled for name in PLANNERS}
     for name in ("LQR", "modified, improved map", "modified, exact map"):
         mean, spread = settled[name]
@@ -67,7 +72,7 @@ def test_liftoff_waits_for_the_predefined_direction():
             assert bool(fired(*args)) is (time >= 0.5)
 
 
-def test_an_earlier_liftoff_is_rougher_with_smaller_amplitudes():
+def test_an_earlier_liftoff_is_rougher_with_smaller_amplitudes(first_steps):
     """The paper's words for Fig. 13(c)."""
     template, predefined = liftoff(first_steps()), liftoff(first_steps(EARLIER))
     # One tick turns beta by less than 0.1 degrees.
@@ -80,7 +85,7 @@ def test_an_earlier_liftoff_is_rougher_with_smaller_amplitudes():
     assert np.all(predefined.peak[[0, 2]] < 0.95 * template.peak[[0, 2]]), "hips"
 
 
-def test_each_foot_has_its_own_template_force_about_liftoff():
+def test_each_foot_has_its_own_template_force_about_liftoff(first_steps):
     """The template's and the robot's liftoff differ by some ticks; forces go to the feet."""
     record = first_steps()
     nodes = np.array(record.metadata["nodes"])[record.node]
@@ -95,7 +100,7 @@ def test_each_foot_has_its_own_template_force_about_liftoff():
     assert np.all(force < 100.0), "the lifting leg's fades"
 
 
-def test_beginning_cuts_the_samples():
+def test_beginning_cuts_the_samples(first_steps):
     record = beginning(first_steps(), 0.1)
     assert record.time[-1] < 0.1
     assert len(record.q) == len(record.time) == 100
@@ -103,7 +108,7 @@ def test_beginning_cuts_the_samples():
 
 
 @pytest.mark.slow
-def test_the_robot_settles_on_the_equilibrium_from_z0():
+def test_the_robot_settles_on_the_equilibrium_from_z0(paper_gait):
     target = np.array([0.9818, 0.0, 826.0])
     for plant in PLANTS:
         mean, spread = robot_walk("LQR", plant)[0].settled
@@ -111,6 +116,6 @@ def test_the_robot_settles_on_the_equilibrium_from_z0():
         # 1 cm, 0.1 m/s of vertical speed and 3 % of speed: what a walk to this equilibrium must
         # hold; here as height, angle and energy.
         assert error[0] < 0.01, plant
-        assert error[1] < 0.1 / GAIT.vlo[0], plant
-        assert error[2] < 80.0 * GAIT.vlo[0] ** 2 * 0.03, plant
+        assert error[1] < 0.1 / paper_gait.vlo[0], plant
+        assert error[2] < 80.0 * paper_gait.vlo[0] ** 2 * 0.03, plant
         assert spread[0] < 0.0015, plant

@@ -10,6 +10,7 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.plant import open_plant, plant_name
+from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
 from template_control.run.record import Record
 from template_control.run.simulation import Push, SimulationOptions, simulate
@@ -224,12 +225,7 @@ def test_agrees_with_pybullet_over_a_short_stance(robot):
 
 
 @pytest.fixture(scope="module")
-def record():
-    from template_control.robot.library import load_robot
-    from template_control.slip.gaits.gait import gait_at
-    from template_control.slip.parameters import SlipParameters
-
-    gait = gait_at(SlipParameters(), np.radians(66.0), 1.1)
+def record(gait):
     options = SimulationOptions(steps=6, plant=IdealOptions())
     return simulate(load_robot("five-link"), LqrPlanner(gait), options)
 

@@ -15,7 +15,7 @@ from template_control.embedding.step_planning import ReplanOptions, StepPlanning
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.gait import gait_at, gait_for_speed, vlo_energy, vlo_jacobians
+from template_control.slip.gaits.gait import vlo_energy, vlo_jacobians
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 
@@ -45,10 +45,9 @@ def test_prediction_is_the_exact_map(planner, gait):
 
 @given(speed=st.floats(0.4, 1.8), height=st.floats(0.85, 1.0), vertical=st.floats(-0.5, 0.5))
 @settings(max_examples=60, deadline=None)
-def test_planner_answers_for_every_state(speed, height, vertical):
-    gait = gait_for_speed(P, 1.2)
+def test_planner_answers_for_every_state(brisk_gait, speed, height, vertical):
     for kind in (LqrPlanner, ModifiedPlanner):
-        decision = kind(gait).decide(np.array([speed, height, vertical]))
+        decision = kind(brisk_gait).decide(np.array([speed, height, vertical]))
         alpha = decision.controls[Slot.TOUCHDOWN_ANGLE]
         assert np.all(np.isfinite(decision.controls))
         # Above asin(y / l0) the foot would be under the ground already.
@@ -101,8 +100,7 @@ def test_unreachable_state_is_said(planner, gait):
     assert not decision.reached
 
 
-def test_overdue_ground_keeps_the_template_in_single_stance():
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_overdue_ground_keeps_the_template_in_single_stance(gait):
     planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
     sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
     node = AUTOMATON.node(STRIDE_START["w"])
@@ -119,8 +117,7 @@ def test_overdue_ground_keeps_the_template_in_single_stance():
     assert not planning.surprised(1.0, 1.0, 10.0)
 
 
-def test_a_template_that_would_take_off_is_planned_from_the_ground():
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_a_template_that_would_take_off_is_planned_from_the_ground(gait):
     planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
     high = np.array([1.1, 0.999, 0.4])
     assert not planning.planner.decide(high).feasible
@@ -134,8 +131,9 @@ def test_a_template_that_would_take_off_is_planned_from_the_ground():
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.02, 0.12), st.floats(-0.2, 0.2), st.floats(-0.02, 0.005))
-def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(later, faster, higher):
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
+    gait, later, faster, higher
+):
     node = AUTOMATON.node(STRIDE_START["w"])
     planning = StepPlanning(LqrPlanner(gait), ReplanOptions())
     sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
@@ -153,10 +151,8 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(later, f
     assert len(planning.steps) == 1
 
 
-def test_surprise_is_a_large_deviation_some_time_after_the_last_plan():
-    planning = StepPlanning(
-        LqrPlanner(gait_at(P, np.radians(66.0), 1.1)), ReplanOptions(speed=0.05, interval=0.02)
-    )
+def test_surprise_is_a_large_deviation_some_time_after_the_last_plan(gait):
+    planning = StepPlanning(LqrPlanner(gait), ReplanOptions(speed=0.05, interval=0.02))
     assert planning.surprised(-0.06, phase_time=0.1, now=0.1)
     assert not planning.surprised(0.04, phase_time=0.1, now=0.1)
     assert not planning.surprised(0.06, phase_time=0.01, now=0.1)

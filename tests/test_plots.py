@@ -14,8 +14,8 @@ from template_control.view.state_figures import phase_portrait, template_energie
 
 
 @pytest.fixture(scope="module")
-def gait():
-    return tc.default_gait(tc.load_robot("five-link"))
+def gait(default_gait):
+    return default_gait
 
 
 def walk(gait, steps, **options):

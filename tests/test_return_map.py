@@ -13,7 +13,7 @@ from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, sample
 from template_control.slip.dynamics.stance_map import axial_torsional, harmonic, momentum_changes
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.gait import gait_at, vlo_energy
+from template_control.slip.gaits.gait import vlo_energy
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 
@@ -28,11 +28,6 @@ STRIDES = {
 }
 CASES = [(stride, kind) for stride in STRIDES for kind in MapKind]
 walking = st.tuples(st.floats(0.95, 1.25), st.floats(0.965, 0.985), st.floats(-0.05, 0.05))
-
-
-@pytest.fixture(scope="module")
-def gait():
-    return gait_at(P, np.radians(66.0), 1.1)
 
 
 @pytest.mark.parametrize(("stride", "kind"), CASES)

@@ -9,7 +9,6 @@ import pytest
 
 from template_control.cli import robustness as command
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.scaling import default_gait
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.robot.library import load_robot
 from template_control.robustness import campaign as robustness
@@ -24,10 +23,9 @@ BY_NAME = {d.name: d for d in DISTURBANCES}
 
 
 @pytest.fixture(scope="module")
-def undisturbed():
+def undisturbed(default_gait):
     robot = load_robot("five-link")
-    gait = default_gait(load_robot("five-link"))
-    return simulate(robot, LqrPlanner(gait), SimulationOptions(steps=BEGIN + 1 + AFTER))
+    return simulate(robot, LqrPlanner(default_gait), SimulationOptions(steps=BEGIN + 1 + AFTER))
 
 
 # -- what a disturbance is -------------------------------------------------------------
@@ -103,8 +101,8 @@ def test_the_edge_of_a_step_lies_between_two_footholds(robot, gait, number):
 # -- what a trial is -------------------------------------------------------------------
 
 
-def test_the_error_of_a_walk_is_that_of_its_last_five_steps(undisturbed):
-    gait = default_gait(load_robot("five-link"))
+def test_the_error_of_a_walk_is_that_of_its_last_five_steps(undisturbed, default_gait):
+    gait = default_gait
     errors = off_gait(undisturbed, gait)
     assert np.all(np.abs(errors) < 0.01)
     last = undisturbed.time >= undisturbed.vlo_time[-6]

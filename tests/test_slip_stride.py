@@ -10,7 +10,6 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.gait import gait_at, gait_from_energy
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 
@@ -167,8 +166,7 @@ def test_running_stride_runs_on_the_same_kernel():
     assert e1 == pytest.approx(e0, rel=1e-11)
 
 
-def test_gait_returns_to_itself_and_is_symmetric():
-    gait = gait_at(P, ALPHA, 1.1)
+def test_gait_returns_to_itself_and_is_symmetric(gait):
     z, outcome = ReturnMap(P).step(gait.vlo, gait.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(z, gait.vlo, atol=1e-8)
@@ -181,10 +179,9 @@ def test_gait_returns_to_itself_and_is_symmetric():
     np.testing.assert_allclose(forth[:, 1], back[:, 1], atol=1e-8)
 
 
-def test_papers_equilibrium_exists():
-    gait = gait_from_energy(P, 0.9818, 826.0)
-    assert gait.energy == pytest.approx(826.0, abs=1e-9)
-    assert gait.vlo[0] == pytest.approx(1.1484, abs=1e-4)
+def test_papers_equilibrium_exists(paper_gait):
+    assert paper_gait.energy == pytest.approx(826.0, abs=1e-9)
+    assert paper_gait.vlo[0] == pytest.approx(1.1484, abs=1e-4)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

@@ -15,7 +15,7 @@ from template_control.robustness.disturbances import Situation
 from template_control.run.record import Record
 from template_control.run.simulation import Push, SimulationOptions, perturbed_start, simulate
 from template_control.run.summary import summarise
-from template_control.slip.gaits.gait import gait_at, gait_for_speed, gait_from_energy
+from template_control.slip.gaits.gait import gait_for_speed
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -26,8 +26,8 @@ def walk(gait, planner=LqrPlanner, **options):
 
 
 @pytest.fixture(scope="module")
-def record():
-    return walk(gait_at(P, np.radians(66.0), 1.1), steps=12)
+def record(gait):
+    return walk(gait, steps=12)
 
 
 def test_walks_without_a_fall(record):
@@ -86,20 +86,20 @@ def test_the_node_sequence_is_the_automatons(record):
     assert len(changes) >= 4 * record.steps
 
 
-def test_walk_is_deterministic(record):
-    again = walk(gait_at(P, np.radians(66.0), 1.1), steps=12)
+def test_walk_is_deterministic(record, gait):
+    again = walk(gait, steps=12)
     np.testing.assert_array_equal(again.q, record.q)
 
 
 @pytest.mark.slow
-def test_a_disturbed_walk_is_the_same_wherever_its_memory_lies():
+def test_a_disturbed_walk_is_the_same_wherever_its_memory_lies(gait):
     """The last digits of ProxQP's harder solves depend on where its workspace lies."""
     pushed = {"steps": 14, "pushes": (Push(25.0, step=10),)}
-    first = walk(gait_at(P, np.radians(66.0), 1.1), **pushed)
+    first = walk(gait, **pushed)
     moved = []
     for n in range(1, 6):
         moved.append([np.zeros(3 * n) for _ in range(1000)])
-        again = walk(gait_at(P, np.radians(66.0), 1.1), **pushed)
+        again = walk(gait, **pushed)
         np.testing.assert_array_equal(again.torque, first.torque)
 
 
@@ -111,8 +111,8 @@ def test_summary_has_every_figure(record):
     assert figures["fall_reason"] is None
 
 
-def test_a_fall_is_recorded_whole(tmp_path):
-    record = walk(gait_at(P, np.radians(66.0), 1.1), steps=30, pushes=(Push(-200.0, step=3),))
+def test_a_fall_is_recorded_whole(gait, tmp_path):
+    record = walk(gait, steps=30, pushes=(Push(-200.0, step=3),))
     assert record.fell
     assert 3 <= record.steps < 30
     assert "step" in record.metadata["fall_reason"]
@@ -122,9 +122,9 @@ def test_a_fall_is_recorded_whole(tmp_path):
     assert again.fell
 
 
-def test_weak_legs_report_failed_qps_or_a_fall():
+def test_weak_legs_report_failed_qps_or_a_fall(gait):
     record = walk(
-        gait_at(P, np.radians(66.0), 1.1),
+        gait,
         steps=5,
         embedding=EmbeddingOptions(torque_scale=0.2),
     )
@@ -134,8 +134,8 @@ def test_weak_legs_report_failed_qps_or_a_fall():
     assert record.metadata["summary"]["saturated_share"] > 0.0
 
 
-def test_the_papers_planner_walks_too():
-    record = walk(gait_at(P, np.radians(66.0), 1.1), ModifiedPlanner, steps=15)
+def test_the_papers_planner_walks_too(gait):
+    record = walk(gait, ModifiedPlanner, steps=15)
     assert not record.fell
 
 
@@ -153,8 +153,7 @@ def settled(record, gait):
 
 
 @pytest.mark.slow
-def test_settles_on_the_default_gait():
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_settles_on_the_default_gait(gait):
     record = walk(gait, steps=200)
     error = np.abs(settled(record, gait))
     assert not record.fell
@@ -164,19 +163,18 @@ def test_settles_on_the_default_gait():
 
 
 @pytest.mark.slow
-def test_settles_on_the_papers_equilibrium():
-    gait = gait_from_energy(P, 0.9818, 826.0)
-    record = walk(gait, steps=200)
-    error = np.abs(settled(record, gait))
+def test_settles_on_the_papers_equilibrium(paper_gait):
+    record = walk(paper_gait, steps=200)
+    error = np.abs(settled(record, paper_gait))
     assert not record.fell
-    assert error[0] <= 0.03 * gait.vlo[0]
+    assert error[0] <= 0.03 * paper_gait.vlo[0]
     assert error[1] <= 0.01
     assert error[2] <= 0.1
 
 
 @pytest.mark.slow
-def test_thousand_steps():
-    record = walk(gait_at(P, np.radians(66.0), 1.1), steps=1000, record_every=10)
+def test_thousand_steps(gait):
+    record = walk(gait, steps=1000, record_every=10)
     figures = summarise(record, "")
     assert record.steps == 1000
     assert not record.fell
@@ -197,21 +195,18 @@ def test_other_speeds(speed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
-def test_perturbed_starts(seed):
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_perturbed_starts(gait, seed):
     assert not walk(gait, steps=50, start=perturbed_start(gait, seed)).fell
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.9, 1.1])
-def test_unknown_mass(scale):
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_unknown_mass(gait, scale):
     assert not walk(gait, steps=50, plant=PlantOptions(mass_scale=scale)).fell
 
 
 @pytest.mark.slow
-def test_slippery_ground():
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_slippery_ground(gait):
     record = walk(
         gait,
         steps=50,
@@ -224,8 +219,7 @@ def test_slippery_ground():
 @pytest.mark.slow
 @pytest.mark.parametrize("impulse", [-20.0, -10.0, 10.0, 25.0])
 @pytest.mark.parametrize("phase", np.arange(10) / 10)
-def test_pushes(impulse, phase):
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_pushes(gait, impulse, phase):
     record = walk(gait, steps=31, pushes=(Push(impulse, 10, phase),))
     assert not record.fell
     assert max(map(abs, off_gait(record, gait))) < 0.02, "back within 20 steps"
@@ -234,8 +228,7 @@ def test_pushes(impulse, phase):
 @pytest.mark.slow
 @pytest.mark.parametrize("height", [-0.03, 0.03])
 @pytest.mark.parametrize("share", [0.3, 0.4, 0.5, 0.6, 0.7])
-def test_a_step_of_the_ground_that_it_does_not_see(height, share):
-    gait = gait_at(P, np.radians(66.0), 1.1)
+def test_a_step_of_the_ground_that_it_does_not_see(gait, height, share):
     where = Situation(load_robot("five-link"), gait)
     before, beyond = where.footholds(tuple(gait.vlo), 11)[-2:]
     edge = GroundStep(height, before + share * (beyond - before))
