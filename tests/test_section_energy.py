@@ -17,16 +17,6 @@ K0, L0 = P.leg_stiffness, P.rest_length
 stiffnesses = st.floats(0.8 * K0, 1.3 * K0)
 
 
-def energy(z, stiffness):
-    """Of a state at VLO (3,) or at an apex (2,) [J]."""
-    return section_energy(P, z, stiffness)[0]
-
-
-def derivatives(z, stiffness):
-    """Of ``energy`` by the state, and by the stiffness."""
-    return section_energy(P, z, stiffness)[1:]
-
-
 def path_energy(stride, time):
     """Kinetic, potential and the legs' energy on a stride's path, of the legs as they are then."""
     row = stride.meta[np.searchsorted(stride.meta[:, 0], time, side="right") - 1]
