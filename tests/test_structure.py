@@ -1,9 +1,12 @@
 """The library's structure: who imports whom, how large things are, and what is written down.
 
-``python tests/test_structure.py`` lists the public functions whose docstring has no ``Args:``.
+``python tests/test_structure.py`` lists the public functions and classes that do not tell their
+arguments.
 """
 
 import ast
+import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -43,6 +46,12 @@ MOST_FILES = 12  # of a folder, its __init__.py included
 MOST_PARAMETERS = 7
 MOST_POSITIONAL = 7  # arguments of a call; a starred one counts as one
 GAIT_NAMES = {*STRIDE_START, *(node.name for node in AUTOMATON.nodes)}
+SECTION = re.compile(r"^(?:Args|Attributes).*:\n((?:(?: .*)?\n)*)", re.MULTILINE)
+ENTRY = re.compile(r"^    (\w+(?:, \w+)*): ", re.MULTILINE)
+# "See :class:`Task`.", "As :meth:`step`, but ...": the name whose docstring tells the arguments.
+ELSEWHERE = re.compile(
+    r"(?:^(?:See|As)|Arguments as for|The rest as in) (?::\w+:)?`+~?([\w.]+)`", re.MULTILINE
+)
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -281,13 +290,39 @@ def undocumented(tree):
             yield f"{node.lineno}: {node.name} has no docstring"
 
 
+@cache
+def documented_names():
+    """Names of the library's classes, functions and methods that have a docstring."""
+    return {
+        node.name
+        for path in sources().values()
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, Function | ast.ClassDef) and ast.get_docstring(node)
+    }
+
+
+def constructor(node):
+    """What a class is made from: parameters of its ``__init__``, or fields."""
+    for child in node.body:
+        if isinstance(child, Function) and child.name == "__init__":
+            return parameters(child, True)
+    fields = [x for x in node.body if isinstance(x, ast.AnnAssign)]
+    names = [x.target.id for x in fields if not ast.unparse(x.annotation).startswith("ClassVar")]
+    return [name for name in names if not name.startswith("_")]
+
+
 def without_arguments(tree):
-    """Public functions with two or more parameters whose docstring does not tell them."""
+    """Public functions and classes with two or more parameters that tell not all of them."""
     for node, bound in public(tree):
-        if isinstance(node, Function) and len(parameters(node, bound)) > 1:
-            text = ast.get_docstring(node) or ""
-            if not any(told in text for told in ("Args:", "Arguments as for")):
-                yield f"{node.lineno}: {node.name}({', '.join(parameters(node, bound))})"
+        names = parameters(node, bound) if isinstance(node, Function) else constructor(node)
+        text = (ast.get_docstring(node) or "") + "\n"
+        entries = ENTRY.findall("".join(SECTION.findall(text)))
+        told = {name for entry in entries for name in entry.split(", ")}
+        elsewhere = ELSEWHERE.search(text)
+        if elsewhere and elsewhere[1].split(".")[-1] in documented_names():
+            continue
+        if len(names) > 1 and (untold := [name for name in names if name not in told]):
+            yield f"{node.lineno}: {node.name} does not tell {', '.join(untold)}"
 
 
 # ---- the rules, over the sources and over a fault of each kind
@@ -313,8 +348,9 @@ def test_the_controller_compares_with_no_gait():
     assert_none(faults(gait_branches, LIBRARY / "embedding"))
 
 
-def test_everything_public_is_documented():
-    assert_none(faults(undocumented, LIBRARY))
+@pytest.mark.parametrize("rule", [undocumented, without_arguments], ids=lambda r: r.__name__)
+def test_everything_public_is_documented(rule):
+    assert_none(faults(rule, LIBRARY))
 
 
 @pytest.mark.parametrize(
@@ -339,8 +375,22 @@ def test_everything_public_is_documented():
         (undocumented, "def f(): ...\nclass A:\n def g(self): ...\n def _h(self): ...", 3),
         (undocumented, "class _A:\n def g(self): ...", 0),
         (without_arguments, "def f(a, b):\n '''Do.'''", 1),
-        (without_arguments, "def f(a, b):\n '''Do.\n\n Args:\n  a: one.\n '''", 0),
+        (without_arguments, "def f(a, b):\n '''Do.\n\n Args:\n     a: one.\n '''", 1),
+        (without_arguments, "def f(a, b):\n '''Do.\n\n Args:\n     a, b: two.\n '''", 0),
+        (without_arguments, "def f(a, *b):\n '''Do.\n\n Args:\n     a: 1.\n     b: 2.\n '''", 0),
+        (without_arguments, "def f(a, b):\n '''Do.\n\n Returns:\n     a, b: two.\n '''", 1),
+        (without_arguments, "def f(a, b):\n '''See :meth:`.planner.Planner.decide`.'''", 0),
+        (without_arguments, "def f(a, b):\n '''As ``decide``, but quicker.'''", 0),
+        (without_arguments, "def f(a, b):\n '''Do as :meth:`decide` does.'''", 1),
+        (without_arguments, "def f(a, b):\n '''See :func:`nowhere_to_be_found`.'''", 1),
         (without_arguments, "class A:\n '''A.'''\n def f(self, b):\n  '''Do.'''", 0),
+        (without_arguments, "class A:\n '''A.'''\n def __init__(self, a, b): ...", 1),
+        (without_arguments, "class A:\n '''A.'''\n a: int\n b: int", 1),
+        (
+            without_arguments,
+            "class A:\n '''A.\n\n Attributes:\n     a, b: two.\n '''\n a: int\n b: int",
+            0,
+        ),
     ],
 )
 def test_the_rules_find_what_they_forbid(rule, text, count):
