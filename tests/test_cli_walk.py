@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from template_control.robot.library import robot_path
 from template_control.run.record import Record
 from template_control.view.figures import FIGURES, save_figures
 
+ROOT = Path(__file__).parents[1]
 KEYS = {
     "robot", "gait", "steps", "fell", "fall_reason", "duration", "mean_speed", "vlo_target",
     "vlo_mean_last_50", "com_error_rms", "com_error_max", "joint_torque", "saturated_share",
@@ -31,6 +33,7 @@ def command(*arguments):
     )
 
 
+@pytest.mark.slow
 def test_json_is_all_there_is_on_stdout(tmp_path):
     done = command("walk", "--steps", "3", "--json", "--output", str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
@@ -49,10 +52,75 @@ def test_table_and_no_figures(tmp_path, capfd):
     assert not list(tmp_path.glob("*.png"))
 
 
+SCENARIO = """
+start = [1.1, 0.978, 0.0]
+[[segment]]
+gait = "walk"
+speed = 1.1
+steps = 2
+[[segment]]
+gait = "walk"
+acceleration = -0.1
+duration = 1.0
+"""
+
+
+def test_a_scenario_that_walks_is_walked(tmp_path, capfd):
+    path = tmp_path / "slower.toml"
+    path.write_text(SCENARIO)
+    arguments = ["walk", "--scenario", str(path), "--json", "--no-figures"]
+    assert main([*arguments, "--output", str(tmp_path)]) == 0
+    figures = json.loads(capfd.readouterr().out)
+    assert not figures["fell"]
+    record = Record.load(figures["record"])
+    # Two steps at the first speed; then steps of about half a second until the time is over.
+    assert record.steps in (4, 5)
+    target = record.section_target[:, 0]
+    np.testing.assert_allclose(target[:2], 1.1)
+    assert np.all(np.diff(target[1:-1]) < -0.02)
+    assert figures["speed_error_rms"] < 0.08
+
+
+@pytest.mark.slow
+def test_the_example_walks_at_several_speeds(tmp_path, capfd):
+    example = str(ROOT / "examples" / "walk_speeds.toml")
+    assert main(["walk", "--scenario", example, "--json", "--output", str(tmp_path)]) == 0
+    figures = json.loads(capfd.readouterr().out)
+    assert figures["qp_failures"] == 0
+    speed = Record.load(figures["record"]).section_state[:, 0]
+    assert speed.min() < 0.97
+    assert speed[-1] > 1.05
+    assert main(["slip", example, "--json", "--no-figures", "--output", str(tmp_path)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (('gait = "walk"\nacc', 'gait = "run"\nacc'), "segment 2 is to run"),
+        (("speed = 1.1", "speed = 1.9"), "segment 1 wants 1.9 m/s at VLO: five-link walks from"),
+        (("start = [1.1", "start = [0.3"), "the start has 0.3 m/s at VLO"),
+        (("speed = 1.1", "sped = 1.1"), "unknown key 'sped'"),
+    ],
+)
+def test_a_scenario_that_no_robot_walks_is_refused(refused, tmp_path, change, told):
+    path = tmp_path / "scenario.toml"
+    path.write_text(SCENARIO.replace(*change))
+    assert told in refused(["walk", "--scenario", str(path), "--output", str(tmp_path)])
+
+
+@pytest.mark.parametrize("other", [("--speed", "1"), ("--gait", "paper"), ("--seed", "1")])
+def test_a_scenario_goes_alone(refused, tmp_path, other):
+    path = tmp_path / "scenario.toml"
+    path.write_text(SCENARIO)
+    line = refused(["walk", "--scenario", str(path), *other, "--output", str(tmp_path)])
+    assert f"{other[0]} does not go with --scenario" in line
+
+
 def test_a_fall_exits_with_one_and_keeps_the_run(tmp_path, capfd):
-    arguments = ["walk", "--steps", "10", "--torque-scale", "0.2", "--json"]
+    arguments = ["walk", "--steps", "10", "--torque-scale", "0.2", "--json", "--no-figures"]
     assert main([*arguments, "--output", str(tmp_path)]) == 1
     figures = json.loads(capfd.readouterr().out)
+    assert set(figures) >= KEYS
     assert figures["fell"]
     assert "step" in figures["fall_reason"]
     assert Record.load(tmp_path / "run.npz").fell

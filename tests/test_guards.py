@@ -119,13 +119,18 @@ def test_the_front_leg_alone_may_be_passed():
     assert liftoff.state[0] > front + 0.1
 
 
+# A guard may rise and fall again within a substep unseen, as ``first_event`` says: a leg that is
+# stretched by micrometres for a millisecond.
+SUBSTEP = 0.1 * np.sqrt(L0 / P.gravity)
+
+
 def crossings(stride, alpha):
-    """Guards that rise through zero before the end of the phase they belong to, node by node."""
+    """Guards that rise through zero before the end of their phase, and stay or last a substep."""
     ends = [e.time for e in stride.events]
     begins = [0.0, *ends[:-1]]
     for begin, end, fired in zip(begins, ends, stride.events, strict=True):
         edges = [int(e.event) for e in AUTOMATON.node(fired.source).edges]
-        times = np.linspace(begin, end, 60)[1:-1]
+        times = np.linspace(begin, end, 100)[1:-1]
         rows = np.searchsorted(stride.meta[:, 0], times, side="right") - 1
         found = np.array(
             [
@@ -133,10 +138,12 @@ def crossings(stride, alpha):
                 for state, toes in zip(stride.sample(times), stride.meta[rows, 3:5], strict=True)
             ]
         )[:, edges]
-        # A guard counts from where it has been below zero, or a forbidden region is entered.
-        rose = (found[1:] > 1e-7) & np.logical_or.accumulate(found[:-1] < -1e-7)
-        for i in np.flatnonzero(rose.any(axis=0)):
-            yield fired.source, Event(edges[i]).name
+        # A guard counts from where it has been below zero.
+        above = (found > 1e-7) & np.logical_or.accumulate(found < -1e-7)
+        for event, over in zip(edges, above.T, strict=True):
+            lasting = np.convolve(over, np.ones(1 + int(SUBSTEP / (times[1] - times[0]))))
+            if over[-1] or lasting.max() * (times[1] - times[0]) > SUBSTEP:
+                yield fired.source, Event(event).name
 
 
 @given(
@@ -146,7 +153,7 @@ def crossings(stride, alpha):
     drop=st.floats(0.002, 0.3),
     stiffness=st.tuples(*[st.floats(8e3, 60e3)] * 4),
 )
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_the_guard_that_fires_is_the_first_of_its_node(kind, vlo, apex, drop, stiffness):
     """Between events no guard of the node at hand rises through zero unseen."""
     y, speed, vertical = (*apex, 0.0) if kind in ("r", "rw") else vlo

@@ -32,7 +32,12 @@ SLIP_STAGES = (
     ("gaits",),
     ("scenario",),
 )
-SHARED = ("errors", "storage")  # modules of the root that every room may import
+SHARED = (
+    "compiled",
+    "compiling",
+    "errors",
+    "storage",
+)  # modules of the root that every room may import
 MOST_ROOMS = 12
 MOST_FILES = 12  # of a folder, its __init__.py included
 MOST_PARAMETERS = 7

@@ -65,7 +65,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def save(automaton: Automaton, path: Path) -> None:
-    """Draw ``automaton`` into ``path``, a PNG, SVG or PDF.
+    """Draw an automaton into a file; folders on the way to it are made.
+
+    Args:
+        automaton: what to draw.
+        path: of the file, which ends in .png, .svg or .pdf.
 
     Raises:
         ParameterError: if the suffix is none of these.

@@ -124,7 +124,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Follow the branch and report it."""
+    """Follow the branch and report it.
+
+    Raises:
+        ParameterError: naming the option that is out of its range or does not fit another.
+    """
     defaults = _DEFAULTS[options.gait]
     given = _quantities("--fix", options.fix)
     limits = (options.limits[0], options.limits[1]) if options.limits else defaults.limits

@@ -92,7 +92,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     try:
         options = build_parser(arguments).parse_args(arguments)
-        return int(options.run(options))
+        # Not before: whoever asks for help need not wait for it.
+        from rich.console import Console
+
+        from template_control.compiling import compiling
+
+        with compiling(Console(stderr=True)):
+            return int(options.run(options))
     except TemplateControlError as error:
         print(f"template-control: {error}", file=sys.stderr)
         return _USER_ERROR

@@ -14,8 +14,17 @@ INTERRUPTED = 130
 
 
 @contextmanager
-def progress_bar(console: Console, text: str, total: float) -> Iterator[Any]:
-    """A progress bar; yields the function that sets how much is done."""
+def progress_bar(console: Console, text: str, total: float | None) -> Iterator[Any]:
+    """Show a progress bar while a ``with`` block runs.
+
+    Args:
+        console: where the bar is drawn.
+        text: what is going on, in front of the bar.
+        total: amount at which the bar is full, in the caller's unit; None where nobody knows.
+
+    Yields:
+        The function that sets how much is done, in the same unit.
+    """
     # Here, because whoever only asks for help should not wait for it.
     from rich.progress import (
         BarColumn,

@@ -81,7 +81,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure as told; returns 0, or 130 after Ctrl-C."""
+    """Measure as told; returns 0, or 130 after Ctrl-C.
+
+    Raises:
+        ParameterError: if the number of workers is out of its range.
+    """
     if not 1 <= options.workers <= _MOST_WORKERS:
         raise ParameterError(
             f"--workers is {options.workers}: give a number from 1 to {_MOST_WORKERS}"

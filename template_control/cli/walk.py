@@ -18,6 +18,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner
+from template_control.embedding.robot_route import robot_route
 from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
@@ -30,8 +31,11 @@ from template_control.run.simulation import perturbed_start, simulate
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.gaits.gait import WalkingGait, gait_for_speed
+from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import writable
 
+_STEPS = 50
 _LONG = 200  # steps beyond which samples are thinned
 
 
@@ -45,7 +49,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot_options(parser)
-    parser.add_argument("--steps", type=int, default=50, help="steps to walk, VLO to VLO")
+    parser.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="TOML",
+        help="a speed profile to walk, as template-control slip takes it, instead of one gait; it"
+        " ends with the profile, or after --steps",
+    )
+    parser.add_argument(
+        "--steps",
+        type=int,
+        help=f"steps to walk, VLO to VLO; {_STEPS} where no scenario says when to stop",
+    )
     parser.add_argument(
         "--gait",
         choices=("walk", "paper"),
@@ -118,11 +133,17 @@ def run(options: argparse.Namespace) -> int:
     _check(options)
     folder = writable(options.output)
     robot = robot_from(options)
-    gait = _gait(options, robot)
+    route = None
+    if options.scenario is not None:
+        route = robot_route(robot, load_scenario(options.scenario))
+        gait = walking_gait(route.parameters, float(route.start[0]))
+    else:
+        gait = _gait(options, robot)
+        options.steps = options.steps or _STEPS
     planner: Planner = LqrPlanner(gait)
     if options.planner == "modified":
         planner = ModifiedPlanner(gait, ModifiedOptions(map_kind=MapKind[options.map.upper()]))
-    every = options.record_every or (1 if options.steps <= _LONG else 5)
+    every = options.record_every or (1 if (options.steps or 0) <= _LONG else 5)
     simulation = SimulationOptions(
         steps=options.steps,
         plant=IdealOptions(mass_scale=options.mass_scale)
@@ -135,7 +156,9 @@ def run(options: argparse.Namespace) -> int:
     console = Console(stderr=True)
     with stdout_to_stderr():
         with progress_bar(console, "walking", options.steps) as advance:
-            record = simulate(robot, planner, simulation, advance)
+            record = simulate(
+                robot, route or planner, simulation, advance, planners={gait.stride: planner}
+            )
         path = record.save(folder / "run.npz")
         if not options.no_figures:
             view.save_figures(record, folder)
@@ -172,6 +195,14 @@ def _check(options: argparse.Namespace) -> None:
             raise ParameterError(f"{flag} is {value:g}: give a number from {low:g} to {high:g}")
     if options.speed is not None and options.gait != "walk":
         raise ParameterError(f"--speed does not go with --gait {options.gait}: leave one out")
+    if options.scenario is not None:
+        for flag, given in (
+            ("--speed", options.speed is not None),
+            ("--gait", options.gait != "walk"),
+            ("--seed", options.seed is not None),
+        ):
+            if given:
+                raise ParameterError(f"{flag} does not go with --scenario: leave one out")
 
 
 def _gait(options: argparse.Namespace, robot: PlanarBiped) -> WalkingGait:
@@ -183,7 +214,12 @@ def _gait(options: argparse.Namespace, robot: PlanarBiped) -> WalkingGait:
 
 
 def print_table(figures: dict[str, Any], record: Record) -> None:
-    """The summary as a table on standard output."""
+    """The summary as a table on standard output.
+
+    Args:
+        figures: of the run, from :func:`~template_control.run.summary.summarise`.
+        record: the run; it knows whether Ctrl-C ended it.
+    """
     table = Table(title=f"{figures['robot']}, gait {figures['gait']}", show_header=False)
     table.add_column()
     table.add_column(justify="right")
@@ -202,6 +238,8 @@ def print_table(figures: dict[str, Any], record: Record) -> None:
                 name,
                 f"{z['speed']:.4f} m/s  {z['height']:.4f} m  {z['vertical_speed']:+.4f} m/s",
             )
+    if figures["speed_error_rms"] is not None:
+        row("speed at VLO less the target, RMS", f"{figures['speed_error_rms']:.4f} m/s")
     rms, worst = figures["com_error_rms"], figures["com_error_max"]
     for axis in ("x", "y"):
         row(

@@ -32,8 +32,10 @@ class GuardOptions:
     """When a touchdown or a liftoff is believed.
 
     Attributes:
-        shortest_swing: of sqrt(l0 / g): earlier contacts are the foot scuffing at liftoff.
-        overstretch: of l0: a rear leg longer than l0 by that is let go, whatever the path says.
+        shortest_swing: shortest time in the air, over sqrt(l0 / g). An earlier contact is the
+            foot that scuffs at liftoff.
+        overstretch: share of l0. A rear leg that is longer than l0 by it is let go, whatever the
+            path says.
         liftoff_angle: direction beta from the rear foot to the CoM [rad, from forward
             horizontal] at which that foot lifts off; beta decreases from pi to 0 as the robot
             moves forward. None: "at the same configuration (namely, the same beta_l) as that

@@ -32,15 +32,15 @@ class PhaseControl:
     """What a phase needs.
 
     Attributes:
-        tasks: of the whole-body QP.
+        tasks: the tasks of the whole-body QP.
         swings: legs whose feet are in the air and follow a reference to their next foothold.
         clock: how the robot is located on the path.
-        momentum_speed: the speed that is sensed includes the angular momentum about the CoM;
-            it needs a stance foot.
+        momentum_speed: whether the sensed speed includes the angular momentum about the CoM;
+            this needs a stance foot.
         unloads: legs whose normal force is kept near the template's, so that they have no load
             left to lift off with.
-        weighs: the load estimate listens.
-        trims: the momentum trim acts.
+        weighs: whether the load estimate observes this phase.
+        trims: whether the momentum trim acts in this phase.
     """
 
     tasks: tuple[Task, ...]
@@ -53,7 +53,7 @@ class PhaseControl:
 
 
 Phases = Mapping[Phase | str, PhaseControl]
-"""By phase, or by the name of a node, which comes first."""
+"""What each phase needs. A key is a phase or a node's name; the node's entry comes first."""
 
 PHASES: Phases = {
     Phase.F: PhaseControl(
@@ -79,5 +79,13 @@ PHASES: Phases = {
 
 
 def phase_control(phases: Phases, node: Node) -> PhaseControl:
-    """The entry of a node."""
+    """Look up what the controller does in a node: the node's own entry, else its phase's.
+
+    Args:
+        phases: the table.
+        node: the automaton's node.
+
+    Raises:
+        KeyError: if the table has neither entry.
+    """
     return phases[node.name] if node.name in phases else phases[node.phase]

@@ -32,9 +32,9 @@ class SectionReport:
     """What the controller knew and chose at a section.
 
     Attributes:
-        time: of the section [s].
-        section: which.
-        state: (3,) dx/dt (as the phase before senses it), y, dy/dt.
+        time: at which the section was reached [s].
+        section: VLO or APEX.
+        state: (3,) dx/dt (as the phase before senses it), y, dy/dt [m/s, m, m/s].
         goal: the stride that begins, and where it is to lead.
         decision: the planner's choice for it.
         offset: (3,) the planner's offset estimate.

@@ -17,13 +17,13 @@ class Station:
     """Where the robot is on the automaton, and what that asks for.
 
     Attributes:
-        node: of the automaton.
+        node: the automaton's node.
         control: the phase's entry in the table.
-        tasks: its rows.
-        com: the task that follows the template's CoM, None without.
+        tasks: the rows of the phase's tasks.
+        com: the task that follows the template's CoM; None where there is none.
         ways: edges to other nodes, in order.
-        awaited: the leg that is to touch down, None where none is.
-        trimmed: the momentum trim acts somewhere in the stride.
+        awaited: the leg that is to touch down; None where none is.
+        trimmed: whether the momentum trim acts somewhere in the stride.
     """
 
     node: Node
@@ -36,12 +36,12 @@ class Station:
 
 
 def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station]:
-    """A station for each node, by its name.
+    """Make a station for each node, by its name.
 
     Args:
-        automaton: of the nodes.
+        automaton: whose nodes.
         nv: degrees of freedom of the robot.
-        phases: what the controller does in each.
+        phases: what the controller does in each phase.
     """
     trimmed = {
         node.name

@@ -114,7 +114,7 @@ class StridePlanning:
 
     @property
     def planner(self) -> Planner:
-        """Of the present stride."""
+        """The planner of the present stride."""
         return self.planner_of(self.reports[-1].goal)
 
     def planner_of(self, goal: StrideGoal) -> Planner:
@@ -259,7 +259,10 @@ class StridePlanning:
         return awaited and late and not self.reaching
 
     def reach_on(self, node: Node, sensed: Sensed, now: float) -> None:
-        """The ground is lower than was thought: the template goes on without a touchdown."""
+        """The ground is lower than was thought: the template goes on without a touchdown.
+
+        Arguments as for :meth:`follow`.
+        """
         self.follow(node, sensed, now, self.options.angle_drop)
 
     def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
@@ -279,7 +282,14 @@ class StridePlanning:
         )
 
     def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> None:
-        """Plan again from here; until a leg lands, the stride's controls are still free."""
+        """Plan again from here; until a leg lands, the stride's controls are still free.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            phase_time: time along the path [s].
+            now: time [s].
+        """
         report = self.reports[-1]
         if node.name == self.automaton.starts[report.goal.stride]:
             z = self._back_to_section(node, report, sensed)

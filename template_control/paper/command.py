@@ -32,7 +32,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reproduce what was asked for."""
+    """Reproduce what was asked for.
+
+    Raises:
+        ParameterError: if there is no such reproduction.
+    """
     if options.name not in REPRODUCTIONS:
         raise ParameterError(
             f"no reproduction {options.name!r}: give one of {', '.join(REPRODUCTIONS)}"

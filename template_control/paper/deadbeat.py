@@ -81,9 +81,15 @@ def backward_set(
 
 
 def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Array:
-    """VLO states (n, 3) after one exact step with the controls another map finds.
+    """Walk one exact step from each state, with the controls that a map finds for it.
 
-    NaN where the step fails.
+    Args:
+        found: the states; the search for controls begins at the exact step's.
+        gait: the equilibrium that the controls aim at.
+        kind: of the map that the controls are found on.
+
+    Returns:
+        (n, 3) VLO states after the step, NaN where it fails.
     """
     p = gait.parameters
     slots = (Slot.TOUCHDOWN_ANGLE, Slot.K_SD)
@@ -104,15 +110,18 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
 def settles(
     ends: Array, branch: list[BranchPoint], gait: WalkingGait, limit: int = 50
 ) -> NDArray[np.bool_]:
-    """Whether passive walking from ``ends`` (n, 3) converges to the equilibria of a branch.
+    """Whether passive walking from each state converges to the equilibria of a branch.
 
     The touchdown angle is that of the branch's equilibrium with the state's energy.
 
     Args:
-        ends: VLO states; NaN does not settle.
+        ends: (n, 3) VLO states; NaN does not settle.
         branch: stable equilibria with the height of ``gait``, energy rising or falling.
         gait: for the template and the height.
         limit: steps to take.
+
+    Returns:
+        (n,) whether it converges.
     """
     p = gait.parameters
     order = np.argsort([point.energy for point in branch])
@@ -130,12 +139,12 @@ def settles(
 def inside_share(
     found: DeadbeatSet, settled: NDArray[np.bool_], least_angles: Array
 ) -> tuple[Array, float]:
-    """Share of the set that settles, of the states whose step has at least a given angle.
+    """Share of the set's states that settle, among those with at least a given touchdown angle.
 
     Args:
         found: the set.
         settled: (n,) from :func:`settles`.
-        least_angles: (m,) alpha_min [rad].
+        least_angles: (m,) alpha_min, the least touchdown angle of the step [rad].
 
     Returns:
         (m,) shares, NaN where no state is left; the least angle from which all settle [rad].

@@ -101,6 +101,10 @@ def study(grid: Grid | None = None, parameters: SlipParameters | None = None) ->
 
     A run is valid if the exact step completes and its energy allows the next touchdown,
     (29) and (30).
+
+    Args:
+        grid: numbers of points; None for the default ones.
+        parameters: the template, whose stiffness the grid replaces; None for Table IV's.
     """
     p = parameters or SlipParameters()
     z, u = (grid or Grid()).states(p)

@@ -96,7 +96,15 @@ def start_state(gait: WalkingGait) -> tuple[float, float, float]:
 
 
 def sections(gait: WalkingGait, z: Array) -> Array:
-    """y, phi, E (n, 3) of VLO states (n, 3), with the template's formulas."""
+    """y, phi and energy of VLO states, with the template's formulas.
+
+    Args:
+        gait: its template counts.
+        z: (n, 3) dx/dt, y, dy/dt at VLO [m/s, m, m/s].
+
+    Returns:
+        (n, 3) y [m], phi [rad, positive downward], E [J].
+    """
     energy = np.asarray(VLO.energy(gait.parameters, z))
     return np.column_stack((z[:, 1], velocity_angle(z), energy))
 
@@ -104,7 +112,17 @@ def sections(gait: WalkingGait, z: Array) -> Array:
 def robot_walk(
     planner: str, plant: str, steps: int = STEPS, beta: float | None = None
 ) -> tuple[Walk, Record]:
-    """The robot from z_0; ``beta`` is a predefined liftoff direction [rad]."""
+    """Let the five-link robot walk from z_0.
+
+    Args:
+        planner: key of :data:`PLANNERS`.
+        plant: key of :data:`PLANTS`.
+        steps: how many at most.
+        beta: predefined liftoff direction, from forward horizontal [rad]; None for the template's.
+
+    Returns:
+        VLO states, and the whole record.
+    """
     gait = _gait()
     world, tuning = PLANTS[plant]
     options = SimulationOptions(
@@ -118,7 +136,10 @@ def robot_walk(
 
 
 def template_walk(planner: str, steps: int = STEPS) -> Walk:
-    """The template itself, integrated exactly, with the planner that the robot has."""
+    """Let the template itself walk from z_0, integrated exactly, with a planner of the robot's.
+
+    Arguments as for :func:`robot_walk`.
+    """
     gait = _gait()
     chooses, step = PLANNERS[planner](gait), ReturnMap(gait.parameters)
     states, fall = [np.array(start_state(gait))], ""

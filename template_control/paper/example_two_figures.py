@@ -34,7 +34,15 @@ class Liftoff:
 
 
 def beginning(record: Record, seconds: float) -> Record:
-    """The samples of the first ``seconds`` of a run."""
+    """Cut a run down to its first seconds.
+
+    Args:
+        record: the run.
+        seconds: time at which the samples end [s].
+
+    Returns:
+        The run with fewer samples; its sections and its metadata are still all there.
+    """
     count, end = len(record.time), int(np.searchsorted(record.time, seconds))
     cut = {
         f.name: getattr(record, f.name)[:end]
@@ -85,12 +93,12 @@ def states_figure(
     plants: tuple[str, ...],
     target: Array,
 ) -> Figure:
-    """y, phi, E at VLO by step; a row a plant, a line a planner.
+    """y, phi and E at VLO over the steps: a row of panels for each plant, a line for each planner.
 
     Args:
-        states: (steps + 1, 3) y [m], phi [rad], E [J] by planner and plant.
-        planners, plants: in order.
-        target: (3,) the equilibrium.
+        states: (steps + 1, 3) y [m], phi [rad], E [J] of each walk, by (planner, plant).
+        planners, plants: names in the order they are drawn in.
+        target: (3,) y, phi, E of the equilibrium.
     """
     figure = Figure(figsize=(9.5, 1.7 * len(plants) + 0.6), layout="constrained")
     panels = figure.subplots(len(plants), 3, sharex=True, sharey="col", squeeze=False)
@@ -122,6 +130,10 @@ def liftoff_figure(settled: Record, records: dict[str, Record]) -> Figure:
     """CoM of a settled walk, and torques of a first step with each liftoff rule.
 
     A step is shown from touchdown to touchdown.
+
+    Args:
+        settled: a run that ends on its gait; one of its last steps is shown.
+        records: at most five runs by the name of their liftoff rule, every sample kept.
     """
     figure = Figure(figsize=(9.0, 2.2 * (len(records) + 1)), layout="constrained")
     panels = figure.subplots(len(records) + 1, 1)

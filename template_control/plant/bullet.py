@@ -61,8 +61,12 @@ class PlantOptions:
     Attributes:
         friction: Coulomb coefficient between foot and ground.
         time_step: physics step [s].
-        mass_scale: every link's mass and inertia times this (the controller is not told).
-        ground_step: a step of the ground (the controller is not told); None for flat ground.
+        mass_scale: factor of every link's mass and inertia; the controller does not know it.
+        ground_step: a step of the ground, which the controller does not know; None for flat
+            ground.
+
+    Raises:
+        ParameterError: if a number is not positive and finite.
     """
 
     friction: float = 0.7
@@ -148,14 +152,14 @@ class BulletPlant:
             p.setJointMotorControl2(body, joint, p.VELOCITY_CONTROL, force=0.0, physicsClientId=c)
 
     def reset(self, q: Array, v: Array) -> None:
-        """Place the robot at (q, v); only for the start of a run."""
+        """See :meth:`~.plant.Plant.reset`."""
         for joint, position, velocity in zip(self.joints, q, v, strict=True):
             pybullet.resetJointState(
                 self.body, joint, position, velocity, physicsClientId=self.client
             )
 
     def read(self, q: Array, v: Array) -> None:
-        """Write the measured configuration and velocity (nv,) into ``q`` and ``v``."""
+        """See :meth:`~.plant.Plant.read`."""
         states = pybullet.getJointStates(self.body, self.joints, physicsClientId=self.client)
         for i, state in enumerate(states):
             q[i] = state[0]

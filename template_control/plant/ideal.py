@@ -33,11 +33,14 @@ _DRIFT = 1e-12  # constraint error [m, m/s] that is projected away
 
 @dataclass(frozen=True)
 class IdealOptions:
-    """What the ideal world is like; friction is not modelled, stance feet stick.
+    """What the ideal world is like. Friction is not modelled: stance feet stick.
 
     Attributes:
         time_step: period of the torques [s]; one step of the integrator.
-        mass_scale: every link's mass and inertia times this (the controller is not told).
+        mass_scale: factor of every link's mass and inertia; the controller does not know it.
+
+    Raises:
+        ParameterError: if a number is not positive and finite.
     """
 
     time_step: float = 1e-3
@@ -98,7 +101,7 @@ class IdealPlant:
         self._trunk_corners = _trunk_corners(self.robot)
 
     def reset(self, q: Array, v: Array) -> None:
-        """Place the robot at (q, v); only for the start of a run.
+        """See :meth:`~.plant.Plant.reset`.
 
         A foot within 1 um of the ground that does not leave it is on it, and stops at once.
         """
@@ -112,7 +115,7 @@ class IdealPlant:
         self.impacts.clear()
 
     def read(self, q: Array, v: Array) -> None:
-        """Write the configuration and velocity (nv,) into ``q`` and ``v``."""
+        """See :meth:`~.plant.Plant.read`."""
         q[:], v[:] = self._q, self._v
 
     def contact_forces(self, out: Array) -> None:
@@ -159,7 +162,7 @@ class IdealPlant:
         self._commit(*self._flow(left))
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """See :class:`~.plant.Plant`; there is nothing to give back."""
 
     def __enter__(self) -> IdealPlant:
         return self

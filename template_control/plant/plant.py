@@ -19,33 +19,57 @@ class Plant(Protocol):
     """A robot in a world, driven by joint torques and a push on its trunk, nothing else."""
 
     def reset(self, q: Array, v: Array) -> None:
-        """Place the robot at (q, v); only for the start of a run."""
+        """Place the robot in a state; only for the start of a run.
+
+        Args:
+            q: (nv,) configuration [m, rad].
+            v: (nv,) velocity [m/s, rad/s].
+        """
 
     def read(self, q: Array, v: Array) -> None:
-        """Write the measured configuration and velocity (nv,) into ``q`` and ``v``."""
+        """Write the robot's state into ``q`` and ``v``.
+
+        Args:
+            q: (nv,) overwritten with the configuration [m, rad].
+            v: (nv,) overwritten with the velocity [m/s, rad/s].
+        """
 
     def contact_forces(self, out: Array) -> None:
-        """Write the ground's mean force on each foot (2, 2) [N] in the last step into ``out``."""
+        """Write the ground's mean force on each foot during the last step into ``out``.
+
+        Args:
+            out: (2, 2) overwritten with x and y of each foot's force [N].
+        """
 
     def trunk_touches_ground(self) -> bool:
         """True where the trunk itself lies on the ground."""
 
     def step(self, torque: Array, push: float = 0.0) -> None:
-        """Advance one time step with ``torque`` (nu,) [N m] and ``push`` [N] on the trunk."""
+        """Advance one time step.
+
+        Args:
+            torque: (nu,) joint torques, held during the step [N m].
+            push: horizontal force on the trunk's centre of mass, forward positive [N].
+        """
 
     def close(self) -> None:
         """Give back what the plant holds."""
 
 
 def plant_name(options: PlantOptions | IdealOptions) -> str:
-    """``ideal`` or ``pybullet``."""
+    """Name of the plant that ``options`` describe: ``ideal`` or ``pybullet``."""
     return "ideal" if isinstance(options, IdealOptions) else "pybullet"
 
 
 def open_plant(
     robot: PlanarBiped, options: PlantOptions | IdealOptions
 ) -> AbstractContextManager[Plant]:
-    """The plant that ``options`` describe, to be used as a context manager."""
+    """Make the plant that ``options`` describe, to be used as a context manager.
+
+    Args:
+        robot: the controller's model; the plant makes its own robot from it.
+        options: the world; their type chooses the plant.
+    """
     if isinstance(options, IdealOptions):
         return IdealPlant(robot, options)
     return BulletPlant(robot, options)

@@ -15,16 +15,16 @@ _STDOUT, _STDERR = 1, 2
 
 @contextmanager
 def stdout_to_stderr() -> Iterator[None]:
-    """Within it, everything written to standard output, by C code too, goes to stderr."""
+    """Send everything that is written to standard output, also by C code, to stderr."""
     with _redirected((_STDOUT,), _STDERR):
         yield
 
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Within it, nothing is written to standard output and stderr, by C code neither.
+    """Hold back everything that is written to standard output and stderr, also by C code.
 
-    If an error leaves it, what was held back comes on stderr after all: it may tell why.
+    If an error ends the ``with`` block, it is written to stderr after all: it may tell why.
     """
     with tempfile.TemporaryFile() as held:
         try:

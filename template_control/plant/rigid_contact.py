@@ -26,17 +26,17 @@ _ROUNDING = 1e-9  # relative: forces and accelerations this small have no sign
 def solve(
     mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, pressed: tuple[int, ...]
 ) -> tuple[Array, Array]:
-    """x and the contacts' forces, with the contacts ``pressed`` held.
+    """Solve the system with some of the contacts held.
 
     Args:
         mass_matrix: (nv, nv) M.
         right: (nv,) right-hand side.
         jacobian: (2, 2, nv) rows x and y of either contact.
-        gamma: (2, 2).
-        pressed: which contacts.
+        gamma: (2, 2) x and y of either contact.
+        pressed: indices of the contacts that are held.
 
     Returns:
-        x (nv,), and f (2, 2), zero for the contacts that are not pressed.
+        x (nv,), and f (2, 2), zero for the contacts that are not held.
 
     Raises:
         numpy.linalg.LinAlgError: if the contacts' rows depend on each other.
@@ -64,13 +64,23 @@ def pressing(
     gamma: Array,
     touching: Iterable[int],
 ) -> tuple[tuple[int, ...], Array, Array, bool]:
-    """Which of the ``touching`` contacts press: no pulling, and no sinking of the others.
+    """Find which of the touching contacts press: none of them pulls, none of the others sinks.
 
-    As many as possible are kept. Serves accelerations and impacts alike.
+    As many contacts as possible are kept. The function serves accelerations and impacts alike.
+
+    Args:
+        mass_matrix: (nv, nv) M.
+        right: (nv,) right-hand side.
+        jacobian: (2, 2, nv) rows x and y of either contact.
+        gamma: (2, 2) x and y of either contact.
+        touching: indices of the contacts that touch the ground.
 
     Returns:
-        The contacts, x and f as :func:`solve` returns them, and False where every choice
-        would pull or sink; all contacts are then held, whatever they pull.
+        The contacts that press; x and f as :func:`solve` returns them; and False where every
+        choice would pull or sink. All contacts are then held, whatever they pull.
+
+    Raises:
+        numpy.linalg.LinAlgError: if the contacts' rows depend on each other.
     """
     touching = tuple(touching)
     for held in _subsets(touching):

@@ -46,6 +46,9 @@ class FiveLink:
         hip_width: between the hips; the plane does not feel it [m].
         foot_radius: of the spheres [m].
         hip_range, knee_range: forward pitch and knee flexion positive [rad].
+
+    Raises:
+        RobotError: if a number of a link is not positive and finite.
     """
 
     name: str

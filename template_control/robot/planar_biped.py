@@ -27,6 +27,8 @@ _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 class PlanarBiped:
     """Model of a planar biped and its kinematics and dynamics at the last :meth:`update`.
 
+    :meth:`from_urdf` makes one from a file. The constructor takes ``path``, ``urdf``, ``model``,
+    ``feet``, ``foot_radius`` and ``walk`` of the attributes.
     Attributes (constant):
         name: the URDF's robot name.
         path: the URDF file.
@@ -51,13 +53,15 @@ class PlanarBiped:
         mass_matrix: (nv, nv) M(q).
         nonlinear_effects: (nv,) C(q, v) v + g(q) [N, N m].
         com, com_velocity: (2,) [m, m/s].
-        com_jacobian: (2, nv); com_bias: (2,) its dJ/dt v [m/s^2].
+        com_jacobian: (2, nv) maps v to the CoM's velocity.
+        com_bias: (2,) dJ/dt v of this Jacobian [m/s^2].
         angular_momentum: about the CoM, forward pitch positive [kg m^2/s].
         angular_momentum_jacobian: (nv,) its row of the centroidal momentum matrix.
         angular_momentum_bias: that row's time derivative times v [N m].
         foot_position: (2, 2) lowest point of each foot sphere [m].
         foot_velocity: (2, 2) of the material point there [m/s].
-        foot_jacobian: (2, 2, nv); foot_bias: (2, 2) its dJ/dt v for rolling [m/s^2].
+        foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
+        foot_bias: (2, 2) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
     """
 
     def __init__(

@@ -17,10 +17,14 @@ _CLOSE = 1e-4  # [m]
 
 
 def check_planar(path: Path, model: pin.Model) -> None:
-    """Whether base and legs are those of a planar biped with hips and knees.
+    """Check that base and legs are those of a planar biped with hips and knees.
+
+    Args:
+        path: of the URDF, for the message.
+        model: of the robot.
 
     Raises:
-        RobotError: naming the joint that is otherwise.
+        RobotError: naming the joint that is otherwise, or has no torque limit.
     """
     kinds = [joint.shortname() for joint in model.joints][1:]
     names = list(model.names)[1:]
@@ -52,10 +56,10 @@ def check_planar(path: Path, model: pin.Model) -> None:
 
 
 def check_hips(path: Path, model: pin.Model, hips: Sequence[int]) -> None:
-    """Whether the trunk turns about the hips: the height of one is the other's.
+    """Check that the trunk turns about the hips: the height of one is the other's.
 
     Args:
-        path: for the message.
+        path: of the URDF, for the message.
         model: of the robot.
         hips: indices of the two hip joints.
 
@@ -73,6 +77,12 @@ def check_hips(path: Path, model: pin.Model, hips: Sequence[int]) -> None:
 
 def foot_radius_of(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> float:
     """Radius of the feet's spheres [m].
+
+    Args:
+        path: of the URDF, for the message.
+        urdf: its text, in which the collision shapes are.
+        model: of the robot, made from this text.
+        feet: names of the two foot links.
 
     Raises:
         RobotError: if a foot has no sphere about its link's origin, or the radii differ.

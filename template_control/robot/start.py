@@ -40,11 +40,14 @@ class Pose:
 
 
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
-    """(q, v) of a pose.
+    """State of a robot whose CoM and feet are in a pose.
 
     Args:
         robot: the model; its last update is overwritten.
         pose: what is wanted.
+
+    Returns:
+        (nv,) configuration q [m, rad]; (nv,) velocity v [m/s, rad/s].
 
     Raises:
         RobotError: if the legs do not reach, or joints would be beyond their limits.
@@ -123,14 +126,18 @@ def state_at_vlo(
     swing_velocity: Array,
     pitch: float = 0.0,
 ) -> tuple[Array, Array]:
-    """(q, v) with the CoM over the stance foot at x = 0 and the VLO state ``z``.
+    """State of a robot at VLO, with the stance foot at x = 0.
 
     Args:
         robot: the model; its last update is overwritten.
-        z: (3,) dx/dt, y, dy/dt; dx/dt is the angular momentum about the foot over m y.
+        z: (3,) dx/dt, y, dy/dt [m/s, m, m/s]; dx/dt is the angular momentum about the foot over
+            m y.
         stance: index of the stance foot.
         swing_position, swing_velocity: (2,) of the swing foot [m, m/s].
         pitch: of the trunk, at rest [rad].
+
+    Returns:
+        q and v as of :func:`state_in`.
 
     Raises:
         RobotError: as :func:`state_in`.

@@ -49,7 +49,7 @@ class Level:
     """What came of one disturbance at one level.
 
     Attributes:
-        level: [SI], of the robot.
+        level: the disturbance's size for this robot [SI].
         succeeded, fell, astray: how many trials; astray is on its feet but not on its gait.
     """
 
@@ -74,7 +74,7 @@ class Finding:
     """What one disturbance does to a robot.
 
     Attributes:
-        disturbance: which.
+        disturbance: the one that was raised.
         levels: those tried, from mild to severe.
     """
 
@@ -83,22 +83,25 @@ class Finding:
 
     @property
     def breaking_point(self) -> float | None:
-        """The severest level up to which all trials of all levels succeed; None: not one."""
+        """The severest level up to which every trial of each level succeeds, or None."""
         return _last(self.levels, [level.rate >= 1.0 for level in self.levels])
 
     @property
     def half_point(self) -> float | None:
-        """The severest level up to which half of the trials of each level succeed, or more."""
+        """The severest level up to which at least half of each level's trials succeed, or None."""
         return _last(self.levels, [level.rate >= _HALF for level in self.levels])
 
     @property
     def standing_point(self) -> float | None:
-        """The severest level up to which no trial falls."""
+        """The severest level up to which no trial falls, or None."""
         return _last(self.levels, [level.fell == 0 for level in self.levels])
 
     @property
     def broken(self) -> bool:
-        """Whether it need not be raised further: all fall, or twice more than half."""
+        """Whether the disturbance need not be raised further.
+
+        All trials of the last level fell, or more than half of the trials at each of the last two.
+        """
         rates = [level.standing for level in self.levels]
         twice = len(rates) > 1 and max(rates[-2:]) < _HALF
         return bool(rates) and (rates[-1] == 0.0 or twice)
@@ -129,7 +132,15 @@ class Robustness:
 
 
 def off_gait(record: Record, gait: WalkingGait) -> tuple[float, float]:
-    """Mean forward speed and VLO height of the last 5 steps over the gait's, less one."""
+    """How far a walk's last 5 steps are from its gait, relative to the gait.
+
+    Args:
+        record: a run of at least 5 steps, without a fall.
+        gait: the gait to compare with.
+
+    Returns:
+        Mean forward speed over the gait's, less one; mean VLO height over the gait's, less one.
+    """
     x = np.interp(record.section_time[[-1 - _LAST, -1]], record.time, record.com[:, 0])
     speed = (x[1] - x[0]) / (record.section_time[-1] - record.section_time[-1 - _LAST])
     height = record.section_state[-_LAST:, 1].mean()
@@ -141,9 +152,9 @@ def trial(robot: str, disturbance: str, level: float, number: int) -> dict[str, 
 
     Args:
         robot: name or URDF path.
-        disturbance: name.
-        level: [SI].
-        number: of the trial.
+        disturbance: name of the disturbance.
+        level: the disturbance's size for this robot [SI].
+        number: of the trial, from 0; trials of a level differ by it.
 
     Returns:
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.

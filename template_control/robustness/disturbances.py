@@ -45,8 +45,8 @@ class Situation:
     """Where a disturbance meets the robot.
 
     Attributes:
-        robot: its last update is overwritten.
-        gait: that is walked.
+        robot: the model; its last update is overwritten.
+        gait: the gait that is walked.
     """
 
     robot: PlanarBiped
@@ -58,14 +58,15 @@ class Situation:
         return Scale.of(self.gait.parameters)
 
     def footholds(self, start: tuple[float, float, float], steps: int) -> NDArray[np.float64]:
-        """Where the robot treads when it walks undisturbed, (steps + 1,) [m].
+        """Where the robot treads when it walks undisturbed.
 
         Args:
-            start: (3,) VLO state.
+            start: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
             steps: how many.
 
         Returns:
-            The gait's footholds if it falls: disturbed it will fall as well.
+            (steps + 1,) x of the footholds [m]; the gait's own if the robot falls, as it will then
+            fall with the disturbance as well.
         """
         options = SimulationOptions(steps=steps, start=start)
         record = simulate(self.robot, LqrPlanner(self.gait), options)
@@ -78,11 +79,11 @@ class Situation:
 
 @dataclass(frozen=True)
 class Unit:
-    """What levels are shown in.
+    """The unit that levels are shown in.
 
     Attributes:
-        name: after the number; "" for a coefficient.
-        factor: units in one of SI; negative where a level is a share taken away.
+        name: stands after the number; "" for a coefficient.
+        factor: one SI unit in this unit; negative where a level is a share taken away.
     """
 
     name: str
@@ -98,11 +99,11 @@ class Disturbance:
         title: in tables and figures.
         unit: that levels are shown in.
         levels: for the reference template [SI], from mild to severe.
-        trials: at each level.
-        size: of a template's level over the reference's.
+        trials: number of trials at each level.
+        size: factor from the reference template's levels to a template's.
         options: of the run at a level [SI] and a trial's index.
-        passing: it comes once and the walk must be back on its gait; otherwise it lasts from
-            the start and the walk must only go on.
+        passing: whether it comes only once: the walk must then be back on its gait at the end.
+            Otherwise it lasts from the start, and the walk must only go on.
         grain: levels are whole multiples of it, at least one; 0 for any levels [SI].
     """
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-_RENAMED = {
+RENAMED = {
     "vlo_time": "section_time",
     "vlo_state": "section_state",
     "vlo_predicted": "section_predicted",
@@ -17,6 +17,7 @@ _RENAMED = {
     "vlo_load": "section_load",
     "vlo_trim": "section_trim",
 }
+"""Fields of format 2, as they are called now."""
 
 
 def from_walk(fields: dict[str, Any]) -> dict[str, Any]:
@@ -28,7 +29,7 @@ def from_walk(fields: dict[str, Any]) -> dict[str, Any]:
     Raises:
         KeyError: if one of them is missing.
     """
-    now = {_RENAMED.get(name, name): value for name, value in fields.items()}
+    now = {RENAMED.get(name, name): value for name, value in fields.items()}
     metadata = dict(now["metadata"])
     count = len(now["section_time"])
     target = np.array(metadata["gait_vlo"])

@@ -21,10 +21,10 @@ class Push:
     """A horizontal force on the trunk.
 
     Attributes:
-        impulse: [N s], forward positive.
-        step: the push begins in this step (0 is the first) ...
-        phase: ... this share of the gait's step duration after its VLO.
-        duration: [s].
+        impulse: force times duration, forward positive [N s].
+        step: number of the step in which the push begins; 0 is the first.
+        phase: time from this step's VLO to the push, over the gait's step duration.
+        duration: how long the force acts [s].
     """
 
     impulse: float
@@ -38,11 +38,12 @@ class FallOptions:
     """When a foot touches the ground, and when a robot counts as fallen.
 
     Attributes:
-        contact_force: of the weight: what a foot must carry to count as touching. Less is the
-            rattle of a contact solver.
-        height: of the template's rest length: the hips nearer to the ground than that.
-        pitch: of the trunk [rad].
-        patience: durations of the gait's step without a section.
+        contact_force: share of the weight that a foot must carry to count as touching. Less is
+            the rattle of a contact solver.
+        height: share of the template's rest length. A robot whose hips are nearer to the ground
+            has fallen.
+        pitch: a trunk that leans further than this has fallen [rad].
+        patience: number of the gait's step durations that may pass without a section.
     """
 
     contact_force: float = 0.005
@@ -56,11 +57,11 @@ class SimulationOptions:
     """How a run goes.
 
     Attributes:
-        steps: from section to section, how many at most; None: to the end of the route, or 50
-            where it has none.
+        steps: largest number of steps from section to section. None: the run goes to the end of
+            the route, or makes 50 steps where the route has no end.
         plant: the world; the type of its options says which.
         embedding: the controller's tuning.
-        start: (3,) VLO state to start in; None for the route's.
+        start: (3,) VLO state to start in [m/s, m, m/s]; None for the route's.
         pose: CoM and feet to start with; None: over the stance foot at VLO. A route that
             begins at another section needs it.
         pushes: disturbances.
@@ -70,6 +71,10 @@ class SimulationOptions:
             physics steps.
         record_every: keep every n-th sample.
         falls: when the robot counts as fallen.
+
+    Raises:
+        ParameterError: if a number is less than 1, or the delay is not a whole number of physics
+            steps up to 1 s.
     """
 
     steps: int | None = None

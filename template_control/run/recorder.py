@@ -36,7 +36,7 @@ class Truth(NamedTuple):
 
 
 class Recorder:
-    """One row a sample in a table that grows by doubling.
+    """Records a run in a table, one row for each sample, that grows by doubling.
 
     Args:
         controller: whose references and steps are recorded.

@@ -58,7 +58,15 @@ class Sensors:
         self._deviation = np.outer((options.position_noise, options.velocity_noise), scale)
 
     def measure(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """The measured configuration and velocity (nv,); the true ones are left alone."""
+        """Measure a state; the true arrays are left alone.
+
+        Args:
+            q: (nv,) true configuration [m, rad].
+            v: (nv,) true velocity [m/s, rad/s].
+
+        Returns:
+            The measured q and v; without noise these are the true arrays themselves.
+        """
         if not self.noisy:
             return q, v
         noise = self._deviation * self._draws.standard_normal(self._deviation.shape)

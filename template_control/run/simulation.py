@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.robot_route import robot_route
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
@@ -27,6 +28,7 @@ from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import Route
+from template_control.slip.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -34,7 +36,15 @@ _STEPS = 50  # of a run on a route that does not end, where the options do not s
 
 
 def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:
-    """The gait's VLO state with up to 5 % more or less speed and 2 % of l0 in height, drawn."""
+    """The gait's VLO state with up to 5 % more or less speed and 2 % of l0 in height, drawn.
+
+    Args:
+        gait: whose VLO state is changed.
+        seed: of the draws.
+
+    Returns:
+        dx/dt, y, dy/dt [m/s, m, m/s].
+    """
     z, length = gait.vlo, gait.parameters.rest_length
     draw = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
     height = z[1] + 0.02 * draw[1] * length
@@ -43,7 +53,7 @@ def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:
 
 def simulate(
     robot: PlanarBiped,
-    route: Route | Planner,
+    route: Route | Scenario | Planner,
     options: SimulationOptions | None = None,
     progress: Callable[[int], None] | None = None,
     planners: Planners | None = None,
@@ -55,8 +65,8 @@ def simulate(
 
     Args:
         robot: model of the controller, and whose URDF the plant loads.
-        route: which stride comes next and towards which state; or a planner, whose gait the
-            robot then keeps.
+        route: which stride comes next and towards which state; or a scenario, which is put on
+            the robot's template; or a planner, whose gait the robot keeps.
         options: how the run goes.
         progress: called with the number of completed steps after each.
         planners: one for each kind of stride of the route; by default
@@ -66,8 +76,11 @@ def simulate(
     Raises:
         RobotError: if the robot's legs do not reach the start.
         ParameterError: if there is no planner for a stride of the route, or no pose to start in.
+        ScenarioError: if the scenario asks for what the robot cannot do.
     """
     o = options or SimulationOptions()
+    if isinstance(route, Scenario):
+        route = robot_route(robot, route)
     if isinstance(route, Planner):
         controller = EmbeddingController(robot, route, o.embedding, automaton=automaton)
     else:

@@ -22,9 +22,11 @@ REFERENCE = SlipParameters()
 
 
 class Dimension(NamedTuple):
-    """What a number is measured in: metres to the power ``length``, seconds to ``time``.
+    """What a number is measured in; angles, shares and counts have no dimension.
 
-    Angles, shares and counts have no dimension.
+    Attributes:
+        length: power of metres.
+        time: power of seconds.
     """
 
     length: int = 0
@@ -37,17 +39,17 @@ TIME = Dimension(0, 1)
 SPEED = Dimension(1, -1)
 ACCELERATION = Dimension(1, -2)
 RATE = Dimension(0, -1)
-"""Of a damping or a bandwidth [1/s]."""
+"""The dimension of a damping or a bandwidth [1/s]."""
 RATE_SQUARED = Dimension(0, -2)
-"""Of a stiffness over a mass, and of angular accelerations [1/s^2]."""
+"""The dimension of a stiffness over a mass, and of an angular acceleration [1/s^2]."""
 PER_LENGTH_SQUARED = Dimension(-2, 0)
-"""Of the weight of a squared length."""
+"""The dimension of a squared length's weight [1/m^2]."""
 PER_SPEED_SQUARED = Dimension(-2, 2)
-"""Of the weight of a squared speed."""
+"""The dimension of a squared speed's weight [s^2/m^2]."""
 PER_ACCELERATION_SQUARED = Dimension(-2, 4)
-"""Of the weight of a squared acceleration."""
+"""The dimension of a squared acceleration's weight [s^4/m^2]."""
 PER_RATE_TO_THE_FOURTH = Dimension(0, 4)
-"""Of the weight of a squared angular acceleration."""
+"""The dimension of a squared angular acceleration's weight [s^4/rad^2]."""
 
 _KEY = "dimension"
 
@@ -71,11 +73,11 @@ def dimensions_of(options: Any) -> dict[str, tuple[Dimension, ...]]:
 
 @dataclass(frozen=True)
 class Scale:
-    """Units of a template over those of the reference.
+    """Units of a template over those of the reference template.
 
     Attributes:
-        length: l0 over l0.
-        time: sqrt(l0 / g) over sqrt(l0 / g).
+        length: l0 over the reference's l0.
+        time: sqrt(l0 / g) over the reference's.
     """
 
     length: float

@@ -27,10 +27,15 @@ class ExecutorLostError(Exception):
 
 
 def check_pickles(function: Callable[..., Any], executor: Executor | None) -> None:
-    """Find out before the first call whether worker processes can be sent the function.
+    """Check, before the first call, that the function can be sent to worker processes.
+
+    Args:
+        function: what the workers are to call.
+        executor: where they are; None for processes of this machine. An executor other than a
+            process pool is taken to send what it can call.
 
     Raises:
-        SweepError: if not.
+        SweepError: if the function cannot be pickled.
     """
     # Dask sends what pickle cannot.
     if executor is not None and not isinstance(executor, ProcessPoolExecutor):

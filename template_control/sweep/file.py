@@ -79,6 +79,11 @@ def name_of(function: Callable[..., Any]) -> str:
 def header(function: Callable[..., Any], seed: int, items: Iterable[Any]) -> dict[str, Any]:
     """What identifies a sweep: format, function, seed, number and SHA-256 of its plain items.
 
+    Args:
+        function: what the sweep calls; its name counts, not its code.
+        seed: what the items' seeds come from.
+        items: keyword arguments of each call, in order.
+
     Raises:
         SweepError: if the items or a partial's arguments are no plain data.
     """
@@ -191,6 +196,12 @@ class SweepFile:
 
     def append(self, index: int, item: Mapping[str, Any], seed: int, outcome: Outcome) -> None:
         """Write an item that finished; it is with the operating system when this returns.
+
+        Args:
+            index: place of the item in the sweep, from 0.
+            item: keyword arguments of its call.
+            seed: that :func:`~.sweep.item_seed` gives this item.
+            outcome: its result, as plain data, or its error.
 
         Raises:
             SweepError: if it cannot be written.

@@ -151,6 +151,10 @@ def item_seed(seed: int, index: int) -> int:
 
     It depends on these two numbers only: not on the order items run in, on the executor or on
     what an earlier run of the sweep had finished.
+
+    Args:
+        seed: of the whole sweep, not negative.
+        index: place of the item in the sweep, from 0.
     """
     return int(np.random.SeedSequence(seed, spawn_key=(index,)).generate_state(1, np.uint64)[0])
 

@@ -86,7 +86,7 @@ def gaits(automaton: Automaton) -> dict[str, tuple[str, ...]]:
 
 
 def choices(automaton: Automaton) -> list[tuple[str, str]]:
-    """Pairs of stride starts at the same section, the second of them no edge leads to.
+    """Pairs of stride starts at the same section; no edge leads to the second of them.
 
     Where a stride ends at the first, the next one may begin at the second instead.
     """

@@ -48,7 +48,13 @@ def _ground(axes: Axes, record: Record) -> None:
 
 
 def stick_diagram(record: Record, seconds: float = WINDOW, interval: float = 0.06) -> Figure:
-    """The robot every ``interval`` seconds with its CoM and the template's path (Fig. 12)."""
+    """The robot at regular times, with its CoM and the template's path (Fig. 12).
+
+    Args:
+        record: the run.
+        seconds: how much of its end is shown [s].
+        interval: time from one drawn pose to the next [s].
+    """
     w = window(record, seconds)
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     axes = figure.subplots()
@@ -76,7 +82,12 @@ def stick_diagram(record: Record, seconds: float = WINDOW, interval: float = 0.0
 
 
 def com_tracking(record: Record, seconds: float = WINDOW) -> Figure:
-    """CoM x and y against the template, and the errors, single stance shaded (Fig. 13a)."""
+    """CoM x and y against the template, and the errors, single stance shaded (Fig. 13a).
+
+    Args:
+        record: the run.
+        seconds: how much of its end is shown [s].
+    """
     w = window(record, seconds)
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True)
@@ -103,7 +114,12 @@ def com_tracking(record: Record, seconds: float = WINDOW) -> Figure:
 
 
 def joint_torques(record: Record, seconds: float = WINDOW) -> Figure:
-    """Joint torques with their limits, single stance shaded (Fig. 13b)."""
+    """Joint torques with their limits, single stance shaded (Fig. 13b).
+
+    Args:
+        record: the run.
+        seconds: how much of its end is shown [s].
+    """
     w = window(record, seconds)
     names, limits = record.metadata["joints"], record.metadata["torque_limit"]
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
@@ -122,7 +138,12 @@ def joint_torques(record: Record, seconds: float = WINDOW) -> Figure:
 
 
 def ground_forces(record: Record, seconds: float = WINDOW) -> Figure:
-    """Ground reaction forces of either foot with the template's leg forces."""
+    """Ground reaction forces of either foot with the template's leg forces.
+
+    Args:
+        record: the run.
+        seconds: how much of its end is shown [s].
+    """
     w = window(record, seconds)
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
@@ -166,7 +187,15 @@ FIGURES: dict[str, Callable[[Record], Figure]] = {
 
 
 def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Path]:
-    """Draw all figures of ``record`` into ``folder`` as PNG; returns their paths.
+    """Draw all :data:`FIGURES` of a run as PNG.
+
+    Args:
+        record: the run.
+        folder: where the files go; it must exist.
+        dpi: dots per inch of the files.
+
+    Returns:
+        The paths of the files.
 
     Raises:
         RecordError: if the folder cannot be written or the run has no samples.

@@ -123,7 +123,15 @@ def energy_figure(record: ScenarioRecord) -> Figure:
 
 
 def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Path]:
-    """Write the figures as PNG; a run without transitions has no energy figure."""
+    """Write the figures as PNG; a run without transitions has no energy figure.
+
+    Args:
+        record: the scenario's run.
+        folder: where the files go; it must exist.
+
+    Returns:
+        The paths of the files.
+    """
     figures = {"scenario": scenario_figure(record)}
     if {"wr", "rw"} & set(record.strides):
         figures["energies"] = energy_figure(record)

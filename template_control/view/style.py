@@ -13,7 +13,15 @@ WINDOW = 2.2  # [s], about four steps
 
 
 def window(record: Record, seconds: float = WINDOW) -> slice:
-    """Samples of the last ``seconds`` of the run."""
+    """Samples of the end of a run.
+
+    Args:
+        record: the run.
+        seconds: how much of its end [s].
+
+    Returns:
+        A slice of the record's samples.
+    """
     return slice(int(np.searchsorted(record.time, record.time[-1] - seconds)), None)
 
 
@@ -24,7 +32,13 @@ def single_stance(record: Record) -> NDArray[np.bool_]:
 
 
 def shade(axes: Axes, record: Record, w: slice) -> None:
-    """Grey over single stance, as in Fig. 13."""
+    """Shade single stance in grey, as in Fig. 13.
+
+    Args:
+        axes: a panel over time [s].
+        record: the run.
+        w: the samples that the panel shows, from :func:`window`.
+    """
     axes.fill_between(
         record.time[w],
         0.0,

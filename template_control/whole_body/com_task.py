@@ -37,7 +37,7 @@ class ComTask:
         return self.weight
 
     def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
-        """See :class:`~.task.Task`."""
+        """See :meth:`~.task.Task.write`."""
         (kp, kd), ref, now = self.gains, wanted.com, wanted.com_now
         height = now[1]
         moment = robot.mass * height

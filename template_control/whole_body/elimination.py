@@ -13,15 +13,24 @@ then hold to machine precision whatever the QP's tolerance.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from template_control.compiled import compiled
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@compiled
 def cholesky(matrix: Array, size: int) -> bool:
-    """Factor the leading ``size`` block in place (lower triangle); False if not positive."""
+    """Factor the leading block of a symmetric matrix in place; its lower triangle becomes L.
+
+    Args:
+        matrix: (n, n) of which only the lower triangle is read and overwritten.
+        size: rows of the block, at most n.
+
+    Returns:
+        False where the block is not positive definite; it is then half overwritten.
+    """
     for j in range(size):
         pivot = matrix[j, j]
         for k in range(j):
@@ -38,9 +47,15 @@ def cholesky(matrix: Array, size: int) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
-    """Solve in place for every column of ``columns`` (size, n) with a factor from above."""
+    """Solve L L^T x = b in place for several right-hand sides b.
+
+    Args:
+        factor: (n, n) matrix that :func:`cholesky` has factored.
+        size: rows of the factored block.
+        columns: (size, m) right-hand sides, one a column; overwritten with the solutions.
+    """
     for c in range(columns.shape[1]):
         for i in range(size):
             value = columns[i, c]
@@ -54,7 +69,7 @@ def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
             columns[i, c] = value / factor[i, i]
 
 
-@njit(cache=True)
+@compiled
 def eliminate(
     mass_matrix: Array,
     nonlinear_effects: Array,

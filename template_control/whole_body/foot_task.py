@@ -39,7 +39,7 @@ class FootTask:
         return self.weight
 
     def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
-        """See :class:`~.task.Task`."""
+        """See :meth:`~.task.Task.write`."""
         foot = wanted.feet[self.leg]
         (kp, kd), (hold_p, hold_d) = self.gains, self.hold_gains
         position, velocity = robot.foot_position[foot], robot.foot_velocity[foot]

@@ -36,7 +36,7 @@ class MomentumTask:
         return (self.weight,)
 
     def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
-        """See :class:`~.task.Task`."""
+        """See :meth:`~.task.Task.write`."""
         inertia = robot.mass * wanted.com_now[1] ** 2
         rows.jacobian[0] = robot.angular_momentum_jacobian / inertia
         rows.bias[0] = robot.angular_momentum_bias / inertia

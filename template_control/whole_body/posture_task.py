@@ -32,7 +32,7 @@ class PostureTask:
         return (self.weight,)
 
     def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
-        """See :class:`~.task.Task`."""
+        """See :meth:`~.task.Task.write`."""
         kp, kd = self.gains
         angle, rate = wanted.pitch_now
         rows.jacobian[0, _PITCH] = 1.0

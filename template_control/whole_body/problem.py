@@ -17,9 +17,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.whole_body.elimination import cholesky, eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
@@ -51,11 +51,11 @@ class Matrices(NamedTuple):
 
     Attributes:
         a_map: (nv, nu + 1) accelerations as an affine function of the torques.
-        f_map: (2 c, nu + 1) contact forces.
+        f_map: (2 c, nu + 1) contact forces as an affine function of the torques.
         factor: (nu, nu) L in its lower triangle.
         gradient: (nu,) L^-1 g.
         constraint: (nu + 3 c, nu) rows of unit length.
-        lower, upper: (nu + 3 c,).
+        lower, upper: (nu + 3 c,) bounds of the rows times w.
     """
 
     a_map: Array
@@ -67,7 +67,7 @@ class Matrices(NamedTuple):
     upper: Array
 
 
-@njit(cache=True)
+@compiled
 def assemble(
     mass_matrix: Array,
     nonlinear_effects: Array,
@@ -159,7 +159,7 @@ def assemble(
     return True
 
 
-@njit(cache=True)
+@compiled
 def _forward(factor: Array, vector: Array) -> None:
     """vector = L^-1 vector, in place."""
     for i in range(vector.shape[0]):
@@ -168,13 +168,19 @@ def _forward(factor: Array, vector: Array) -> None:
         vector[i] /= factor[i, i]
 
 
-@njit(cache=True)
+@compiled
 def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
-    """Joint torques [N m] of the QP's solution: tau_max * (L^-T w), kept within tau_max.
+    """Write the joint torques of the QP's solution, tau_max * (L^-T w), into ``out``.
 
-    They are rounded to 2^-24 of tau_max, near ProxQP's tolerance: its last digits depend on
-    where its workspace happens to lie in memory, and a walk near a fall would not be the same
-    twice.
+    They are kept within tau_max and rounded to 2^-24 of it, which is near ProxQP's tolerance.
+    The last digits of ProxQP's solution depend on where its workspace happens to lie in memory;
+    without the rounding a walk near a fall would not be the same twice.
+
+    Args:
+        factor: (nu, nu) L in its lower triangle, from :func:`assemble`.
+        w: (nu,) solution of the QP.
+        torque_limit: (nu,) tau_max [N m].
+        out: (nu,) overwritten with the torques [N m].
     """
     n = w.shape[0]
     for i in range(n - 1, -1, -1):
@@ -188,7 +194,7 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
         out[i] = share * torque_limit[i]
 
 
-@njit(cache=True)
+@compiled
 def _add_square(
     row: Array, row_weight: float, scale: Array, hessian: Array, gradient: Array
 ) -> None:
@@ -201,14 +207,21 @@ def _add_square(
             hessian[i, j] += left * row[j] * scale[j]
 
 
-@njit(cache=True)
+@compiled
 def follow(maps: Matrices, tau: Array, acceleration: Array, force: Array) -> None:
-    """Accelerations (nv,) and contact forces (2 c,) that the torques ``tau`` (nu,) bring about."""
+    """Write the accelerations and contact forces that joint torques bring about.
+
+    Args:
+        maps: affine maps that :func:`assemble` has filled.
+        tau: (nu,) joint torques [N m].
+        acceleration: (nv,) overwritten with the generalised accelerations [m/s^2, rad/s^2].
+        force: (2 c,) overwritten with x and y of the force on each stance foot [N].
+    """
     _affine(maps.a_map, tau, acceleration)
     _affine(maps.f_map, tau, force)
 
 
-@njit(cache=True)
+@compiled
 def _affine(matrix: Array, tau: Array, out: Array) -> None:
     """out = matrix[:, :-1] tau + matrix[:, -1]."""
     n = tau.shape[0]

@@ -47,9 +47,9 @@ class Task(Protocol):
         """Fill the task's rows.
 
         Args:
-            robot: updated.
+            robot: the model, updated to this tick.
             wanted: references and measurements of this tick.
-            rows: overwritten.
+            rows: views of the task's own rows, overwritten; entries that it never writes are 0.
         """
 
 
@@ -77,6 +77,11 @@ class TaskStack:
             self._parts.append((task, rows))
 
     def write(self, robot: PlanarBiped, wanted: Wanted) -> None:
-        """Let every task fill its rows for the updated ``robot``."""
+        """Let every task fill its rows of the table.
+
+        Args:
+            robot: the model, updated to this tick.
+            wanted: references and measurements of this tick.
+        """
         for task, rows in self._parts:
             task.write(robot, wanted, rows)

@@ -35,6 +35,10 @@ class LoadEstimate:
     nothing, unless forces computed with the model's mass do not carry the robot. All joint
     torques are then scaled by the factor learnt here; the model itself stays nominal.
 
+    Args:
+        options: gain, leak and bounds of the estimate.
+        gravity: of the robot's model [m/s^2]; the feedback is measured in units of it.
+
     Attributes:
         factor: the estimate, 1 at first.
     """
@@ -47,15 +51,21 @@ class LoadEstimate:
         self._time = 0.0
 
     def observe(self, feedback: float, dt: float) -> None:
-        """Add the vertical feedback acceleration [m/s^2] of one tick."""
+        """Add the feedback of one tick to the mean over the present stride.
+
+        Args:
+            feedback: the feedback part of the CoM's vertical acceleration, up positive [m/s^2].
+            dt: duration of the tick [s].
+        """
         self._sum += feedback * dt
         self._time += dt
 
     def end_stride(self, nominal: bool) -> None:
-        """Learn from the stride that just ended.
+        """Learn from the stride that has just ended.
 
         Args:
-            nominal: it went near the gait; from others, a push's say, nothing is learnt.
+            nominal: whether the stride went near the gait. Another one, such as a stride with a
+                push, teaches nothing; the estimate then leaks.
         """
         if self._time == 0.0:
             return

@@ -70,18 +70,19 @@ class MomentumTrim:
 
         Args:
             path: from this VLO to the next; None where nothing is to be learnt from it.
-            gait: about which the direction is taken that the controls leave alone.
+            gait: the stride's gait; :func:`uncontrolled` tells the direction that counts.
         """
         self._path = path
         if path is not None and gait is not self._gait:
             self._gait, self._left_alone = gait, uncontrolled(gait)
 
     def end_stride(self, z: Array, nominal: bool) -> None:
-        """Learn from the step that ended in VLO state ``z`` (3,).
+        """Learn from the step that has just ended.
 
         Args:
-            z: dx/dt, y, dy/dt.
-            nominal: it went near the gait; from others, a push's say, nothing is learnt.
+            z: (3,) VLO state dx/dt, y, dy/dt in which it ended [m/s, m, m/s].
+            nominal: whether the step went near the gait. Another one, such as a step with a push,
+                teaches nothing.
         """
         path = self._path
         if path is None or not nominal:

@@ -45,15 +45,15 @@ class SearchOptions:
     """How a step is searched for where the linear law's own is not good enough.
 
     Attributes:
-        first_weight: of the cost-to-go after the first step beside that after the second:
-            where two steps end alike, the one that is nearer the gait half-way is taken.
-        coarse: points in alpha, kappa_1 and kappa_2 over all of their ranges; most in alpha,
-            which decides where the foot lands.
-        fine: points in alpha and kappa_2 of each finer grid about the best so far, at least 2;
-            kappa_1, which matters least there, gets two points beside its plane.
-        rounds: finer grids; with two, alphas end 0.03 rad apart.
-        narrowing: a finer grid's half-widths over those of the one before; at most the spacing
-            of its alphas, half of a half-width: what lies beyond has its neighbour's price.
+        first_weight: weight of the cost-to-go after the first step, relative to that after the
+            second. Where two steps end alike, it favours the one nearer the gait half-way.
+        coarse: numbers of points in alpha, kappa_1 and kappa_2 over all of their ranges. Most are
+            in alpha, which decides where the foot lands.
+        fine: numbers of points in alpha and kappa_2 of each finer grid about the best so far, at
+            least 2. kappa_1, which matters least there, gets two points beside their plane.
+        rounds: number of finer grids; with two, alphas end 0.03 rad apart.
+        narrowing: half-widths of a finer grid over those of the one before. It is at most half,
+            the spacing of that one's alphas: what lies beyond has its neighbour's price.
     """
 
     first_weight: float = tuned(0.3)
@@ -192,12 +192,13 @@ class LqrPlanner:
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
-        """Controls for a step from VLO state ``z`` (3,); see :class:`~.planner.Planner`.
+        """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO.
 
-        The law leads to the symmetric gait with the target's speed; the target's height is
-        that gait's.
+        The law leads to the symmetric gait with the target's speed, and with that gait's
+        height. Where no gait is that slow or fast it leads to the nearest, and the decision is
+        not nominal.
         """
-        gait = self._family.towards(self.gait, target)
+        gait, reachable = self._family.towards(self.gait, target)
         if gait is not self.gait:
             self._settle_on(gait)
         law, s = self._law, self._scratch
@@ -214,10 +215,11 @@ class LqrPlanner:
             cost = search(law, self._grid, s, z, u, first)
         controls = self.gait.controls.copy()
         controls[WALKING_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
+        nominal = nominal and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
 
     def observe(self, decision: Decision, z: Array) -> None:
-        """Learn from the VLO state ``z`` (3,) in which the step of ``decision`` ended."""
+        """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
         if not (decision.feasible and decision.nominal):
             return  # far from the gait the surprise says little about it
         o = self.options

@@ -62,13 +62,13 @@ class ModifiedPlanner:
         self._stiffness = np.array(self.options.stiffness_range) * k0
 
     def reset(self) -> None:
-        """The paper's planner learns nothing."""
+        """See :class:`~.planner.Planner`; the paper's planner learns nothing."""
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
-        """Controls for a step from VLO state ``z`` (3,); see :class:`~.planner.Planner`."""
-        self.gait = self._family.towards(self.gait, target)
+        """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO."""
+        self.gait, reachable = self._family.towards(self.gait, target)
         p, o = self.gait.parameters, self.options
         predicted = np.empty(3)
         nominal = float(self.gait.controls[Slot.TOUCHDOWN_ANGLE])
@@ -83,8 +83,8 @@ class ModifiedPlanner:
         controls = self.gait.controls.copy()
         controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2
         feasible = outcome == Outcome.SECTION
-        nominal = feasible and residual < o.tolerance**2
+        nominal = reachable and feasible and residual < o.tolerance**2
         return Decision(controls, predicted, feasible, feasible, nominal)
 
     def observe(self, decision: Decision, z: Array) -> None:
-        """The paper's planner plans every step afresh."""
+        """See :meth:`~.planner.Planner.observe`; the paper's planner learns nothing."""

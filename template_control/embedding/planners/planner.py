@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 ANY_ANGLE = (-np.inf, np.inf)
-"""Of a stride whose touchdown angle is free."""
+"""Range of angles that leaves the touchdown angle free."""
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class Decision:
     Attributes:
         controls: (5,) u by Slot.
         predicted: (3,) dx/dt, y, dy/dt that the stride should end in, offset included.
-        feasible: the template completes the stride with these controls.
-        lasting: and a stride after it, as far as the planner looks.
-        nominal: the planner follows its own law, near its gait. Otherwise ``controls`` are the
-            best that a search has found, and nothing is learnt from the stride.
+        feasible: whether the template completes the stride with these controls.
+        lasting: whether it also completes the stride after that, as far as the planner looks.
+        nominal: whether the planner follows its own law, near its gait. Otherwise ``controls``
+            are the best that a search has found, and nothing is learnt from the stride.
     """
 
     controls: Array
@@ -44,7 +44,7 @@ class Planner(Protocol):
 
     @property
     def gait(self) -> Gait:
-        """The gait to settle on, the last target's."""
+        """The gait that the planner leads to; the last target chose it."""
 
     @property
     def offset(self) -> Array:
@@ -59,14 +59,19 @@ class Planner(Protocol):
         """Controls for a stride from section state ``z``.
 
         Args:
-            z: (n,) the state: dx/dt, y and, at VLO, dy/dt.
-            target: (n,) wanted at the section where the stride ends; None: the gait's own.
-            angles: touchdown angles [rad] the swing foot can still reach.
+            z: (n,) the state: dx/dt, y and, at VLO, dy/dt [m/s, m, m/s].
+            target: (n,) state wanted at the section where the stride ends; None: the gait's own.
+            angles: least and greatest touchdown angle that the swing foot can still reach [rad].
         """
 
     def observe(self, decision: Decision, z: Array) -> None:
-        """Learn that the stride planned by ``decision`` ended in section state ``z``."""
+        """Learn from a stride that has ended.
+
+        Args:
+            decision: the decision that planned the stride.
+            z: (n,) section state in which it ended, as for :meth:`decide`.
+        """
 
 
 Planners = Mapping[str, Planner]
-"""By the kind of stride they plan."""
+"""A planner for each kind of stride, by that kind's key in an automaton's ``starts``."""

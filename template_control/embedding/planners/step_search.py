@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Slot
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
@@ -32,11 +32,11 @@ class Grid(NamedTuple):
     """The controls that :func:`search` tries.
 
     Attributes:
-        coarse: points in alpha, kappa_1, kappa_2 of the first grid, over all bounds.
-        fine: points in alpha and kappa_2 of the later ones, about the best found.
-        rounds: how many later ones.
+        coarse: numbers of points in alpha, kappa_1, kappa_2 of the first grid, over all bounds.
+        fine: numbers of points in alpha and kappa_2 of the later grids, about the best found.
+        rounds: number of later grids.
         width_alpha, width_kappa: half-widths of the first of these [rad, of k0].
-        narrowing: half-widths of each over those of the one before.
+        narrowing: half-widths of each grid over those of the one before.
     """
 
     coarse: tuple[int, int, int]
@@ -80,18 +80,37 @@ class Law(NamedTuple):
     kernel: Kernel
 
 
-@njit(cache=True)
+@compiled
+def _copy(source: Array, target: Array) -> None:
+    """A slice would take Numba seconds to compile: it prepares what to say of wrong shapes."""
+    for i in range(3):
+        target[i] = source[i]
+
+
+@compiled
 def bounded(law: Law, z: Array, u: Array) -> None:
-    """Clip controls ``u`` (3,) in place to what is admissible at VLO state ``z`` (3,)."""
+    """Clip controls in place to what is admissible at a VLO state.
+
+    Args:
+        law: its bounds and its ``top_margin`` count.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0; overwritten.
+    """
     for i in range(3):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
     top = np.arcsin(min(z[1] / law.kernel.model.rest_length, 1.0)) - law.top_margin
     u[0] = min(u[0], top)
 
 
-@njit(cache=True)
+@compiled
 def linear(law: Law, z: Array, u: Array) -> None:
-    """The law's bounded controls at ``z`` into ``u``."""
+    """Write the law's controls, within their bounds, into ``u``.
+
+    Args:
+        law: u = u_s - K (z - z_s), and the bounds.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (3,) overwritten with alpha [rad], kappa_1/k0, kappa_2/k0.
+    """
     for i in range(3):
         u[i] = law.control[i]
         for j in range(3):
@@ -99,9 +118,21 @@ def linear(law: Law, z: Array, u: Array) -> None:
     bounded(law, z, u)
 
 
-@njit(cache=True)
+@compiled
 def step(law: Law, kind: int | None, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
-    """One step from ``z`` with controls ``u``, the robot's offset included; the Outcome."""
+    """Take one walking step of the template, and add the robot's offset to where it ends.
+
+    Args:
+        law: the template's step and the offset.
+        kind: of map, from :func:`~template_control.slip.maps.section_map.closed_form`.
+        s: overwritten.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
+        z_next: (3,) overwritten with the next VLO state.
+
+    Returns:
+        The Outcome's value; ``z_next`` means nothing where that is not SECTION.
+    """
     controls = np.zeros(NUM_SLOTS)
     controls[_ANGLE] = u[0]
     controls[_K_SC], controls[_K_SD] = u[1] * law.stiffness, u[2] * law.stiffness
@@ -112,7 +143,7 @@ def step(law: Law, kind: int | None, s: Scratch, z: Array, u: Array, z_next: Arr
     return outcome
 
 
-@njit(cache=True)
+@compiled
 def _cost_to_go(law: Law, z: Array) -> float:
     total = 0.0
     for i in range(3):
@@ -121,20 +152,20 @@ def _cost_to_go(law: Law, z: Array) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled
 def price(
     law: Law, kind: int | None, s: Scratch, z: Array, u: Array, limit: float, first: Array
 ) -> float:
-    """Cost of taking ``u`` at ``z``; the state after one step into ``first`` (3,).
+    """Cost of taking ``u`` at ``z``.
 
     Args:
-        law: what judges.
+        law: says what a state costs.
         kind: of map, from :func:`~template_control.slip.maps.section_map.closed_form`.
         s: overwritten.
-        z: (3,) VLO state.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
         u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
         limit: a cost known to be too much; the second step is not looked at beyond it.
-        first: overwritten.
+        first: (3,) overwritten with the state after one step.
     """
     second, u2 = np.empty(3), np.empty(3)
     if step(law, kind, s, z, u, first) != 0:
@@ -151,14 +182,14 @@ def price(
             # The law's own step is good enough near the gait.
             if best < law.enough:
                 break
-            u2[:] = law.second_steps[i]
+            _copy(law.second_steps[i], u2)
             bounded(law, first, u2)
         if step(law, kind, s, first, u2, second) == 0:
             best = min(best, _cost_to_go(law, second) + share)
     return best
 
 
-@njit(cache=True)
+@compiled
 def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
     """Point ``i`` of the grid over all bounds into ``u`` (3,)."""
     n0, n1, n2 = grid.coarse
@@ -169,14 +200,14 @@ def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
         u[j] = law.lower[j] + u[j] * (law.upper[j] - law.lower[j])
 
 
-@njit(cache=True)
+@compiled
 def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
     """Point ``i`` of a grid about ``centre`` (3,) into ``u`` (3,).
 
     A plane of points in alpha and kappa_2, then two in kappa_1.
     """
     n0, n2 = grid.fine
-    u[:] = centre
+    _copy(centre, u)
     if i < n0 * n2:
         u[0] += (i // n2 / (0.5 * (n0 - 1)) - 1.0) * widths[0]
         u[2] += (i % n2 / (0.5 * (n2 - 1)) - 1.0) * widths[1]
@@ -184,7 +215,7 @@ def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Arr
         u[1] += (2 * (i - n0 * n2) - 1) * widths[1]
 
 
-@njit(cache=True)
+@compiled
 def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array) -> float:
     """Improve ``best`` (3,) in place: a coarse grid over all bounds, then finer ones about it.
 
@@ -217,9 +248,9 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
             cost = price(law, _FAST, s, z, u, cheapest, end)
             if cost < cheapest:
                 cheapest = cost
-                best[:] = u
-                first[:] = end
-        centre[:] = best
+                _copy(u, best)
+                _copy(end, first)
+        _copy(best, centre)
         if level > 0:
             widths = grid.narrowing * widths[0], grid.narrowing * widths[1]
     return price(law, None, s, z, best, np.inf, first)

@@ -33,12 +33,18 @@ class Feet:
         self.landed = 0
 
     def begin(self, rear: int) -> None:
-        """Foot ``rear`` is the rear leg's and carries."""
+        """Make foot ``rear`` the rear leg's, and put the template's ground under it."""
         self.of = (rear, 1 - rear)
         self.landed = rear
 
     def lift(self, foot: int, robot: PlanarBiped, swung: float = 0.0) -> None:
-        """A foot leaves the ground, or did so ``swung`` seconds ago."""
+        """Begin the swing of a foot that leaves the ground, or has left it already.
+
+        Args:
+            foot: its index, 0 or 1, in the order of the robot's ``feet``.
+            robot: the model, updated; the swing begins at the foot's position and velocity there.
+            swung: time since the foot left the ground [s].
+        """
         self.swing_time[foot] = swung
         self.swing[foot].start(robot.foot_position[foot], robot.foot_velocity[foot], swung)
 

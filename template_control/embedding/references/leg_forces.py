@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.similarity import tuned
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ class UnloadOptions:
     """Largest normal force of a foot that is about to lift off: near the template's.
 
     Attributes:
-        share: of the template's force. Over 1, as the robot's forces are not exactly the
+        share: of the template's force. It is over 1, as the robot's forces are not exactly the
             template's.
         floor: of the weight. It leaves a foot no load to lift off with, and the QP some room.
     """
@@ -27,11 +27,16 @@ class UnloadOptions:
     floor: float = tuned(0.025)
 
     def cap(self, template_force: float, weight: float) -> float:
-        """Largest normal force [N] where the template's leg has ``template_force`` [N]."""
+        """Largest normal force that the foot may carry [N].
+
+        Args:
+            template_force: vertical force of the template's leg at this phase [N].
+            weight: of the robot, m g [N].
+        """
         return self.share * template_force + self.floor * weight
 
 
-@njit(cache=True)
+@compiled
 def leg_forces(
     meta_row: Array, com_x: float, com_y: float, rest_length: float, forces: Array
 ) -> None:

@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, tuned
 
 Array = NDArray[np.float64]
@@ -45,13 +45,16 @@ class SwingOptions:
     leg_share: float = tuned(0.98)
 
 
-@njit(cache=True)
+@compiled
 def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
     """Advance (position, velocity, acceleration) by ``dt`` along the quintic to its target.
 
     Args:
-        state: (3,) overwritten.
-        target, speed: position and velocity after ``time`` [s]; the acceleration there is 0.
+        state: (3,) position, velocity, acceleration now [m, m/s, m/s^2]; overwritten.
+        target, speed: position [m] and velocity [m/s] at the quintic's end; the acceleration
+            there is 0.
+        time: from now to the quintic's end [s].
+        dt: how far to advance [s].
     """
     p, v, a = state[0], state[1], state[2]
     # In tau = t / time: c0..c5 with c0 = p, c1 = v T, c2 = a T^2 / 2.
@@ -85,7 +88,13 @@ class SwingFoot:
         self._elapsed = 0.0
 
     def start(self, position: Array, velocity: Array, elapsed: float = 0.0) -> None:
-        """Begin a swing at the foot's present position and velocity (2,)."""
+        """Begin a swing where the foot is now.
+
+        Args:
+            position: (2,) x and y of the foot in the world [m].
+            velocity: (2,) its velocity [m/s].
+            elapsed: time since the foot left the ground [s].
+        """
         self.x[:] = position[0], velocity[0], 0.0
         self.y[:] = position[1], velocity[1], 0.0
         self._elapsed = elapsed
@@ -94,9 +103,9 @@ class SwingFoot:
         """Move the reference by ``dt`` towards its foothold.
 
         Args:
-            foothold: x [m].
-            time_to_go: until it is due [s].
-            dt: [s].
+            foothold: x of the foothold in the world [m].
+            time_to_go: time until the foot is due there [s].
+            dt: control period [s].
             ground: height of the foothold [m].
         """
         o = self.options
@@ -113,7 +122,7 @@ class SwingFoot:
         self._elapsed += dt
 
     def drop(self, dt: float) -> None:
-        """Overdue: the ground is lower than was thought; fall to it."""
+        """Let an overdue foot fall: the ground is lower than was thought."""
         self.x[1], self.x[2] = 0.0, 0.0
         self.y[2] = -self.options.drop_acceleration
         self.y[0] += (self.y[1] + 0.5 * self.y[2] * dt) * dt

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.embedding.phases import Clock
 from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.stride import Stride
@@ -43,9 +43,11 @@ class Curve(NamedTuple):
 
 
 class Landing(NamedTuple):
-    """Where and when a leg next touches down: x of its toe [m] and time on the path [s].
+    """Where and when a leg next touches down; (nan, inf) if it does not land on this path.
 
-    A leg that does not land on this path has (nan, inf).
+    Attributes:
+        x: of its toe in the world [m].
+        time: on the path [s].
     """
 
     x: float
@@ -63,7 +65,7 @@ class TemplatePath:
             start of the path.
         toes: x of the rear and the front toe at the start [m].
         section_state: (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex.
-        outcome: how it ends.
+        outcome: how the first stride ends.
         duration: end of the last segment [s].
     """
 
@@ -80,12 +82,20 @@ class TemplatePath:
 
         Args:
             event: the guard.
-            passed: so many of the path's events are over.
+            passed: number of the path's events that are over already.
         """
         return next((time for time, found in self.events[passed:] if found is event), np.inf)
 
     def after(self, event: Event, passed: int) -> int:
-        """How many of the path's events are over once ``event`` is."""
+        """How many of the path's events are over once the next ``event`` is.
+
+        Args:
+            event: the guard that fires.
+            passed: number of the path's events that are over already.
+
+        Returns:
+            The new number; ``passed`` where no such event is left.
+        """
         for i in range(passed, len(self.events)):
             if self.events[i][1] is event:
                 return i + 1
@@ -137,7 +147,7 @@ def _landings(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[Landi
     return found.get(Leg.REAR, never), found.get(Leg.FRONT, never)
 
 
-@njit(cache=True)
+@compiled
 def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     """Value, first and second derivative at ``t`` into out[first], out[first+2], ..."""
     p = d = dd = 0.0
@@ -148,12 +158,19 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     out[first], out[first + 2], out[first + 4] = p, d, 2.0 * dd
 
 
-@njit(cache=True)
+@compiled
 def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
-    """Path at ``time`` into out (6,): x from ``toe``, y, and their two derivatives.
+    """Write the path at a time into ``out``.
+
+    Args:
+        curve: the path.
+        toe: x of the template's rear toe [m].
+        time: on the path [s]. The path goes on for a moment past either end, then stops.
+        out: (6,) overwritten: x from ``toe``, y, and their first and second derivatives
+            [m, m/s, m/s^2].
 
     Returns:
-        The segment.
+        The index of the path's segment at that time.
     """
     meta = curve.meta
     row = 0
@@ -167,7 +184,7 @@ def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
     return row
 
 
-@njit(cache=True)
+@compiled
 def at_direction(
     curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
@@ -198,7 +215,7 @@ def at_direction(
     return t, sample(curve, toe, t, out)
 
 
-@njit(cache=True)
+@compiled
 def at_time(
     curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:

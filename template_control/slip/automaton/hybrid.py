@@ -85,7 +85,7 @@ class Automaton:
         return begin, ends[0]
 
     def before(self, node_name: str) -> Node:
-        """The node from which the section is reached that ``node_name`` begins at.
+        """The node that leads to the section at which ``node_name`` begins.
 
         It is the first whose section leads there; for a start that is only chosen at a
         section, such as a transition's, the first whose section is the same.
@@ -106,8 +106,13 @@ class Automaton:
     def successor(self, name: str, event: Event) -> str:
         """Name of the node that follows ``name`` when ``event`` fires.
 
+        Args:
+            name: of the node that is left.
+            event: the guard of one of its edges.
+
         Raises:
-            KeyError: if ``event`` is no way out of it, or ends the stride in failure.
+            KeyError: if there is no node ``name``, or ``event`` is no way out of it, or ends the
+                stride in failure.
         """
         edge = self.node(name).edge(event)
         if edge is None or isinstance(edge.target, Outcome):

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, Model, stride_kernel
@@ -70,7 +70,7 @@ class AngleSearch(NamedTuple):
     fall: float = 1e6
 
 
-@njit(cache=True)
+@compiled
 def energy_stiffness(
     z: Array,
     target: Array,
@@ -96,7 +96,7 @@ def energy_stiffness(
     return (mu_4 + (mu_3 - mu_2) * kappa_1) / (mu_3 - mu_1)
 
 
-@njit(cache=True)
+@compiled
 def modified_step(
     kernel: Kernel,
     kind: int | None,
@@ -132,7 +132,7 @@ def modified_step(
     return section_map(kernel, kind, z, controls, scratch, result)
 
 
-@njit(cache=True)
+@compiled
 def modified_many(
     kernel: Kernel, kind: int | None, z: Array, aim: Aim, controls: Array, scratch: Scratch
 ) -> tuple[Array, IntArray]:
@@ -144,7 +144,7 @@ def modified_many(
     return result, outcome
 
 
-@njit(cache=True)
+@compiled
 def search_angle(
     kernel: Kernel,
     kind: int | None,
@@ -190,7 +190,8 @@ def search_angle(
             if cost < best_cost or best_outcome < 0:
                 best_cost, best_alpha, best_kappa = cost, alpha, kappa_2
                 best_residual, best_outcome = residual, outcome
-                z_next[:] = z1[:3]
+                for j in range(3):
+                    z_next[j] = z1[j]
         width = (high - low) / (count - 1)
         low = max(search.least, best_alpha - search.narrowing * width)
         high = min(search.greatest, best_alpha + search.narrowing * width)

@@ -45,9 +45,9 @@ class Unknowns:
     """Which controls are free, and between which bounds.
 
     Attributes:
-        slots: of the control vector.
+        slots: the free slots of the control vector.
         lower, upper: (len(slots),) bounds [rad, N/m].
-        scale: (len(slots),) sizes that count as alike [rad, N/m].
+        scale: (len(slots),) changes of each that count as equally large [rad, N/m].
     """
 
     slots: tuple[Slot, ...]
@@ -60,19 +60,49 @@ class Step(Protocol):
     """What a controller needs of a return map; ``ReturnMap`` is one.
 
     ``evaluate`` and ``derivatives`` may complete the controls they are given in place.
+
+    Attributes:
+        parameters: the template.
+        dimensions: sizes n and m of the states at the sections a stride starts from and ends at.
     """
 
     parameters: SlipParameters
     dimensions: tuple[int, int]
 
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
-        """Results of one stride and how it ended."""
+        """Map one stride.
+
+        Args:
+            z: (n,) state at the section it starts from.
+            u: (NUM_SLOTS,) controls; touchdown angle [rad] and stiffnesses [N/m] by Slot.
+
+        Returns:
+            (RESULTS,) as of :func:`~template_control.slip.maps.section_map.section_map`; how the
+            stride ended.
+        """
 
     def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
-        """Results (n, RESULTS) and outcomes (n,) of controls ``u`` (n, NUM_SLOTS)."""
+        """Map strides from one state with many controls.
+
+        Args:
+            z: (n,) state at the section that all of them start from.
+            u: (count, NUM_SLOTS) controls, a row for each stride.
+
+        Returns:
+            (count, RESULTS) as :meth:`evaluate`; (count,) values of the strides' outcomes.
+        """
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
-        """Results of one stride, their derivatives, and how it ended."""
+        """Map one stride, with chosen derivatives.
+
+        Args:
+            z: (n,) state at the section it starts from.
+            u: (NUM_SLOTS,) controls.
+            columns: (c,) what to differentiate by: 3 + slot for a control.
+
+        Returns:
+            (RESULTS,) as :meth:`evaluate`; its (RESULTS, c) derivatives; how the stride ended.
+        """
 
 
 class StepProblem:
@@ -133,7 +163,16 @@ class StepProblem:
         return best
 
     def costs(self, z: Array, target: Array, grid: Array) -> Array:
-        """Squared errors (n,) of the controls ``grid`` (n, NUM_SLOTS), inf for a failed stride."""
+        """Squared errors of the stride with each of many controls.
+
+        Args:
+            z: (n,) state at the section.
+            target: (m,) state wanted at the next.
+            grid: (count, NUM_SLOTS) controls, a row for each stride.
+
+        Returns:
+            (count,) weighted sums of squared errors, as in (36); inf where the stride fails.
+        """
         self._set(target)
         results, outcomes = self.step.evaluate_many(z, grid)
         costs = np.sum((self._weights * (self._aim - results[:, self._rows])) ** 2, axis=1)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
-from template_control.slip.dynamics.compiled import inner
 from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_bottom
 from template_control.slip.dynamics.locate import Watch, arm, first_event, root
 from template_control.slip.dynamics.model import Kernel, Model

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import Event
-from template_control.slip.dynamics.compiled import inner
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import entry, inner
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
-from template_control.slip.dynamics.compiled import inner
 from template_control.slip.dynamics.locate import Watch, arm, first_event
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.dynamics.path import COEFFICIENTS, SERIES, Path, sample
@@ -107,7 +107,7 @@ def note_bottom(event: int, state: Array, toes: Array, bottom: Array) -> None:
             bottom[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
 
 
-@inner
+@entry
 def run_stride(
     kernel: Kernel,
     state: Array,

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
-from template_control.slip.dynamics.compiled import inner
 from template_control.slip.dynamics.guards import all_guards, guard, guard_rate
 from template_control.slip.dynamics.path import Path, sample
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.dynamics.compiled import inner
+from template_control.compiled import inner
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.dynamics.compiled import inner
+from template_control.compiled import inner
 from template_control.slip.dynamics.model import Model
 from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, Path, sample
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.dynamics.compiled import inner
+from template_control.compiled import inner
 from template_control.slip.dynamics.model import Model
 
 Array = NDArray[np.float64]

@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from template_control.compiled import compiled, inner
 from template_control.slip.automaton.vocabulary import Outcome
-from template_control.slip.dynamics.compiled import inner
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.section import VLO
@@ -77,7 +76,7 @@ def _steps(
     return limit, late < _THERE or (late < _SHRINKS * middle and late < early)
 
 
-@njit(cache=True)
+@compiled
 def _many(
     kernel: Kernel, z: Array, controls: Array, goal: Array, limit: int, scratch: Scratch
 ) -> tuple[IntArray, NDArray[np.bool_]]:

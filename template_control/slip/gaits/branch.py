@@ -51,11 +51,11 @@ class BranchPoint:
         energy: at the section [J].
         target: what a controller is asked for, in the quantity it is varied in; None where
             there is no controller.
-        eigenvalues: of the stride: within its energy shell if passive, all of them if
-            controlled.
+        eigenvalues: of the stride's map. A passive gait has those within its energy shell, a
+            controlled one has all of them.
         kind: stable, saddle or unstable.
         tangent: of the branch, in scaled coordinates.
-        special: what happens here, None at an ordinary point.
+        special: what happens here; None at an ordinary point.
     """
 
     x: Array
@@ -75,7 +75,7 @@ class BranchPoint:
 
     @property
     def stiffness(self) -> float:
-        """Of the leg that lands, from touchdown on [N/m]."""
+        """Stiffness of the leg that lands, from touchdown on [N/m]."""
         return float(self.controls[Slot.K_SC])
 
     def quantity(self, name: str) -> float:
@@ -113,10 +113,10 @@ class Branch(ABC):
     Attributes:
         scale: (n + 1,) natural size of each coordinate.
         free: quantities that vary along it.
-        noise: to which eigenvalues are known; one that close to the unit circle does not
-            cross it.
-        anchor: (n + 1,) direction that the first gait is not moved in from its guess (scaled);
-            None where the nearest gait will do.
+        noise: how exactly eigenvalues are known. One that is this close to the unit circle does
+            not count as crossing it.
+        anchor: (n + 1,) scaled direction in which the first gait stays where its guess is; None
+            where the nearest gait will do.
     """
 
     scale: Array
@@ -134,12 +134,26 @@ class Branch(ABC):
 
     @abstractmethod
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:
-        """One of the free quantities, and its (n + 1,) gradient in X."""
+        """One of the quantities that vary along the branch, and its gradient in X.
+
+        Args:
+            x: (n + 1,) X.
+            name: of the quantity, one of :attr:`free`.
+
+        Returns:
+            The value [SI, angles in rad]; the (n + 1,) gradient, not scaled.
+        """
 
     def correct(self, x: Array, direction: Array | None = None) -> Array:
-        """The gait nearest X along the plane through it normal to ``direction`` (scaled).
+        """Find the gait nearest X in the plane through X that is normal to a direction.
 
-        Without a direction the least change of X is made.
+        Args:
+            x: (n + 1,) guess of X.
+            direction: (n + 1,) normal of the plane, in scaled coordinates; None: any X will do, and
+                it is changed as little as possible.
+
+        Returns:
+            (n + 1,) X of the gait.
 
         Raises:
             GaitError: if Newton's method does not converge.

@@ -93,7 +93,7 @@ class ControlledFamily(Branch):
         )
 
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:
-        """The target, and its (n + 1,) gradient in X."""
+        """See :meth:`~.branch.Branch.quantity`; the only quantity is the controller's target."""
         return float(x[-1]), np.eye(self.n + 1)[-1]
 
     def _closed(self, x: Array) -> tuple[Linearisation, Array, Array]:
@@ -102,7 +102,12 @@ class ControlledFamily(Branch):
 
 
 def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisation, Array, Array]:
-    """The exact stride from ``z`` (n,) with a policy's controls.
+    """Take the exact stride from a state with a policy's controls, and differentiate it.
+
+    Args:
+        step: the map z moves on; the exact one, whatever map the policy computes with.
+        policy: controls (NUM_SLOTS,) at a state (n,).
+        z: (n,) state at the section.
 
     Returns:
         The map at z and u; the (n, n) derivative of the closed loop; u (NUM_SLOTS,).
@@ -121,9 +126,7 @@ def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisatio
 def controlled_fixed_point(
     step: ReturnMap, policy: Policy, start: Array, iterations: int = 30
 ) -> tuple[Array, NDArray[np.complex128]]:
-    """Where a controlled stride settles, and the eigenvalues of the closed loop there.
-
-    Newton's method on z = P(z, u(z)).
+    """Find where a controlled stride settles: Newton's method on z = P(z, u(z)).
 
     Args:
         step: the map z moves on; the exact one, whatever map the policy computes with.
@@ -131,6 +134,9 @@ def controlled_fixed_point(
             ``lambda z: controller.solve(z, target).controls``.
         start: (n,) first guess.
         iterations: of Newton's method at most.
+
+    Returns:
+        (n,) the state; (n,) eigenvalues of the closed loop there.
 
     Raises:
         GaitError: if a stride fails on the way, or there is no convergence.

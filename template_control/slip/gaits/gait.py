@@ -31,7 +31,7 @@ class Gait(Protocol):
 
     @property
     def name(self) -> str:
-        """For tables and records."""
+        """Name of the gait for tables and records."""
 
     @property
     def parameters(self) -> SlipParameters:
@@ -55,7 +55,7 @@ class Gait(Protocol):
 
     @property
     def step_duration(self) -> float:
-        """[s]."""
+        """Duration of the stride [s]."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +100,11 @@ class WalkingGait:
 
 
 def vlo_jacobians(gait: Gait) -> tuple[Array, Array]:
-    """Of the exact VLO map at a gait: A (3, 3) in z and B (3, 3) in alpha and shares of k0.
+    """Jacobians of the exact VLO map at a gait: A in z and B in the angle and shares of k0.
 
-    B's columns are the touchdown angle [1/rad], kappa_1 / k0 and kappa_2 / k0.
+    Returns:
+        A (3, 3); B (3, 3), whose columns are the touchdown angle [1/rad], kappa_1 / k0 and
+        kappa_2 / k0.
     """
     linear = ReturnMap(gait.parameters).linearise(gait.state, gait.controls)
     k0 = gait.parameters.leg_stiffness
@@ -149,7 +151,13 @@ def _symmetric_roots(
 def gait_at(
     parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
 ) -> WalkingGait:
-    """The symmetric gait with this touchdown angle [rad] and speed at VLO [m/s].
+    """The symmetric gait with a given touchdown angle and speed at VLO.
+
+    Args:
+        parameters: the template; both legs have its stiffness k0.
+        touchdown_angle: alpha, from the ground to the leg [rad].
+        vlo_speed: dx/dt at VLO [m/s].
+        name: of the gait.
 
     Raises:
         GaitError: if there is none.
@@ -171,7 +179,13 @@ def gait_at(
 def gait_from_energy(
     parameters: SlipParameters, height: float, energy: float, name: str = "paper"
 ) -> WalkingGait:
-    """The symmetric gait with this VLO height [m] and energy [J] (as Section IV-D).
+    """The symmetric gait with a given VLO height and energy, as in Section IV-D.
+
+    Args:
+        parameters: the template; both legs have its stiffness k0.
+        height: y at VLO [m].
+        energy: mechanical energy at VLO, the stance spring's included [J].
+        name: of the gait.
 
     Raises:
         GaitError: if there is none.
@@ -204,10 +218,15 @@ def _nominal_angle(mean_speed: float, rest_length: float, gravity: float) -> flo
 def gait_for_speed(
     parameters: SlipParameters, mean_speed: float, name: str = "walk"
 ) -> WalkingGait:
-    """The symmetric gait with this mean forward speed [m/s].
+    """The symmetric gait with a given mean forward speed.
+
+    Args:
+        parameters: the template; both legs have its stiffness k0.
+        mean_speed: step length over step duration [m/s].
+        name: of the gait.
 
     Raises:
-        GaitError: if there is none.
+        GaitError: if there is none, or the speed is not positive.
     """
     p = parameters
     if not (np.isfinite(mean_speed) and mean_speed > 0.0):

@@ -86,7 +86,10 @@ class Family(Branch):
         return self._linearised(x)[0]
 
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:
-        """One of :data:`~.branch.QUANTITIES`, and its (n + 2,) gradient in X."""
+        """See :meth:`~.branch.Branch.quantity`; any of :data:`~.branch.QUANTITIES` has a value.
+
+        X and the gradient are (n + 2,), with n the size of the section's state.
+        """
         gradient = np.zeros(self.n + 2)
         if name != "energy":
             gradient[_COORDINATE[name]] = 1.0

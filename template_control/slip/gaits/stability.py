@@ -26,7 +26,7 @@ def classify(eigenvalues: ComplexArray, tolerance: float = 0.0) -> Kind:
     """STABLE if all lie within the unit circle, UNSTABLE if none does, SADDLE between.
 
     Args:
-        eigenvalues: of a return map.
+        eigenvalues: (n,) of a return map.
         tolerance: to which they are known; NEUTRAL if the largest lies on the circle to it.
     """
     sizes = np.abs(eigenvalues)

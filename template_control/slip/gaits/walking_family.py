@@ -56,24 +56,25 @@ class WalkingFamily:
     def __init__(self, gait: WalkingGait) -> None:
         self._known = [gait]
 
-    def towards(self, present: WalkingGait, target: Array | None) -> WalkingGait:
-        """The gait with the target's speed at VLO.
+    def towards(self, present: WalkingGait, target: Array | None) -> tuple[WalkingGait, bool]:
+        """The gait with the target's speed at VLO, or the nearest there is.
 
         Args:
             present: is kept where it has that speed.
             target: (3,) dx/dt, y, dy/dt; None: the present gait's.
 
-        Raises:
-            GaitError: if the speed is out of the family's range.
+        Returns:
+            The gait, and whether it has the target's speed.
         """
         if target is None:
-            return present
+            return present, True
         p = present.parameters
         same = _SAME * np.sqrt(p.gravity * p.rest_length)
-        speed = float(target[0])
+        wanted = float(target[0])
         for gait in (present, *self._known):
-            if abs(gait.vlo[0] - speed) <= same:
-                return gait
+            if abs(gait.vlo[0] - wanted) <= same:
+                return gait, True
+        speed = float(np.clip(wanted, *speed_range(p)))
         gait = walking_gait(p, speed)
         self._known.append(gait)
-        return gait
+        return gait, abs(speed - wanted) <= same

@@ -64,6 +64,8 @@ class Linearisation(NamedTuple):
 class ReturnMap:
     """The map of one kind of stride from its section to the next: (5), (7), (39), (42).
 
+    One object serves one thread: it owns the compiled kernel's scratch arrays.
+
     Args:
         parameters: the template.
         stride: key of the automaton's ``starts``: "w" (VLO to VLO), "r" (apex to apex), "wr"
@@ -73,13 +75,11 @@ class ReturnMap:
         automaton: that the stride is of.
 
     Attributes:
-        sections: that it starts from and ends at.
-        dimensions: sizes of the state there.
+        sections: the sections that a stride starts from and ends at.
+        dimensions: sizes n and m of the states at these sections.
 
     Raises:
         ParameterError: if there is no such stride.
-
-    One object serves one thread: it owns the compiled kernel's scratch arrays.
     """
 
     def __init__(

@@ -89,9 +89,15 @@ class Section:
         return float(energy) if states.ndim == 1 else np.asarray(energy)
 
     def speed(self, parameters: SlipParameters, y: ArrayLike, energy: ArrayLike) -> Array:
-        """Speed of the CoM [m/s] at height ``y`` [m] with ``energy`` [J], k0 in stance.
+        """Speed of the CoM where a height and an energy are given; shapes broadcast.
 
-        NaN where the energy does not suffice.
+        Args:
+            parameters: the template; at VLO the stance leg has its stiffness k0.
+            y: (...) height of the CoM [m].
+            energy: (...) mechanical energy [J].
+
+        Returns:
+            (...) speeds [m/s], NaN where the energy does not suffice.
         """
         p = parameters
         height = np.asarray(y, dtype=float)
@@ -109,12 +115,12 @@ class Section:
     def calmer(self, z: Array, share: float, highest: float) -> Array:
         """A state (n,) that the template can go on from more easily than from ``z``.
 
+        At apex dy/dt is 0 already, and no leg limits the height: there it is ``z``.
+
         Args:
             z: (n,) state at the section.
             share: of dy/dt that is left.
             highest: height that it may have at most [m].
-
-        At apex dy/dt is 0 already, and no leg limits the height: there it is ``z``.
         """
         calm = np.array(z, dtype=float)
         for place, quantity in enumerate(self.order):

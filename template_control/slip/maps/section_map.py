@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled, entry
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.dynamics.closed_form import closed_form_stride
-from template_control.slip.dynamics.compiled import inner
 from template_control.slip.dynamics.kernel import Scratch, run_stride
 from template_control.slip.dynamics.model import Kernel
 
@@ -45,7 +44,7 @@ def closed_form(kind: MapKind) -> int | None:
     return None if kind is MapKind.EXACT else int(kind)
 
 
-@inner
+@entry
 def section_map(
     kernel: Kernel,
     kind: int | None,
@@ -79,7 +78,7 @@ def section_map(
     return outcome
 
 
-@njit(cache=True)
+@compiled
 def map_many(
     kernel: Kernel,
     kind: int | None,
@@ -94,7 +93,7 @@ def map_many(
         outcome[i] = section_map(kernel, kind, z[i], controls[i], scratch, result[i])
 
 
-@njit(cache=True)
+@compiled
 def section_jacobian(
     kernel: Kernel,
     kind: int | None,

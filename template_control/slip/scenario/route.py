@@ -39,10 +39,10 @@ class StrideGoal:
     """What a route asks for at a section.
 
     Attributes:
-        stride: key of ``STRIDE_START``: the kind of stride that comes next.
+        stride: the kind of stride that comes next, a key of ``STRIDE_START``.
         target: (n,) state wanted at the section the stride ends at.
-        wanted_speed: of the profile there [m/s].
-        segment: of the scenario, from 0.
+        wanted_speed: the profile's speed there [m/s].
+        segment: index of the scenario's segment, from 0.
     """
 
     stride: str
@@ -86,11 +86,14 @@ class Route(Protocol):
         """
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
-        """What :meth:`next` would return here; the route does not go on."""
+        """What :meth:`next` would return here; the route does not go on.
+
+        Arguments as for :meth:`next`.
+        """
 
 
 class SteadyRoute:
-    """The same stride to the same target for ever.
+    """A route that repeats one stride to one target for ever.
 
     Args:
         parameters: the template.
@@ -141,7 +144,7 @@ class SteadyRoute:
         return True
 
     def reset(self) -> None:
-        """Nothing to go back to: every stride is alike."""
+        """Do nothing: every stride is alike."""
 
     def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
         """See :meth:`Route.next`."""
@@ -253,7 +256,8 @@ class ScenarioRoute:
     def took(self, duration: float) -> None:
         """Tell how long the stride under way took [s], before the section it ends at.
 
-        Nobody need do it. It spares who knows the duration the rounding of two times' difference.
+        This call is optional. Without it the duration is a difference of two times, with its
+        rounding.
         """
         self._progress = replace(self._progress, took=duration)
 

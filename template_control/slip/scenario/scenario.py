@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -70,6 +70,21 @@ class Scenario:
 
     def __post_init__(self) -> None:
         _check(self)
+
+    def on(self, parameters: SlipParameters) -> Scenario:
+        """The same scenario for another template.
+
+        Heights grow with l0. Speeds, accelerations and times stay as they were asked for.
+        """
+        ratio = parameters.rest_length / self.parameters.rest_length
+        speed, height, vertical = self.start
+        return replace(
+            self,
+            parameters=parameters,
+            start=(speed, height * ratio, vertical),
+            vlo=(self.vlo[0] * ratio, self.vlo[1]),
+            apex_height=self.apex_height * ratio,
+        )
 
     @property
     def gaits(self) -> frozenset[Gait]:

@@ -123,7 +123,7 @@ def write_film(
     Args:
         path: of the film; its ending tells the format.
         playback: the frames.
-        fps: as they were chosen with.
+        fps: frames per second, as the frames were chosen with.
         progress: called with the number of frames done.
         dpi: dots per inch of the 6.4 x 4.4 inch picture.
 

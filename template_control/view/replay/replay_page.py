@@ -71,7 +71,7 @@ def write_page(path: Path, title: str, commands: list[Any]) -> Path:
     Args:
         path: of the file.
         title: of the page.
-        commands: as :func:`~template_control.view.replay_scene.scene_commands` makes them.
+        commands: as :func:`~template_control.view.replay.replay_scene.scene_commands` makes them.
 
     Raises:
         RecordError: if the file cannot be written.

@@ -19,7 +19,7 @@ class ReplayServer:
     """A running server; ends with :meth:`close`, the ``with`` block, or the process.
 
     Args:
-        commands: as :func:`~template_control.view.replay_scene.scene_commands` makes them.
+        commands: as :func:`~template_control.view.replay.replay_scene.scene_commands` makes them.
 
     Attributes:
         url: where a browser finds the replay.

@@ -64,7 +64,12 @@ def load_visuals(record: Record) -> tuple[pin.Model, pin.GeometryModel, list[Vis
 
 
 def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[Array, Array]:
-    """Where the shapes are in the configurations q (F, nv).
+    """Where the shapes are in each of several configurations.
+
+    Args:
+        model: of the robot.
+        shapes: its shapes, from :func:`load_visuals`.
+        q: (F, nv) configurations [m, rad].
 
     Returns:
         positions: (F, shapes, 3) x forward, y to the left, z up [m].
@@ -82,7 +87,15 @@ def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[A
 
 
 def foot_sides(model: pin.Model, feet: list[str]) -> Array:
-    """(2,) how far to the left of the sagittal plane the foot frames are [m]."""
+    """How far the feet are to the left of the sagittal plane.
+
+    Args:
+        model: of the robot.
+        feet: names of the two foot frames.
+
+    Returns:
+        (2,) y of each foot frame [m]; to the left is positive.
+    """
     data = model.createData()
     pin.framesForwardKinematics(model, data, pin.neutral(model))
     return np.array([data.oMf[model.getFrameId(foot)].translation[1] for foot in feet])

@@ -1,0 +1,47 @@
+"""A scenario as the route of a robot: which of it the robot can follow."""
+
+from __future__ import annotations
+
+from template_control.embedding.robot_template import template_for
+from template_control.errors import ScenarioError
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.gaits.walking_family import speed_range
+from template_control.slip.scenario.route import ScenarioRoute
+from template_control.slip.scenario.scenario import Scenario, Segment
+
+
+def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
+    """The scenario on the robot's own template.
+
+    Args:
+        robot: its last update is overwritten.
+        scenario: speeds in m/s, as they are; its heights are scaled with l0.
+
+    Raises:
+        ScenarioError: if a segment runs, or wants a speed at VLO that no walking gait has.
+    """
+    own = scenario.on(template_for(robot))
+    slowest, fastest = speed_range(own.parameters)
+    for number, segment in enumerate(own.segments, 1):
+        if segment.gait != "walk":
+            raise ScenarioError(
+                f"segment {number} is to {segment.gait}, and robots only walk so far: leave it"
+                " out, or run the scenario on the template with template-control slip"
+            )
+        for speed in _speeds(segment):
+            if not slowest <= speed <= fastest:
+                raise ScenarioError(
+                    f"segment {number} wants {speed:g} m/s at VLO: {robot.name} walks from"
+                    f" {slowest:.3g} to {fastest:.3g} m/s"
+                )
+    if not slowest <= own.start[0] <= fastest:
+        raise ScenarioError(
+            f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from {slowest:.3g} to"
+            f" {fastest:.3g} m/s"
+        )
+    return ScenarioRoute(own)
+
+
+def _speeds(segment: Segment) -> list[float]:
+    """Speeds that a segment names."""
+    return [speed for speed in (segment.speed, segment.until_speed) if speed is not None]

@@ -1,0 +1,74 @@
+"""What is said while functions are compiled."""
+
+import io
+import logging
+
+import pytest
+from rich.console import Console
+
+from template_control import compiling
+from template_control.compiled import compiled
+
+
+@pytest.fixture
+def teller(monkeypatch):
+    """A process that has compiled nothing yet, and a clock that is set by hand."""
+    clock = [100.0]
+    monkeypatch.setattr(compiling.time, "monotonic", lambda: clock[0])
+    fresh = compiling.Teller()
+    monkeypatch.setattr(compiling, "TELLER", fresh)
+
+    def compile_one(seconds):
+        fresh.begin()
+        clock[0] += seconds
+        fresh.end()
+
+    return compile_one
+
+
+def told(terminal, run):
+    stream = io.StringIO()
+    console = Console(file=stream, force_terminal=terminal, width=60, color_system=None)
+    with compiling.compiling(console):
+        run()
+    return stream.getvalue()
+
+
+def test_short_compiling_is_not_worth_a_word(teller, caplog):
+    caplog.set_level(logging.INFO, "template_control")
+    assert told(True, lambda: teller(0.5)) == ""
+    assert caplog.messages == []
+
+
+def test_long_compiling_is_told_once_where_lines_stay(teller, caplog):
+    caplog.set_level(logging.INFO, "template_control")
+    text = told(False, lambda: [teller(0.2) for _ in range(20)])
+    assert text == "compiling once, about 20 s\n"
+    assert caplog.messages == ["compiling once, about 20 s"]
+
+
+def test_a_terminal_sees_one_line_that_goes_away(teller):
+    text = told(True, lambda: [teller(0.2) for _ in range(22)])
+    assert "\n" not in text
+    lines = text.split("\r")
+    assert lines[0].startswith("compiling once, about 20 s: ")
+    assert lines[-3].endswith(" 20%")
+    assert lines[-2].strip() == ""
+
+
+def test_without_a_command_the_logger_is_told(teller, caplog):
+    caplog.set_level(logging.INFO, "template_control")
+    teller(2.0)
+    assert len(caplog.messages) == 1
+
+
+def test_numba_tells_of_what_it_compiles():
+    @compiled
+    def double(x):
+        return 2 * x
+
+    before = compiling.TELLER.done
+    assert double(2.0) == 4.0
+    assert compiling.TELLER.done == before + 1
+    assert double(3.0) == 6.0
+    assert compiling.TELLER.done == before + 1
