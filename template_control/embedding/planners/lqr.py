@@ -144,9 +144,9 @@ class LqrPlanner:
         grid = o.search
         self._grid = Grid(grid.coarse, grid.fine, grid.rounds, *o.spread, grid.narrowing)
         self._law = self._aim()
-        # Compile now what a step would otherwise wait for.
-        linear(self._law, gait.vlo, u := np.empty(3))
-        search(self._law, self._grid, self._scratch, gait.vlo, u, np.empty(3))
+        # Compile now what a step would otherwise wait for; the search only once a step needs
+        # it, as it takes as long again and a walk without disturbances never does.
+        self.decide(gait.vlo)
 
     def _aim(self) -> Law:
         """The linear law about the fixed point the robot has with the present offset."""
