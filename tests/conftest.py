@@ -112,7 +112,7 @@ def understood():
     def parse(line):
         program, *words = shlex.split(line)
         assert program == "template-control"
-        return build_parser().parse_args(words)
+        return build_parser(words).parse_args(words)
 
     return parse
 

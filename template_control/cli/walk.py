@@ -253,7 +253,7 @@ def print_table(figures: dict[str, Any], record: Record) -> None:
         )
     row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
     row("QP failures", f"{figures['qp_failures']}")
-    row("steps beside the planner's own law", f"{figures['steps_not_nominal']}")
+    row("steps off the planner's own law", f"{figures['steps_not_nominal']}")
     for name, key in (
         ("control tick", "control_tick_seconds"),
         ("QP solve", "qp_solve_seconds"),

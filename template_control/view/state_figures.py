@@ -225,7 +225,7 @@ def vlo_states(record: Record) -> Figure:
     if len(far):
         panels[0].plot(
             far, state[far, 0], "s", color=RIGHT, fillstyle="none", markersize=7,
-            label="best reachable step taken",
+            label="step off the planner's own law",
         )  # fmt: skip
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)

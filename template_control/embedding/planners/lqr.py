@@ -146,9 +146,9 @@ class LqrPlanner:
         grid, spread = self.options.search, self.options.spread
         self._grid = Grid(grid.coarse, grid.fine, grid.rounds, *spread, grid.narrowing)
         self._settle_on(gait)
-        # Compile now what a step would otherwise wait for.
-        linear(self._law, gait.vlo, u := np.empty(3))
-        search(self._law, self._grid, self._scratch, gait.vlo, u, np.empty(3))
+        # Compile now what a step would otherwise wait for; the search only once a step needs
+        # it, as it takes as long again and a walk without disturbances never does.
+        self.decide(gait.vlo)
 
     def _settle_on(self, gait: WalkingGait) -> None:
         """Make ``gait`` the one that the law leads to."""

@@ -27,8 +27,8 @@ class Decision:
         predicted: (3,) dx/dt, y, dy/dt that the stride should end in, offset included.
         feasible: whether the template completes the stride with these controls.
         lasting: whether it also completes the stride after that, as far as the planner looks.
-        nominal: whether the planner follows its own law, near its gait. Otherwise ``controls``
-            are the best that a search has found, and nothing is learnt from the stride.
+        nominal: the planner follows its own law, towards the target that was asked for. Nothing
+            is learnt from other strides.
     """
 
     controls: Array

@@ -123,7 +123,11 @@ def section_jacobian(
         The rest as in :func:`section_map`.
     """
     result, jacobian = found
-    zc, uc = z.astype(np.complex128), controls.astype(np.complex128)
+    zc, uc = np.empty(z.shape[0], np.complex128), np.empty(controls.shape[0], np.complex128)
+    for i in range(z.shape[0]):
+        zc[i] = z[i]
+    for i in range(controls.shape[0]):
+        uc[i] = controls[i]
     out = np.empty(RESULTS, np.complex128)
     outcome = 0
     for c in range(columns.shape[0]):
