@@ -25,18 +25,13 @@ def pytest_configure():
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.hookimpl(tryfirst=True)  # xdist reads the groups where it is called itself
 def pytest_collection_modifyitems(items):
-    """Share the tests among the processes: the quick ones file by file, the longest first."""
+    """Start the longest first: none shall be left to one process at the end."""
 
     def seconds(item):
         mark = item.get_closest_marker("slow")
-        return mark.kwargs.get("seconds", 2.0) if mark else 0.0
+        return mark.kwargs.get("seconds", 0.0) if mark else 0.0
 
-    for item in items:
-        if not seconds(item):
-            shared = "long_walk" if "long_walk" in item.fixturenames else item.path.stem
-            item.add_marker(pytest.mark.xdist_group(shared))
     items.sort(key=seconds, reverse=True)
 
 
