@@ -10,7 +10,7 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.slip.maps.section import VLO
 from template_control.view.figures import FIGURES
-from template_control.view.state_figures import phase_portrait, template_energies, vlo_states
+from template_control.view.state_figures import phase_portrait, section_states, template_energies
 
 
 @pytest.fixture(scope="module")
@@ -111,8 +111,8 @@ def test_energies_add_up(record):
     assert np.allclose(parts["total"], parts["kinetic"] + parts["gravity"] + parts["spring"])
 
 
-def test_vlo_figure_shows_the_recorded_states(record, gait):
-    figure = vlo_states(record)
+def test_section_figure_shows_the_recorded_states(record, gait):
+    figure = section_states(record)
     speed, height, vertical, energy = figure.axes
     for axes, column in ((speed, 0), (height, 1), (vertical, 2)):
         shown = {line.get_label(): line.get_ydata() for line in axes.lines}
@@ -120,7 +120,7 @@ def test_vlo_figure_shows_the_recorded_states(record, gait):
         assert np.array_equal(
             shown["expected by the planner"], record.section_predicted[:-1, column]
         )
-        assert np.allclose(shown["gait"], gait.vlo[column])
+        assert np.allclose(shown["target"], gait.vlo[column])
     reached = next(line for line in energy.lines if line.get_label() == "reached").get_ydata()
     assert reached[-1] == pytest.approx(VLO.energy(gait.parameters, record.section_state[-1]))
 

@@ -25,6 +25,7 @@ from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
+from template_control.view.figures import FIGURES, save_figures
 from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.foot_task import FootTask
 from template_control.whole_body.momentum_task import MomentumTask
@@ -210,3 +211,8 @@ def test_record_names_the_toy_s_nodes_section_and_stride(record, tmp_path):
     assert np.isnan(swings[:, 0]).any()
     again = Record.load(record.save(tmp_path / "hop.npz"))
     np.testing.assert_array_equal(again.section_state, record.section_state)
+
+
+@pytest.mark.slow
+def test_the_toy_s_figures_are_drawn(record, tmp_path):
+    assert {path.stem for path in save_figures(record, tmp_path)} == set(FIGURES)

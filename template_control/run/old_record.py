@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from template_control.slip.automaton.automaton import AUTOMATON
+
 RENAMED = {
     "vlo_time": "section_time",
     "vlo_state": "section_state",
@@ -35,6 +37,9 @@ def from_walk(fields: dict[str, Any]) -> dict[str, Any]:
     target = np.array(metadata["gait_vlo"])
     metadata["gait_state"] = metadata.pop("gait_vlo")
     metadata["sections"], metadata["strides"] = ["VLO"], ["w"]
+    nodes = [AUTOMATON.node(name) for name in metadata["nodes"]]
+    metadata["phases"] = [node.phase.name for node in nodes]
+    metadata["stiffness_slots"] = [[node.rear, node.front] for node in nodes]
     both = np.full((len(now["time"]), 2, 2), np.nan)
     both[np.arange(len(both)), 1 - now["rear"]] = now["swing_reference"]
     now["swing_reference"] = both

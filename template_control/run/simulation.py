@@ -209,6 +209,7 @@ def _metadata(
 ) -> dict[str, Any]:
     robot, gait = controller.robot, controller.planner.gait
     parameters = asdict(gait.parameters)
+    nodes = controller.planning.automaton.nodes
     metadata = {
         "robot": robot.name,
         "urdf": robot.urdf,
@@ -218,7 +219,9 @@ def _metadata(
         "feet": list(robot.feet),
         "legs": [list(leg) for leg in robot.legs],
         "trunk_com": robot.trunk_com,
-        "nodes": [node.name for node in controller.planning.automaton.nodes],
+        "nodes": [node.name for node in nodes],
+        "phases": [node.phase.name for node in nodes],
+        "stiffness_slots": [[node.rear, node.front] for node in nodes],
         "gait": gait.name,
         "template": parameters,
         "gait_state": gait.state.tolist(),

@@ -16,8 +16,8 @@ from template_control.run.record import Record
 from template_control.view.state_figures import (
     energies,
     phase_portrait,
+    section_states,
     tracking_errors,
-    vlo_states,
 )
 from template_control.view.style import (
     COM,
@@ -181,7 +181,7 @@ FIGURES: dict[str, Callable[[Record], Figure]] = {
     "phase_portrait": phase_portrait,
     "tracking": tracking_errors,
     "energies": energies,
-    "vlo": vlo_states,
+    "sections": section_states,
 }
 """Every figure of a walk, by file name."""
 

@@ -1,4 +1,4 @@
-"""Figures of a walk's state: phase portrait, tracking errors, energies, VLO states."""
+"""Figures of a walk's state: phase portrait, tracking errors, energies, states at the sections."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.run.record import Record
-from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.maps.section import VLO
+from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, shade, window
 
@@ -22,6 +22,23 @@ _MOST_POINTS = 20_000  # of a line that shows a whole run
 
 def _parameters(record: Record) -> SlipParameters:
     return SlipParameters(**record.metadata["template"])
+
+
+def _sections(record: Record) -> list[Section]:
+    """The kind of each section of the run."""
+    kinds = [section_of(Event[name]) for name in record.metadata["sections"]]
+    return [kinds[i] for i in record.section]
+
+
+def _where(record: Record) -> str:
+    """The sections of the run in words, such as "VLO"."""
+    return " and ".join(record.metadata["sections"])
+
+
+def _energies_at(record: Record, sections: list[Section], states: Array) -> Array:
+    """Energy of states (n, 3) at ``sections`` (n) [J]."""
+    p = _parameters(record)
+    return np.array([s.energy(p, z[: s.dimension]) for s, z in zip(sections, states, strict=True)])
 
 
 def _whole(record: Record) -> slice:
@@ -37,16 +54,16 @@ def _broken(values: Array, rear: NDArray[np.int64]) -> Array:
 
 
 def phase_portrait(record: Record) -> Figure:
-    """y against dy/dt, and x from the rear stance foot against dx/dt, with every VLO.
+    """y against dy/dt, and x from the rear stance foot against dx/dt, with every section.
 
-    The whole run is pale, its last 2.2 s are strong. The planner's VLO state has its dx/dt from
+    The whole run is pale, its last 2.2 s are strong. The planner's state has its dx/dt from
     the angular momentum about the stance foot.
     """
     figure = Figure(figsize=(9.0, 4.4), layout="constrained")
     upright, forward = figure.subplots(1, 2)
     samples = np.arange(len(record.time))
     toe = record.foot[samples, record.rear, 0]
-    target = record.metadata["gait_state"]
+    target, where = record.section_target[-1], _where(record)
     rows = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
     panels: tuple[tuple[Axes, int, Array, tuple[float, float]], ...] = (
         (upright, 1, np.zeros(len(toe)), (target[1], target[2])),
@@ -66,15 +83,15 @@ def phase_portrait(record: Record) -> Figure:
         across = record.com[rows, axis] - origin[rows]
         axes.plot(
             across, record.com_velocity[rows, axis], "o", color=RIGHT, markersize=3, zorder=4,
-            label="robot at VLO",
+            label=f"robot at {where}",
         )  # fmt: skip
         seen = record.section_state[:, 1 if axis else 0], record.section_state[:, 2]
         planned = seen if axis else (np.zeros(len(rows)), seen[0])
         axes.plot(
             *planned, "o", color=RIGHT, fillstyle="none", markersize=4, zorder=4,
-            label="VLO state of the planner",
+            label=f"{where} state of the planner",
         )  # fmt: skip
-        axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label="VLO of the gait")
+        axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=f"{where} of the gait")
     upright.set(xlabel="y [m]", ylabel="dy/dt [m/s]")
     forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
     upright.set_title(f"{record.metadata['robot']}: phase portrait", loc="left")
@@ -128,12 +145,12 @@ def template_energies(record: Record) -> dict[str, Array]:
     step = np.maximum(np.searchsorted(record.section_time, record.time, side="right") - 1, 0)
     stiffness = np.zeros((len(record.time), 2))
     for index in np.unique(record.node):
-        node = AUTOMATON.node(record.metadata["nodes"][index])
+        slots = record.metadata["stiffness_slots"][index]
         on = record.node == index
-        for leg, slot in enumerate((node.rear, node.front)):
+        for leg, slot in enumerate(slots):
             # A template that touches down before the robot's foot does has both legs loaded
             # in the robot's single stance.
-            used = node.rear if slot is None else slot
+            used = slots[0] if slot is None else slot
             if used is not None:
                 stiffness[on, leg] = record.section_controls[step[on], used]
     force_squared = np.sum(record.template_force**2, axis=2)
@@ -175,8 +192,9 @@ def energies(record: Record) -> Figure:
         label="template",
     )  # fmt: skip
     lower.plot(time, template["total"][w], color=TEMPLATE, label="template with its springs")
-    target = float(VLO.energy(p, record.metadata["gait_state"]))
-    lower.axhline(target, color=LEFT, linewidth=1.2, linestyle=":", label="gait at VLO")
+    target = _energies_at(record, _sections(record)[-1:], record.section_target[-1:])[0]
+    label = f"gait at {_where(record)}"
+    lower.axhline(target, color=LEFT, linewidth=1.2, linestyle=":", label=label)
     lower.set(xlabel="time [s]", ylabel="sum [J]")
     for axes in panels:
         shade(axes, record, w)
@@ -186,39 +204,40 @@ def energies(record: Record) -> Figure:
     return figure
 
 
-def vlo_states(record: Record) -> Figure:
-    """State and energy at each VLO against the gait's and what the planner expected.
+def section_states(record: Record) -> Figure:
+    """State and energy at each section against the target's and what the planner expected.
 
-    The energy is E = m v^2 / 2 + m g y + k0 (l0 - y)^2 / 2, as in Section IV-D.
+    The energy is E = m v^2 / 2 + m g y, at VLO with k0 (l0 - y)^2 / 2, as in Section IV-D.
     """
-    p = _parameters(record)
     state, expected = record.section_state, record.section_predicted[:-1]
-    target = np.array(record.metadata["gait_state"])
+    # What a stride was to end in is the target of the section where it began.
+    target = np.vstack((record.section_target[:1], record.section_target[:-1]))
+    sections = _sections(record)
     steps = np.arange(len(state))
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True)
     common: dict[str, Any] = {"linewidth": 0.9, "markersize": 3.5}
-    for axes, values, predicted, wanted, least, name in (
-        (panels[0], state[:, 0], expected[:, 0], target[0], 0.005, "dx/dt [m/s]"),
-        (panels[1], state[:, 1], expected[:, 1], target[1], 0.001, "y [m]"),
-        (panels[2], state[:, 2], expected[:, 2], target[2], 0.005, "dy/dt [m/s]"),
-        (
-            panels[3],
-            VLO.energy(p, state),
-            VLO.energy(p, expected),
-            VLO.energy(p, target),
-            1.0,
-            "energy [J]",
-        ),
+    energy = (
+        _energies_at(record, sections, state),
+        _energies_at(record, sections[1:], expected),
+        _energies_at(record, sections, target),
+    )
+    for axes, (values, predicted, wanted), least, name in (
+        (panels[0], (state[:, 0], expected[:, 0], target[:, 0]), 0.005, "dx/dt [m/s]"),
+        (panels[1], (state[:, 1], expected[:, 1], target[:, 1]), 0.001, "y [m]"),
+        (panels[2], (state[:, 2], expected[:, 2], target[:, 2]), 0.005, "dy/dt [m/s]"),
+        (panels[3], energy, 1.0, "energy [J]"),
     ):
-        axes.axhline(wanted, color=LEFT, linewidth=1.0, linestyle=":", label="gait")
+        axes.step(
+            steps, wanted, where="mid", color=LEFT, linewidth=1.0, linestyle=":", label="target"
+        )
         axes.plot(
             steps[1:], predicted, "x", color="0.55", markersize=4, label="expected by the planner"
         )
         axes.plot(steps, values, "o-", color=COM, label="reached", **common)
         axes.set_ylabel(name)
         # A first step on its target is no reason to magnify rounding errors.
-        axes.update_datalim([(0.0, wanted - least), (0.0, wanted + least)])
+        axes.update_datalim([(0.0, wanted[0] - least), (0.0, wanted[0] + least)])
         axes.autoscale_view()
         axes.ticklabel_format(axis="y", useOffset=False)
     far = np.flatnonzero(~record.section_nominal)
@@ -229,7 +248,8 @@ def vlo_states(record: Record) -> Figure:
         )  # fmt: skip
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    panels[0].set_title(f"{record.metadata['robot']}: at VLO (dx/dt from the angular momentum)")
+    title = f"{record.metadata['robot']}: at {_where(record)}"
+    panels[0].set_title(f"{title} (dx/dt from the angular momentum where a foot stands)")
     panels[-1].set(xlabel="step", xlim=(-0.5, len(state) - 0.5))
     panels[-1].xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)
     return figure

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from template_control.run.record import Record
+from template_control.slip.automaton.vocabulary import Phase
 
 LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
 WINDOW = 2.2  # [s], about four steps
@@ -27,7 +28,7 @@ def window(record: Record, seconds: float = WINDOW) -> slice:
 
 def single_stance(record: Record) -> NDArray[np.bool_]:
     """(T,) whether the robot's controller was in single stance."""
-    single = np.array([name.startswith("SS") for name in record.metadata["nodes"]])
+    single = np.array([phase == Phase.SS.name for phase in record.metadata["phases"]])
     return np.asarray(single[record.node])
 
 
