@@ -15,6 +15,7 @@ from .planners.planner import Decision as Decision
 from .planners.planner import Planner as Planner
 from .references.leg_forces import UnloadOptions as UnloadOptions
 from .references.swing_foot import SwingOptions as SwingOptions
+from .references.template_path import PathOptions as PathOptions
 from .robot_route import robot_route as robot_route
 from .robot_template import default_gait as default_gait
 from .robot_template import paper_gait as paper_gait

@@ -36,6 +36,7 @@ class SectionReport:
         section: VLO or APEX.
         state: (3,) dx/dt (as the phase before senses it), y, dy/dt [m/s, m, m/s].
         goal: the stride that begins, and where it is to lead.
+        target: (3,) dx/dt, y, dy/dt where it is to lead.
         decision: the planner's choice for it.
         offset: (3,) the planner's offset estimate.
         learnt: what the learners knew.
@@ -46,6 +47,7 @@ class SectionReport:
     section: Section
     state: Array
     goal: StrideGoal
+    target: Array
     decision: Decision
     offset: Array
     learnt: Learnt

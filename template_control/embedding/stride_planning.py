@@ -7,13 +7,18 @@ has carried the robot away from it.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import Decision, Planner, Planners
-from template_control.embedding.references.template_path import Landing, TemplatePath, join
+from template_control.embedding.references.template_path import (
+    Landing,
+    PathOptions,
+    TemplatePath,
+    join,
+)
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
 from template_control.errors import ParameterError
@@ -40,9 +45,11 @@ class ReplanOptions:
         angle_drop: the touchdown angle is then taken to be lower by this [rad].
         agility: a touchdown in t seconds can still be planned anew with an angle that differs
             from the old one by this times t^2 [rad/s^2]; the swing foot cannot do more.
+        foresight: t counts as this at most [s]; where no touchdown is due it has no bound.
         calmer: shares of dy/dt, tried in turn, of the states that a path starts from where the
             template cannot go on from the robot's: its leg cannot pull, the robot's can.
         highest: height over l0 above which no such path starts.
+        path: how the robot's place on the path is looked for.
     """
 
     speed: float = tuned(0.05, SPEED)
@@ -50,8 +57,10 @@ class ReplanOptions:
     patience: float = tuned(0.01, TIME)
     angle_drop: float = tuned(0.15)
     agility: float = tuned(8.0, RATE_SQUARED)
+    foresight: float = tuned(1.0, TIME)
     calmer: tuple[float, ...] = tuned((0.5, 0.0))
     highest: float = tuned(0.99)
+    path: PathOptions = field(default_factory=PathOptions)
 
 
 class StridePlanning:
@@ -153,20 +162,21 @@ class StridePlanning:
             self.arrived, goal = True, self.reports[-1].goal
         decision, start = self._plan(section, z, goal)
         seconds = time.perf_counter() - begin
-        offset = self.planner_of(goal).offset.copy()
+        node = self.automaton.start(goal.stride)
+        end = section_of(self.automaton.sections(node.name)[1])
         self.reports.append(
             SectionReport(
                 time=now,
                 section=section,
                 state=section.padded(z),
                 goal=goal,
+                target=end.padded(goal.target),
                 decision=decision,
-                offset=offset,
+                offset=end.padded(self.planner_of(goal).offset),
                 learnt=learnt,
                 plan_seconds=seconds,
             )
         )
-        node = self.automaton.start(goal.stride)
         state = sensed.state.copy()
         if start is not z:
             state[:4] = section.state(start, state[0])
@@ -221,7 +231,7 @@ class StridePlanning:
             start = self.automaton.start(goal.stride).name
             toes = (float(first.toes[0]), float(first.toes[1]))
             strides.append(self._simulator.run(start, first.state, ahead.controls, toes))
-        self.path = join(strides)
+        self.path = join(strides, self.options.path)
         self.toe = self.path.toes[Leg.REAR]
         self._feet = sensed.feet
         self._planned_at = now
@@ -295,7 +305,7 @@ class StridePlanning:
             z = self._back_to_section(node, report, sensed)
             if z is not None:
                 left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
-                change = self.options.agility * min(left, 1.0) ** 2
+                change = self.options.agility * min(left, self.options.foresight) ** 2
                 angle = float(report.decision.controls[Slot.TOUCHDOWN_ANGLE])
                 decision = self.planner.decide(
                     z, report.goal.target, (angle - change, angle + change)

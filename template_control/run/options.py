@@ -12,6 +12,7 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.start import Pose
 from template_control.run.sensing import SensorOptions
+from template_control.slip.similarity import tuned
 
 _LONGEST_DELAY = 1.0  # [s]
 
@@ -46,10 +47,10 @@ class FallOptions:
         patience: number of the gait's step durations that may pass without a section.
     """
 
-    contact_force: float = 0.005
-    height: float = 0.35
-    pitch: float = float(np.radians(60.0))
-    patience: float = 4.0
+    contact_force: float = tuned(0.005)
+    height: float = tuned(0.35)
+    pitch: float = tuned(float(np.radians(60.0)))
+    patience: float = tuned(4.0)
 
 
 @dataclass(frozen=True)

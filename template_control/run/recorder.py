@@ -187,10 +187,10 @@ class Recorder:
             section_time=np.array([r.time for r in reports]),
             section_state=np.array([r.state for r in reports]),
             stride=np.array([strides.index(r.goal.stride) for r in reports], dtype=np.int64),
-            section_target=np.array([_padded(r.goal.target) for r in reports]),
-            section_predicted=np.array([_padded(r.decision.predicted) for r in reports]),
+            section_target=np.array([r.target for r in reports]),
+            section_predicted=np.array([r.decision.predicted for r in reports]),
             section_controls=np.array([r.decision.controls for r in reports]),
-            section_offset=np.array([_padded(r.offset) for r in reports]),
+            section_offset=np.array([r.offset for r in reports]),
             section_nominal=np.array([r.decision.nominal for r in reports]),
             section_feasible=np.array([r.decision.feasible for r in reports]),
             section_load=np.array([r.learnt.load for r in reports]),
@@ -208,10 +208,3 @@ class Recorder:
     def stride_names(self) -> list[str]:
         """Kinds of stride of the run, each once."""
         return list(dict.fromkeys(r.goal.stride for r in self.controller.reports))
-
-
-def _padded(z: Array) -> Array:
-    """A section's state as records keep it: dy/dt is 0 where the section has none."""
-    full = np.zeros(3)
-    full[: len(z)] = z
-    return full

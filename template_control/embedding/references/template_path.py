@@ -21,12 +21,26 @@ from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Rese
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.dynamics.taylor import ORDER
 from template_control.slip.maps.section import VLO
+from template_control.slip.similarity import TIME, tuned
 
 Array = NDArray[np.float64]
 
 _NEWTON = 12
-_OVERRUN = 0.02  # [s] how far a segment's polynomial is followed past its ends
-_LEAP = 0.05  # [s] longest step of the search for a phase
+
+
+@dataclass(frozen=True)
+class PathOptions:
+    """How the robot's place on a path is looked for.
+
+    Attributes:
+        overrun: a segment's polynomial is followed this long past its ends [s]: template and
+            robot do not come to an event at the same time.
+        leap: longest step of the search for a phase [s]. Far from the answer Newton's step is
+            too long.
+    """
+
+    overrun: float = tuned(0.02, TIME)
+    leap: float = tuned(0.05, TIME)
 
 
 class Curve(NamedTuple):
@@ -35,11 +49,14 @@ class Curve(NamedTuple):
     Attributes:
         cx, cy: (n, ORDER + 1) polynomials.
         meta: (n, 7) start time, duration, node, toes, stiffnesses.
+        overrun, leap: of the :class:`PathOptions` [s].
     """
 
     cx: Array
     cy: Array
     meta: Array
+    overrun: float
+    leap: float
 
 
 class Landing(NamedTuple):
@@ -102,11 +119,12 @@ class TemplatePath:
         return passed
 
 
-def join(strides: Sequence[Stride]) -> TemplatePath:
+def join(strides: Sequence[Stride], options: PathOptions | None = None) -> TemplatePath:
     """Join strides, each of which starts where the one before ended.
 
     Args:
         strides: at least one; the path's section is the first one's.
+        options: how the path is looked up.
     """
     metas, offset = [], 0.0
     events, resets = [], []
@@ -118,9 +136,14 @@ def join(strides: Sequence[Stride]) -> TemplatePath:
         resets += [(offset + e.time, e.reset) for e in stride.events]
         offset += stride.duration
     meta = np.concatenate(metas)
+    o = options or PathOptions()
     return TemplatePath(
         curve=Curve(
-            np.concatenate([s.cx for s in strides]), np.concatenate([s.cy for s in strides]), meta
+            cx=np.concatenate([s.cx for s in strides]),
+            cy=np.concatenate([s.cy for s in strides]),
+            meta=meta,
+            overrun=o.overrun,
+            leap=o.leap,
         ),
         events=tuple(events),
         landings=_landings(meta, resets),
@@ -177,7 +200,7 @@ def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
     while row + 1 < meta.shape[0] and meta[row + 1, 0] <= time:
         row += 1
     # Past either end the path goes on along its last polynomial for a moment, then stops.
-    local = min(max(time - meta[row, 0], -_OVERRUN), meta[row, 1] + _OVERRUN)
+    local = min(max(time - meta[row, 0], -curve.overrun), meta[row, 1] + curve.overrun)
     _polynomial(curve.cx[row], local, out, 0)
     _polynomial(curve.cy[row], local, out, 1)
     out[0] -= toe
@@ -209,7 +232,7 @@ def at_direction(
         if slope < 1e-6:
             break
         step = (out[1] * x - out[0] * y) / slope
-        t = min(max(t + min(max(step, -_LEAP), _LEAP), 0.0), end)
+        t = min(max(t + min(max(step, -curve.leap), curve.leap), 0.0), end)
         if abs(step) < 1e-10:
             break
     return t, sample(curve, toe, t, out)
