@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from template_control.compiled import inner
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.tables import TABLES, Tables
 from template_control.slip.parameters import SlipParameters
@@ -30,14 +31,20 @@ class Model(NamedTuple):
 class Kernel(NamedTuple):
     """A kind of stride of one template.
 
+    The model's numbers lie in it side by side: a tuple more within it would cost a
+    microsecond at every call from Python.
+
     Attributes:
         tables: the packed automaton.
-        model: the template.
+        mass, gravity, rest_length, max_time: see :class:`Model`.
         node: index of the stride's first node.
     """
 
     tables: Tables
-    model: Model
+    mass: float
+    gravity: float
+    rest_length: float
+    max_time: float
     node: int
 
 
@@ -53,6 +60,12 @@ def kernel_model(parameters: SlipParameters, max_time: float | None = None) -> M
     return Model(p.mass, p.gravity, p.rest_length, float(limit))
 
 
+@inner
+def model_of(kernel: Kernel) -> Model:
+    """The template of a kernel."""
+    return Model(kernel.mass, kernel.gravity, kernel.rest_length, kernel.max_time)
+
+
 def stride_kernel(parameters: SlipParameters, stride: str) -> Kernel:
     """The kernel's input for strides of a kind, a key of ``STRIDE_START``."""
-    return Kernel(TABLES, kernel_model(parameters), AUTOMATON.index[STRIDE_START[stride]])
+    return Kernel(TABLES, *kernel_model(parameters), node=AUTOMATON.index[STRIDE_START[stride]])

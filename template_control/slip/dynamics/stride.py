@@ -156,7 +156,7 @@ def simulate_stride(
     x = finite("state", state, 4)
     c = finite("toes", toes, 2)
     outcome, node, segments, events, duration = run_stride(
-        Kernel(TABLES, kernel_model(parameters, max_time), AUTOMATON.index[start]),
+        Kernel(TABLES, *kernel_model(parameters, max_time), node=AUTOMATON.index[start]),
         x,
         c,
         finite("controls", u, NUM_SLOTS),
