@@ -98,7 +98,7 @@ def bounded(law: Law, z: Array, u: Array) -> None:
     """
     for i in range(3):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
-    top = np.arcsin(min(z[1] / law.kernel.model.rest_length, 1.0)) - law.top_margin
+    top = np.arcsin(min(z[1] / law.kernel.rest_length, 1.0)) - law.top_margin
     u[0] = min(u[0], top)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
-from template_control.slip.dynamics.model import Kernel, Model, stride_kernel
+from template_control.slip.dynamics.model import Kernel, Model, model_of, stride_kernel
 from template_control.slip.maps.section_map import RESULTS, closed_form, section_map
 from template_control.slip.parameters import SlipParameters
 
@@ -123,7 +123,7 @@ def modified_step(
     rear, front = result[4], result[5]
     if not np.isfinite(rear.real):
         return outcome
-    wanted = energy_stiffness(z, aim.target, front, rear, controls[_K_SC], kernel.model)
+    wanted = energy_stiffness(z, aim.target, front, rear, controls[_K_SC], model_of(kernel))
     if wanted.real < stiffness_range[0]:
         wanted = stiffness_range[0] + 0.0 * wanted
     elif wanted.real > stiffness_range[1]:

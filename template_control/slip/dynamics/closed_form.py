@@ -13,7 +13,7 @@ from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_bottom
 from template_control.slip.dynamics.locate import Watch, arm, first_event, root
-from template_control.slip.dynamics.model import Kernel, Model
+from template_control.slip.dynamics.model import Kernel, Model, model_of
 from template_control.slip.dynamics.path import FLIGHT, STANCE, Path, sample
 from template_control.slip.dynamics.stance_map import (
     Launch,
@@ -161,7 +161,7 @@ def closed_form_stride(
     Returns:
         The Outcome's value.
     """
-    tables, model, node = kernel
+    tables, model, node = kernel.tables, model_of(kernel), kernel.node
     alpha = controls[0]
     rest_length = model.rest_length
     touchdown_height = rest_length * np.sin(alpha)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from template_control.compiled import entry, inner
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
 from template_control.slip.dynamics.locate import Watch, arm, first_event
-from template_control.slip.dynamics.model import Kernel
+from template_control.slip.dynamics.model import Kernel, model_of
 from template_control.slip.dynamics.path import COEFFICIENTS, SERIES, Path, sample
 from template_control.slip.dynamics.taylor import ORDER, expand
 
@@ -147,7 +147,7 @@ def run_stride(
         Outcome, last node (the one entered, where the section was reached), number of
         segments, number of events, duration [s].
     """
-    tables, model, node = kernel
+    tables, model, node = kernel.tables, model_of(kernel), kernel.node
     gravity, rest_length, max_time = model.gravity, model.rest_length, model.max_time
     cx, cy, meta, events, work = scratch[:5]
     out, stiffness, values, armed = scratch.out, scratch.stiffness, scratch.values, scratch.armed

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from template_control.compiled import inner
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.tables import Tables
@@ -31,14 +32,20 @@ class Model(NamedTuple):
 class Kernel(NamedTuple):
     """A kind of stride of one template.
 
+    The model's numbers lie in it side by side: a tuple more within it would cost a
+    microsecond at every call from Python.
+
     Attributes:
         tables: the packed automaton.
-        model: the template.
+        mass, gravity, rest_length, max_time: see :class:`Model`.
         node: index of the stride's first node.
     """
 
     tables: Tables
-    model: Model
+    mass: float
+    gravity: float
+    rest_length: float
+    max_time: float
     node: int
 
 
@@ -52,6 +59,12 @@ def kernel_model(parameters: SlipParameters, max_time: float | None = None) -> M
     p = parameters
     limit = 20.0 * np.sqrt(p.rest_length / p.gravity) if max_time is None else max_time
     return Model(p.mass, p.gravity, p.rest_length, float(limit))
+
+
+@inner
+def model_of(kernel: Kernel) -> Model:
+    """The template of a kernel."""
+    return Model(kernel.mass, kernel.gravity, kernel.rest_length, kernel.max_time)
 
 
 def stride_kernel(
@@ -68,4 +81,4 @@ def stride_kernel(
         ParameterError: if there is no such stride.
     """
     node = automaton.index[automaton.start(stride).name]
-    return Kernel(automaton.tables, kernel_model(parameters), node)
+    return Kernel(automaton.tables, *kernel_model(parameters), node=node)

@@ -193,7 +193,7 @@ class StrideSimulator:
         x = finite("state", state, 4)
         c = finite("toes", toes, 2)
         outcome, node, segments, events, duration = run_stride(
-            Kernel(self.automaton.tables, self._model, self.automaton.index[start]),
+            Kernel(self.automaton.tables, *self._model, node=self.automaton.index[start]),
             x,
             c,
             finite("controls", u, NUM_SLOTS),

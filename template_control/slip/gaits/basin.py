@@ -71,7 +71,7 @@ def _steps(
             return step, False
         for i in range(3):
             z[i] = result[i]
-        height = (z[1] - goal[0]) / (_HEIGHT * kernel.model.rest_length)
+        height = (z[1] - goal[0]) / (_HEIGHT * kernel.rest_length)
         angle = (-np.arctan2(z[2], z[0]) - goal[1]) / _ANGLE
         distance = np.sqrt(height * height + angle * angle)
         if step < _WINDOW:
