@@ -1,5 +1,6 @@
 """What tests share: robot, gaits, a short walk, how a mistake is told, and their own setting."""
 
+import shlex
 import signal
 from pathlib import Path
 
@@ -7,10 +8,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.cli.main import main
-from template_control.robot.library import load_robot
-from template_control.slip.gaits.gait import gait_at, gait_for_speed, gait_from_energy
-from template_control.slip.parameters import SlipParameters
+from template_control.cli.main import build_parser, main
 
 PACKAGE = Path(__file__).parents[1] / "template_control"
 
@@ -27,32 +25,49 @@ def pytest_configure():
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(items):
+    """Start the longest first: none shall be left to one process at the end."""
+
+    def seconds(item):
+        mark = item.get_closest_marker("slow")
+        return mark.kwargs.get("seconds", 0.0) if mark else 0.0
+
+    items.sort(key=seconds, reverse=True)
+
+
 @pytest.fixture
 def robot():
-    return load_robot("five-link")
+    return tc.load_robot("five-link")
 
 
 @pytest.fixture(scope="session")
 def gait():
-    return gait_at(SlipParameters(), np.radians(66.0), 1.1)
+    return tc.gait_at(tc.SlipParameters(), np.radians(66.0), 1.1)
 
 
 @pytest.fixture(scope="session")
 def default_gait():
     """What the five-link robot walks with unless told otherwise: ``gait``, but for rounding."""
-    return tc.default_gait(load_robot("five-link"))
+    return tc.default_gait(tc.load_robot("five-link"))
 
 
 @pytest.fixture(scope="session")
 def brisk_gait():
     """1.2 m/s on average, for tests that draw many states and cannot make it for each."""
-    return gait_for_speed(SlipParameters(), 1.2)
+    return tc.gait_for_speed(tc.SlipParameters(), 1.2)
 
 
 @pytest.fixture(scope="session")
 def paper_gait():
     """The paper's walking equilibrium: 0.9818 m and 826 J."""
-    return gait_from_energy(SlipParameters(), 0.9818, 826.0)
+    return tc.gait_from_energy(tc.SlipParameters(), 0.9818, 826.0)
+
+
+@pytest.fixture(scope="session")
+def long_walk(default_gait):
+    """Twelve steps of the five-link robot on its default gait, recorded."""
+    robot = tc.load_robot("five-link")
+    return tc.simulate(robot, tc.LqrPlanner(default_gait), tc.SimulationOptions(steps=12))
 
 
 @pytest.fixture
@@ -83,6 +98,18 @@ def refused(capfd):
         return line
 
     return run
+
+
+@pytest.fixture
+def understood():
+    """Parses a line that a page prints; refuses options that its command does not have."""
+
+    def parse(line):
+        program, *words = shlex.split(line)
+        assert program == "template-control"
+        return build_parser().parse_args(words)
+
+    return parse
 
 
 @pytest.fixture
