@@ -10,8 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from template_control.slip.gaits.gait import gait_at
-from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 from template_control.sweep.sweep import sweep
 
@@ -56,6 +54,10 @@ def logged(x, pause=0.02):
 
 
 def walking_step(angle, speed):
+    # Imported here: the processes that the other tests start and kill need nothing compiled.
+    from template_control.slip.gaits.gait import gait_at
+    from template_control.slip.maps.return_map import ReturnMap
+
     gait = gait_at(P, np.radians(angle), speed)
     mapped = ReturnMap(P, "w")(gait.vlo, gait.controls)
     return {"outcome": mapped.outcome, "error": np.max(np.abs(mapped.state - gait.vlo))}

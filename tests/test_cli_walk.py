@@ -31,6 +31,7 @@ def command(*arguments):
     )
 
 
+@pytest.mark.slow
 def test_json_is_all_there_is_on_stdout(tmp_path):
     done = command("walk", "--steps", "3", "--json", "--output", str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
@@ -50,9 +51,10 @@ def test_table_and_no_figures(tmp_path, capfd):
 
 
 def test_a_fall_exits_with_one_and_keeps_the_run(tmp_path, capfd):
-    arguments = ["walk", "--steps", "10", "--torque-scale", "0.2", "--json"]
+    arguments = ["walk", "--steps", "10", "--torque-scale", "0.2", "--json", "--no-figures"]
     assert main([*arguments, "--output", str(tmp_path)]) == 1
     figures = json.loads(capfd.readouterr().out)
+    assert set(figures) >= KEYS
     assert figures["fell"]
     assert "step" in figures["fall_reason"]
     assert Record.load(tmp_path / "run.npz").fell

@@ -17,6 +17,8 @@ from template_control.errors import SweepError
 from template_control.sweep.file import plain
 from template_control.sweep.sweep import grid
 
+pytestmark = pytest.mark.slow  # starting a cluster and its workers takes longest
+
 
 def fatal(x):
     """Kills every worker it is tried on, at x = 1."""
@@ -96,7 +98,6 @@ def test_a_killed_dask_worker_costs_no_result(dask, tmp_path):
     assert sorted(kept(path)) == list(range(COUNT))
 
 
-@pytest.mark.slow
 def test_an_item_that_kills_dask_workers_is_a_failure(dask, tmp_path):
     run = partial(quietly, fatal, grid(x=range(4)), tmp_path / "s", dask.get_executor())
     failures = run().failures

@@ -49,7 +49,7 @@ def test_rays_meet_the_ground_where_it_is_said_to_be(robot, height, edge):
             assert options.ground_height(x) == (height if x > edge else 0.0)
 
 
-@pytest.mark.parametrize("height", [0.005, -0.005])
+@pytest.mark.parametrize("height", [0.005, pytest.param(-0.005, marks=pytest.mark.slow)])
 def test_a_step_nobody_told_of_moves_the_feet(on_step, robot, height):
     step, record = on_step(height)
     assert not record.fell
@@ -74,13 +74,14 @@ def test_momentum_changes_by_the_forces_on_both_levels(on_step, robot):
     assert np.quantile(np.abs(residual), 0.99) < 10.0
 
 
-def test_an_edge_out_of_reach_changes_nothing(robot, gait):
-    flat = walk(robot, gait, steps=4)
-    ahead = walk(robot, gait, steps=4, plant=PlantOptions(ground_step=GroundStep(0.05, 50.0)))
-    np.testing.assert_array_equal(ahead.q, flat.q)
+def test_an_edge_out_of_reach_changes_nothing(robot, default_gait, short_walk):
+    def towards(height):
+        plant = PlantOptions(ground_step=GroundStep(height, 50.0))
+        return walk(robot, default_gait, steps=short_walk.steps, plant=plant)
+
+    np.testing.assert_array_equal(towards(0.05).q, short_walk.q)
     # Before a step down the ground is another kind of body, which carries as well.
-    above = walk(robot, gait, steps=4, plant=PlantOptions(ground_step=GroundStep(-0.05, 50.0)))
-    np.testing.assert_allclose(above.vlo_state, flat.vlo_state, atol=1e-3)
+    np.testing.assert_allclose(towards(-0.05).vlo_state, short_walk.vlo_state, atol=1e-3)
 
 
 def test_a_wall_pushes_sideways(robot):
@@ -178,7 +179,7 @@ def test_noise_is_seeded_and_scales_with_the_template(robot):
     assert not v.any()
 
 
-@pytest.mark.parametrize("ticks", [0, 1, 4])
+@pytest.mark.parametrize("ticks", [0, pytest.param(1, marks=pytest.mark.slow), 4])
 def test_torques_act_that_many_ticks_later(robot, gait, monkeypatch, ticks):
     spy = Spy(monkeypatch)
     record = walk(robot, gait, steps=2, delay=ticks * 1e-3)

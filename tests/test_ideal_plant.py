@@ -226,13 +226,13 @@ def test_agrees_with_pybullet_over_a_short_stance(robot):
 
 @pytest.fixture(scope="module")
 def record(gait):
-    options = SimulationOptions(steps=6, plant=IdealOptions())
+    options = SimulationOptions(steps=4, plant=IdealOptions())
     return simulate(load_robot("five-link"), LqrPlanner(gait), options)
 
 
 def test_the_robot_walks_on_it(record):
     assert record.metadata["plant"] == "ideal"
-    assert record.steps == 6
+    assert record.steps == 4
     assert not record.fell
     assert record.metadata["summary"]["qp_failures"] == 0
 

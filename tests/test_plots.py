@@ -41,14 +41,8 @@ def cut(record, samples):
     return replace(record, **held)
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        *(pytest.param(k, marks=pytest.mark.slow) for k in ("whole", "two samples")),
-        "fallen",
-        "no step",
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["whole", "two samples", "fallen", "no step"])
 def test_every_run_has_every_figure(record, gait, kind, tmp_path):
     if kind == "fallen":
         weak = tc.EmbeddingOptions(torque_scale=0.2)
@@ -64,12 +58,17 @@ def test_every_run_has_every_figure(record, gait, kind, tmp_path):
         assert np.mean(picture.min(axis=2) < 0.8) > 0.005, f"{path} is empty"
 
 
-def test_the_command_draws_beside_the_run_or_elsewhere(record, tmp_path, capfd):
+def test_the_command_draws_beside_the_run(record, tmp_path, capfd):
     run = record.save(tmp_path / "run.npz")
     assert main(["plots", str(run)]) == 0
     beside = [tmp_path / f"{name}.png" for name in FIGURES]
     assert capfd.readouterr().out.split() == [str(path) for path in beside]
     assert all(path.is_file() for path in beside)
+
+
+@pytest.mark.slow
+def test_the_command_draws_elsewhere(record, tmp_path):
+    run = record.save(tmp_path / "run.npz")
     assert main(["plots", str(run), "--output", str(tmp_path / "new" / "folder")]) == 0
     assert len(list((tmp_path / "new" / "folder").glob("*.png"))) == len(FIGURES)
 

@@ -14,7 +14,7 @@ from template_control.robot.library import load_robot
 from template_control.robustness import campaign as robustness
 from template_control.robustness.campaign import Finding, Level, measure, off_gait, trial
 from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
-from template_control.run.simulation import SimulationOptions, simulate
+from template_control.run.simulation import simulate
 from template_control.slip.parameters import SlipParameters
 from template_control.view.robustness_figure import robustness_figure
 
@@ -22,10 +22,9 @@ DOCS = Path(__file__).parents[1] / "docs"
 BY_NAME = {d.name: d for d in DISTURBANCES}
 
 
-@pytest.fixture(scope="module")
-def undisturbed(default_gait):
-    robot = load_robot("five-link")
-    return simulate(robot, LqrPlanner(default_gait), SimulationOptions(steps=BEGIN + 1 + AFTER))
+@pytest.fixture
+def undisturbed(long_walk):
+    return long_walk
 
 
 # -- what a disturbance is -------------------------------------------------------------
@@ -60,7 +59,11 @@ def test_levels_are_round_and_grow_more_severe():
     assert BY_NAME["friction"].shown(0.55) == "0.55"
 
 
-def test_options_hold_the_level(robot, gait):
+def test_options_hold_the_level(robot, gait, monkeypatch):
+    # Where the robot really treads is the next test's.
+    monkeypatch.setattr(
+        Situation, "footholds", lambda self, _, steps: self.gait.step_length * np.arange(steps + 1)
+    )
     where = Situation(robot, gait)
 
     def of(name, level, number=2):
@@ -72,6 +75,8 @@ def test_options_hold_the_level(robot, gait):
     assert of("push-backward", 15.0).steps == BEGIN + 1 + AFTER
     assert of("step-up", 0.03).plant.ground_step.height == 0.03
     assert of("step-down", 0.03).plant.ground_step.height == -0.03
+    edges = [of("step-up", 0.03, number).plant.ground_step.x for number in (0, 4)]
+    assert edges == pytest.approx([4.3 * gait.step_length, 4.7 * gait.step_length])
     assert of("friction", 0.4).plant.friction == 0.4
     assert of("heavier", 0.2).plant.mass_scale == pytest.approx(1.2)
     assert of("lighter", -0.2).plant.mass_scale == pytest.approx(0.8)
@@ -84,6 +89,7 @@ def test_options_hold_the_level(robot, gait):
     assert of("delay", 4e-3).steps == AFTER
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 4])
 def test_the_edge_of_a_step_lies_between_two_footholds(robot, gait, number):
     options = BY_NAME["step-up"].options(Situation(robot, gait), 0.001, number)
@@ -112,11 +118,15 @@ def test_the_error_of_a_walk_is_that_of_its_last_five_steps(undisturbed, default
     assert off_gait(undisturbed, slower)[0] == pytest.approx((1.0 + errors[0]) / 0.9 - 1.0)
 
 
-def test_trials_succeed_or_fall():
+@pytest.mark.slow
+def test_trials_succeed():
     good = trial("five-link", "push-backward", 5.0, 3)
     assert not good["fell"]
     assert good["steps"] == BEGIN + 1 + AFTER
     assert abs(good["speed_error"]) < 0.02
+
+
+def test_trials_fall_alike():
     bad = trial("five-link", "friction", 0.05, 0)
     assert bad["fell"]
     assert bad["reason"]

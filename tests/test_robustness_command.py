@@ -88,17 +88,22 @@ def test_commands_of_the_documentation_are_understood(line):
     assert build_parser().parse_args(words[1:]).command == "robustness"
 
 
-def test_the_documentation_has_its_pictures_and_a_snippet_that_runs(capfd):
+def test_the_documentation_has_its_pictures():
     text = (DOCS / "robustness.md").read_text()
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
     assert len(pictures) == 2
     assert all((DOCS / picture).is_file() for picture in pictures)
+
+
+@pytest.mark.slow
+def test_the_snippet_of_the_documentation_runs(capfd):
+    text = (DOCS / "robustness.md").read_text()
     (snippet,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     exec(snippet, {})
     assert "fell: False" in capfd.readouterr().out
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=40)
 def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
     (line,) = (line for line in commands() if "--quick" in line)
     monkeypatch.chdir(tmp_path)

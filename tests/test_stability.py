@@ -140,6 +140,7 @@ def test_gaits_command(tmp_path, capfd):
         assert text in out
 
 
+@pytest.mark.slow
 def test_gaits_command_follows_controlled_ones(tmp_path, capfd):
     arguments = ["gaits", "--controlled", "improved", "--limits", "825", "827"]
     assert main([*arguments, "--output", str(tmp_path), "--json"]) == 0

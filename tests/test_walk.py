@@ -25,9 +25,9 @@ def walk(gait, planner=LqrPlanner, **options):
     return simulate(load_robot("five-link"), planner(gait), SimulationOptions(**options))
 
 
-@pytest.fixture(scope="module")
-def record(gait):
-    return walk(gait, steps=12)
+@pytest.fixture
+def record(long_walk):
+    return long_walk
 
 
 def test_walks_without_a_fall(record):
@@ -86,9 +86,13 @@ def test_the_node_sequence_is_the_automatons(record):
     assert len(changes) >= 4 * record.steps
 
 
-def test_walk_is_deterministic(record, gait):
-    again = walk(gait, steps=12)
-    np.testing.assert_array_equal(again.q, record.q)
+def test_walk_is_deterministic(record, short_walk):
+    """Walked twice: the second time for fewer steps."""
+    samples = len(short_walk.time)
+    assert samples > 2000
+    for name in ("q", "v", "torque", "contact_force"):
+        again, first = getattr(short_walk, name), getattr(record, name)
+        np.testing.assert_array_equal(again, first[:samples])
 
 
 @pytest.mark.slow
@@ -134,9 +138,11 @@ def test_weak_legs_report_failed_qps_or_a_fall(gait):
     assert record.metadata["summary"]["saturated_share"] > 0.0
 
 
-def test_the_papers_planner_walks_too(gait):
-    record = walk(gait, ModifiedPlanner, steps=15)
+@pytest.mark.parametrize("steps", [4, pytest.param(15, marks=pytest.mark.slow)])
+def test_the_papers_planner_walks_too(gait, steps):
+    record = walk(gait, ModifiedPlanner, steps=steps)
     assert not record.fell
+    assert record.steps == steps
 
 
 def test_bad_options_are_named():
@@ -152,7 +158,7 @@ def settled(record, gait):
     return record.vlo_state[-50:].mean(axis=0) - gait.vlo
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=12)
 def test_settles_on_the_default_gait(gait):
     record = walk(gait, steps=200)
     error = np.abs(settled(record, gait))
@@ -162,7 +168,7 @@ def test_settles_on_the_default_gait(gait):
     assert error[2] <= 0.03
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=12)
 def test_settles_on_the_papers_equilibrium(paper_gait):
     record = walk(paper_gait, steps=200)
     error = np.abs(settled(record, paper_gait))
@@ -172,7 +178,7 @@ def test_settles_on_the_papers_equilibrium(paper_gait):
     assert error[2] <= 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=60)
 def test_thousand_steps(gait):
     record = walk(gait, steps=1000, record_every=10)
     figures = summarise(record, "")
@@ -225,12 +231,17 @@ def test_pushes(gait, impulse, phase):
     assert max(map(abs, off_gait(record, gait))) < 0.02, "back within 20 steps"
 
 
+@pytest.fixture(scope="module")
+def footholds(gait):
+    """About the place where the ground is to step up or down."""
+    return Situation(load_robot("five-link"), gait).footholds(tuple(gait.vlo), 11)[-2:]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("height", [-0.03, 0.03])
 @pytest.mark.parametrize("share", [0.3, 0.4, 0.5, 0.6, 0.7])
-def test_a_step_of_the_ground_that_it_does_not_see(gait, height, share):
-    where = Situation(load_robot("five-link"), gait)
-    before, beyond = where.footholds(tuple(gait.vlo), 11)[-2:]
+def test_a_step_of_the_ground_that_it_does_not_see(gait, footholds, height, share):
+    before, beyond = footholds
     edge = GroundStep(height, before + share * (beyond - before))
     record = walk(gait, steps=31, plant=PlantOptions(ground_step=edge))
     assert not record.fell
