@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import Clock, PhaseControl
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.errors import ParameterError
 from template_control.robot.library import load_robot
 from template_control.robot.start import Pose
 from template_control.run.options import SimulationOptions
@@ -211,6 +212,16 @@ def test_record_names_the_toy_s_nodes_section_and_stride(record, tmp_path):
     assert np.isnan(swings[:, 0]).any()
     again = Record.load(record.save(tmp_path / "hop.npz"))
     np.testing.assert_array_equal(again.section_state, record.section_state)
+
+
+def test_a_table_that_does_not_fit_the_automaton_is_refused():
+    def refused(phases):
+        with pytest.raises(ParameterError) as told:
+            hop(1, embedding=EmbeddingOptions(phases=phases))
+        return str(told.value)
+
+    assert "no entry of the phases serves node F_aa^hop" in refused({Phase.SS: PHASES[Phase.SS]})
+    assert "'SS_sc^hpo', which is no node" in refused({**PHASES, "SS_sc^hpo": PHASES[Phase.SS]})
 
 
 @pytest.mark.slow

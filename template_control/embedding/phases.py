@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.whole_body.com_task import ComTask
@@ -79,13 +80,20 @@ PHASES: Phases = {
 
 
 def phase_control(phases: Phases, node: Node) -> PhaseControl:
-    """Look up what the controller does in a node: the node's own entry, else its phase's.
+    """The entry of a node.
 
     Args:
         phases: the table.
-        node: the automaton's node.
+        node: of the automaton.
 
     Raises:
-        KeyError: if the table has neither entry.
+        ParameterError: if the table has none for it.
     """
-    return phases[node.name] if node.name in phases else phases[node.phase]
+    if node.name in phases:
+        return phases[node.name]
+    if node.phase not in phases:
+        raise ParameterError(
+            f"no entry of the phases serves node {node.name}: give one for it or for"
+            f" Phase.{node.phase.name}"
+        )
+    return phases[node.phase]

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from template_control.embedding.guards import PLACED
 from template_control.embedding.phases import PhaseControl, Phases, phase_control
+from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Event, Leg
+from template_control.slip.automaton.vocabulary import Event, Leg, Phase
 from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.task import TaskStack
 
@@ -42,7 +43,16 @@ def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station
         automaton: whose nodes.
         nv: degrees of freedom of the robot.
         phases: what the controller does in each phase.
+
+    Raises:
+        ParameterError: if a node has no entry, or an entry is for no node.
     """
+    strangers = [key for key in phases if key not in automaton.index and key not in list(Phase)]
+    if strangers:
+        raise ParameterError(
+            f"the phases have an entry for {strangers[0]!r}, which is no node and no Phase: nodes"
+            f" are {', '.join(automaton.index)}"
+        )
     trimmed = {
         node.name
         for start in automaton.starts.values()
