@@ -32,7 +32,7 @@ def test_joined_path_is_continuous_and_knows_its_events(gait):
     times = np.linspace(0.0, path.duration - 1e-6, 400)
     states = np.empty((400, 6))
     for t, row in zip(times, states, strict=True):
-        sample(path.curve, 0.0, t, row)
+        sample(*path.curve, t, row)
     assert np.max(np.abs(np.diff(states[:, :2], axis=0))) < 0.01
     touchdown, liftoff = path.due(Event.TOUCHDOWN), path.due(Event.REAR_LIFTOFF)
     assert touchdown < liftoff < path.due(Event.VLO)
@@ -80,13 +80,13 @@ def test_phase_look_up_inverts_the_path(brisk_gait, time, scale):
         [simulate_stride(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)]
     ).curve
     state, found = np.empty(6), np.empty(6)
-    sample(curve, 0.0, time, state)
+    sample(*curve, time, state)
     # A robot on the same ray from the foot, a little nearer or farther, is in the same phase.
-    t, _ = at_direction(curve, 0.0, scale * state[0], scale * state[1], 0.2, found)
+    t, _ = at_direction(*curve, scale * state[0], scale * state[1], 0.2, found)
     assert t == pytest.approx(time, abs=1e-8)
     np.testing.assert_allclose(found, state, atol=1e-7)
     # By time, wherever the robot is.
-    assert LOCATE[Clock.TIME](curve, 0.0, -5.0, 0.1, time, found)[0] == time
+    assert LOCATE[Clock.TIME](*curve, -5.0, 0.1, time, found)[0] == time
     np.testing.assert_allclose(found, state, atol=1e-12)
 
 

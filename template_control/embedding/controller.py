@@ -14,6 +14,8 @@ centimetres.
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,7 +26,6 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.leg_forces import leg_forces
-from template_control.embedding.references.template_path import LOCATE
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.station import stations
@@ -100,7 +101,7 @@ class EmbeddingController:
         self.ground = 0.0
         self.time = 0.0
         self._rear_shift = 0.0
-        self._sensed = Sensed()
+        self._sensed = Sensed(swing_time=self.feet.swing_time)
         self._guards = RobotGuards(self.parameters, o.guards)
         self._stations = stations(automaton, robot.nv, o.phases)
         self.station = next(iter(self._stations.values()))
@@ -129,7 +130,7 @@ class EmbeddingController:
     @property
     def _origin(self) -> float:
         """Where the template's rear toe is in the world: at the foot, if that stands [m]."""
-        return float(self._sensed.toes[0]) if self.node.stance else self.planning.toe
+        return float(self._sensed.toes[0]) if self.station.stance else self.planning.toe
 
     def start(self, rear: int = 0) -> None:
         """Begin where the route begins; the robot's model must be up to date.
@@ -179,15 +180,13 @@ class EmbeddingController:
 
     def _sense(self, contact: NDArray[np.bool_]) -> None:
         r, s, (rear, front) = self.robot, self._sensed, self.feet.of
-        if self.node.stance:
+        if self.station.stance:
             self.ground = float(r.foot_position[self.feet.landed, 1])
-        s.toes[Leg.REAR] = r.foot_position[rear, 0] + self._rear_shift
-        s.toes[Leg.FRONT] = r.foot_position[front, 0]
+        s.toes[0] = r.foot_position[rear, 0] + self._rear_shift
+        s.toes[1] = r.foot_position[front, 0]
         s.state[0], s.state[1] = r.com[0], r.com[1] - self.ground
         s.state[3] = r.com_velocity[1]
-        for leg, foot in enumerate(self.feet.of):
-            s.contact[leg] = contact[foot]
-            s.swing_time[leg] = self.feet.swing_time[foot]
+        s.contact = contact
         self._sense_speed()
 
     def _sense_speed(self) -> None:
@@ -204,7 +203,7 @@ class EmbeddingController:
     def _advance(self) -> None:
         """Take the first edge of the present node that the robot fires."""
         for edge in self.station.ways:
-            due = self.planning.due(edge.event) - self.phase_time
+            due = self.planning.dues[edge.event] - self.phase_time
             if self._guards.fired(edge, self._sensed, due):
                 self._take(edge)
                 return
@@ -224,7 +223,7 @@ class EmbeddingController:
             self._rear_shift = 0.0
             rear, front = self.feet.of
             s.toes[:] = self.robot.foot_position[[rear, front], 0]
-            self.planning.toe = self.planning.toe_of(rear)
+            self.planning.stand_on(rear)
         if self.station.control.momentum_speed is not before.control.momentum_speed:
             self._sense_speed()
         placed = PLACED.get(edge.reset)
@@ -234,7 +233,7 @@ class EmbeddingController:
             self._decide(section_of(edge.event))
 
     def _standing(self) -> set[int]:
-        return {self.feet.of[leg] for leg in self.node.stance}
+        return {self.feet.of[leg] for leg in self.station.stance}
 
     def _land(self, leg: Leg) -> None:
         """The template's ground is now that of the foot which has landed.
@@ -287,9 +286,10 @@ class EmbeddingController:
     def _locate(self, dt: float) -> None:
         """The template's state and forces at the robot's phase."""
         s, path, toe = self._sensed, self.planning.path, self.planning.toe
-        x, y = s.state[0] + self.phase_offset - s.toes[Leg.REAR], s.state[1]
-        locate = LOCATE[self.station.control.clock]
-        self.phase_time, row = locate(path.curve, toe, x, y, self.phase_time + dt, self.reference)
+        x, y = s.state[0] + self.phase_offset - s.toes[0], s.state[1]
+        self.phase_time, row = self.station.locate(
+            *path.curve, x, y, self.phase_time + dt, self.reference
+        )
         self.phase_offset += (s.state[2] - self.robot.com_velocity[0]) * dt
         segment = path.curve.meta[row]
         leg_forces(
@@ -306,15 +306,15 @@ class EmbeddingController:
     def _swing(self, q: Array, v: Array, dt: float) -> None:
         """Move the references of the feet in the air towards their footholds."""
         station, planning, wanted = self.station, self.planning, self.wanted
-        for leg in station.control.swings:
+        for leg in station.swings:
             foot = self.feet.of[leg]
             swing = self.feet.swing[foot]
-            if planning.reaching and leg is station.awaited:
+            if planning.reaching and leg == station.awaited:
                 swing.drop(dt)
             else:
                 landing = planning.landing(foot)
                 foothold, due = landing.x, landing.time - self.phase_time
-                if not np.isfinite(foothold):
+                if not isfinite(foothold):
                     # The template cannot complete the stride; the gait's own foothold is the
                     # best guess.
                     gait = self.planner.gait
@@ -328,7 +328,7 @@ class EmbeddingController:
         """Let the phase's tasks write what they ask for."""
         s, wanted, station = self._sensed, self.wanted, self.station
         wanted.com_now[:] = s.state
-        wanted.com_now[0] -= s.toes[Leg.REAR]
+        wanted.com_now[0] -= s.toes[0]
         wanted.com_push = self.trim.acceleration if station.control.trims else 0.0
         wanted.pitch_now[0], wanted.pitch_now[1] = q[_PITCH], v[_PITCH]
         wanted.feet = self.feet.of
@@ -338,10 +338,11 @@ class EmbeddingController:
 
     def _stance(self) -> Stance:
         """The feet on the ground, the template's forces on them, and how far they unload."""
-        legs, forces = self.node.stance, self.template_forces
-        cap = np.full(len(legs), np.inf)
-        for leg in self.station.control.unloads:
+        station, forces = self.station, self.template_forces
+        for leg in station.control.unloads:
             weight = self.robot.mass * self.robot.gravity
-            cap[leg] = self.options.unload.cap(forces[leg, 1], weight)
-        feet = tuple(self.feet.of[leg] for leg in legs)
-        return Stance(feet, forces[: len(legs)].ravel(), cap)
+            station.cap[leg] = self.options.unload.cap(forces[leg, 1], weight)
+        legs = station.stance
+        return Stance(
+            tuple(self.feet.of[leg] for leg in legs), forces[: len(legs)].ravel(), station.cap
+        )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,12 @@ class RobotGuards:
     parameters: SlipParameters
     options: GuardOptions
 
+    @cached_property
+    def _shortest_time(self) -> float:
+        """Of a swing [s]."""
+        p = self.parameters
+        return float(self.options.shortest_swing * np.sqrt(p.rest_length / p.gravity))
+
     def fired(self, edge: Edge, sensed: Sensed, due: float) -> bool:
         """Whether the edge's event has happened.
 
@@ -77,7 +84,7 @@ class RobotGuards:
             sensed: the robot now.
             due: time until the template's path comes to that event [s].
         """
-        felt = _FELT.get(edge.event)
+        felt = _FELT[edge.event]
         if felt is not None:
             return felt(self, edge, sensed, due)
         return self._value(edge.event, sensed) >= 0.0
@@ -86,9 +93,8 @@ class RobotGuards:
         return float(guard(int(event), sensed.state, sensed.toes, self.parameters.rest_length, 0.0))
 
     def _touchdown(self, edge: Edge, sensed: Sensed, due: float) -> bool:
-        p, leg = self.parameters, PLACED[edge.reset]
-        shortest = self.options.shortest_swing * np.sqrt(p.rest_length / p.gravity)
-        return bool(sensed.contact[leg]) and bool(sensed.swing_time[leg] > shortest)
+        foot = sensed.feet[PLACED[edge.reset]]
+        return bool(sensed.contact[foot]) and bool(sensed.swing_time[foot] > self._shortest_time)
 
     def _rear_liftoff(self, edge: Edge, sensed: Sensed, due: float) -> bool:
         stretch = self._value(edge.event, sensed)
@@ -101,8 +107,9 @@ class RobotGuards:
         return bool(beta <= angle)
 
 
-_FELT: dict[Event, Callable[[RobotGuards, Edge, Sensed, float], bool]] = {
+_NOT_GEOMETRIC: dict[Event, Callable[[RobotGuards, Edge, Sensed, float], bool]] = {
     Event.TOUCHDOWN: RobotGuards._touchdown,
     Event.REAR_LIFTOFF: RobotGuards._rear_liftoff,
 }
-"""Events that the robot does not read off the template's geometry."""
+_FELT = [_NOT_GEOMETRIC.get(event) for event in Event]
+"""By Event: how the robot feels what it does not read off the template's geometry."""

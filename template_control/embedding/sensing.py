@@ -20,8 +20,8 @@ class Sensed:
             the CoM, so that m y dx/dt - m x dy/dt is the robot's angular momentum about its
             stance foot.
         toes: (2,) x of the rear and the front foot [m].
-        contact: (2,) whether the rear and the front foot touch the ground.
-        swing_time: (2,) time since the rear and the front foot lifted off [s].
+        contact: (2,) whether each foot touches the ground.
+        swing_time: (2,) time since each foot lifted off [s].
         feet: the foot that is the rear leg's, and the front leg's.
     """
 

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from template_control.embedding.guards import PLACED
 from template_control.embedding.phases import PhaseControl, Phases, phase_control
+from template_control.embedding.references.template_path import LOCATE, Locate
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Leg, Phase
 from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.task import TaskStack
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -23,6 +29,11 @@ class Station:
         tasks: the rows of the phase's tasks.
         com: the task that follows the template's CoM; None where there is none.
         ways: edges to other nodes, in order.
+        stance: legs that carry.
+        swings: legs in the air that have a foothold to go to.
+        locate: finds the robot's place on the path.
+        cap: (len(stance),) largest normal force of each stance foot, inf without [N]; the
+            controller overwrites those of the legs that unload.
         awaited: the leg that is to touch down; None where none is.
         trimmed: whether the momentum trim acts somewhere in the stride.
     """
@@ -32,6 +43,10 @@ class Station:
     tasks: TaskStack
     com: ComTask | None
     ways: tuple[Edge, ...]
+    stance: tuple[int, ...]
+    swings: tuple[int, ...]
+    locate: Locate
+    cap: Array
     awaited: Leg | None
     trimmed: bool
 
@@ -69,6 +84,11 @@ def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station
             tasks=TaskStack(control.tasks, nv),
             com=next((task for task in control.tasks if isinstance(task, ComTask)), None),
             ways=tuple(edge for edge in node.edges if isinstance(edge.target, str)),
+            # Plain numbers: an enumeration's members are slow to index with.
+            stance=tuple(int(leg) for leg in node.stance),
+            swings=tuple(int(leg) for leg in control.swings),
+            locate=LOCATE[control.clock],
+            cap=np.full(len(node.stance), np.inf),
             awaited=PLACED[touchdown.reset] if touchdown is not None else None,
             trimmed=node.name in trimmed,
         )

@@ -24,7 +24,7 @@ from template_control.embedding.sensing import Sensed
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
-from template_control.slip.automaton.vocabulary import Event, Leg, Slot
+from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
@@ -32,6 +32,8 @@ from template_control.slip.scenario.route import Route, StrideGoal
 from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 
 Array = NDArray[np.float64]
+
+_TOUCHDOWN = int(Event.TOUCHDOWN)
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class StridePlanning:
     Attributes:
         reports: one a section, the start's included.
         path: the template's, from the last plan on.
-        toe: x of the template's rear toe [m].
+        dues: time on the path at which each :class:`Event` comes next [s], inf if it does not.
         reaching: the swing foot is overdue, and the path goes on without it.
         arrived: the route has ended.
     """
@@ -94,12 +96,11 @@ class StridePlanning:
         self.parameters: SlipParameters = route.parameters
         self.reports: list[SectionReport] = []
         self.path: TemplatePath
-        self.toe = 0.0
+        self.dues = [np.inf] * NUM_EVENTS
         self.reaching = False
         self.arrived = False
         self._planned_at = 0.0
         self._passed = 0  # so many of the path's events are over
-        self._due: dict[Event, float] = {}
         self._feet = (0, 1)  # rear and front leg's at the start of the path
         self._simulator = StrideSimulator(route.parameters, automaton)
 
@@ -232,30 +233,35 @@ class StridePlanning:
             toes = (float(first.toes[0]), float(first.toes[1]))
             strides.append(self._simulator.run(start, first.state, ahead.controls, toes))
         self.path = join(strides, self.options.path)
-        self.toe = self.path.toes[Leg.REAR]
         self._feet = sensed.feet
         self._planned_at = now
-        self._passed = 0
-        self._due.clear()
+        self._look_ahead(0)
 
     def due(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
-        if event not in self._due:
-            self._due[event] = self.path.due(event, self._passed)
-        return self._due[event]
+        return self.dues[event]
 
     def pass_event(self, event: Event) -> None:
         """The robot has fired ``event``."""
-        self._passed = self.path.after(event, self._passed)
-        self._due.clear()
+        self._look_ahead(self.path.after(event, self._passed))
+
+    def _look_ahead(self, passed: int) -> None:
+        """So many of the path's events are over: note when each comes next."""
+        self._passed = passed
+        self.dues = [self.path.due(event, passed) for event in Event]
 
     def landing(self, foot: int) -> Landing:
         """Where and when on the path a foot next touches down."""
         return self.path.landings[self._feet.index(foot)]
 
-    def toe_of(self, foot: int) -> float:
-        """x of the template's toe that was this foot's at the start of the path [m]."""
-        return self.path.toes[self._feet.index(foot)]
+    @property
+    def toe(self) -> float:
+        """x of the template's rear toe [m]."""
+        return float(self.path.curve.look[0])
+
+    def stand_on(self, foot: int) -> None:
+        """The template's rear toe is now the one that was this foot's at the start of the path."""
+        self.path.curve.look[0] = self.path.toes[self._feet.index(foot)]
 
     def overdue(self, node: Node, phase_time: float) -> bool:
         """Whether the swing foot should have found the ground by now.
@@ -264,9 +270,8 @@ class StridePlanning:
             node: of the automaton, the robot's.
             phase_time: time along the path [s].
         """
-        awaited = node.edge(Event.TOUCHDOWN) is not None
-        late = phase_time > self.due(Event.TOUCHDOWN) + self.options.patience
-        return awaited and late and not self.reaching
+        late = phase_time > self.dues[_TOUCHDOWN] + self.options.patience
+        return late and not self.reaching and node.edge(Event.TOUCHDOWN) is not None
 
     def reach_on(self, node: Node, sensed: Sensed, now: float) -> None:
         """The ground is lower than was thought: the template goes on without a touchdown.

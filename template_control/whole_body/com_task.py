@@ -38,7 +38,7 @@ class ComTask:
 
     def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
-        (kp, kd), ref, now = self.gains, wanted.com, wanted.com_now
+        (kp, kd), ref, now = self.gains, wanted.com.tolist(), wanted.com_now.tolist()
         height = now[1]
         moment = robot.mass * height
         rows.jacobian[:] = robot.com_jacobian
@@ -52,5 +52,5 @@ class ComTask:
 
     def lift(self, wanted: Wanted) -> float:
         """The feedback part of the vertical acceleration [m/s^2]."""
-        (kp, kd), ref, now = self.gains, wanted.com, wanted.com_now
+        (kp, kd), ref, now = self.gains, wanted.com.tolist(), wanted.com_now.tolist()
         return float(kp * (ref[1] - now[1]) + kd * (ref[3] - now[3]))

@@ -42,8 +42,9 @@ class FootTask:
         """See :meth:`~.task.Task.write`."""
         foot = wanted.feet[self.leg]
         (kp, kd), (hold_p, hold_d) = self.gains, self.hold_gains
-        position, velocity = robot.foot_position[foot], robot.foot_velocity[foot]
-        x, y = wanted.foot[foot]
+        # Lists: arithmetic on an array's single numbers is slow.
+        position, velocity = robot.foot_position[foot].tolist(), robot.foot_velocity[foot].tolist()
+        x, y = wanted.foot[foot].tolist()
         rows.jacobian[:] = robot.foot_jacobian[foot]
         rows.bias[:] = robot.foot_bias[foot]
         to_reference = x[2] + kp * (x[0] - position[0]) + kd * (x[1] - velocity[0])

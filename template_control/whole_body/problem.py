@@ -30,22 +30,6 @@ _FAR = 1e20  # ProxQP's infinity
 _GRID = 2.0**24  # steps of a torque up to its limit
 
 
-class Limits(NamedTuple):
-    """What a solution must respect.
-
-    Attributes:
-        torque: (nu,) largest joint torques [N m].
-        cap: (c,) largest normal force of each stance foot [N] (inf: none).
-        friction: coefficient of the cones.
-        weight: m g, the unit of forces [N].
-    """
-
-    torque: Array
-    cap: Array
-    friction: float
-    weight: float
-
-
 class Matrices(NamedTuple):
     """The QP in w, and how it is mapped back; :func:`assemble` overwrites all.
 
@@ -74,7 +58,7 @@ def assemble(
     contact: Array,
     tasks: Array,
     costs: Array,
-    limits: Limits,
+    limits: Array,
     out: Matrices,
 ) -> bool:
     """Fill the QP's matrices in place.
@@ -86,7 +70,9 @@ def assemble(
         tasks: (t, nv + 3), the table of a :class:`~.task.TaskStack`.
         costs: (2,) of the contact forces' distance from the wanted ones, per (m g)^2, and of
             the joint torques, per squared limit.
-        limits: torques, friction, caps.
+        limits: (nu + c + 2,) largest joint torques [N m], largest normal force of each stance foot
+            [N] (inf: none), coefficient of the friction cones, m g [N]. One array, as each one
+            that a compiled function is handed costs time.
         out: overwritten.
 
     Returns:
@@ -94,12 +80,17 @@ def assemble(
     """
     a_map, f_map, factor, gradient = out.a_map, out.f_map, out.factor, out.gradient
     constraint, lower, upper = out.constraint, out.lower, out.upper
-    torque_limit, force_cap, weight = limits.torque, limits.cap, limits.weight
-    friction = limits.friction
     nv = mass_matrix.shape[0]
-    nu = torque_limit.shape[0]
-    feet = force_cap.shape[0]
-    jacobian, bias = contact[:, :nv], contact[:, nv]
+    nu = gradient.shape[0]
+    feet = contact.shape[0] // 2
+    torque_limit, force_cap = limits[:nu], limits[nu : nu + feet]
+    friction, weight = limits[nu + feet], limits[nu + feet + 1]
+    # Copies without gaps, which the elimination reads faster.
+    jacobian, bias = np.empty((2 * feet, nv)), np.empty(2 * feet)
+    for i in range(2 * feet):
+        for k in range(nv):
+            jacobian[i, k] = contact[i, k]
+        bias[i] = contact[i, nv]
     if not eliminate(mass_matrix, nonlinear_effects, jacobian, bias, nv - nu, a_map, f_map):
         return False
     factor[:] = 0.0
@@ -208,17 +199,17 @@ def _add_square(
 
 
 @compiled
-def follow(maps: Matrices, tau: Array, acceleration: Array, force: Array) -> None:
+def follow(a_map: Array, f_map: Array, tau: Array, acceleration: Array, force: Array) -> None:
     """Write the accelerations and contact forces that joint torques bring about.
 
     Args:
-        maps: affine maps that :func:`assemble` has filled.
+        a_map, f_map: affine maps that :func:`assemble` has filled.
         tau: (nu,) joint torques [N m].
         acceleration: (nv,) overwritten with the generalised accelerations [m/s^2, rad/s^2].
         force: (2 c,) overwritten with x and y of the force on each stance foot [N].
     """
-    _affine(maps.a_map, tau, acceleration)
-    _affine(maps.f_map, tau, force)
+    _affine(a_map, tau, acceleration)
+    _affine(f_map, tau, force)
 
 
 @compiled

@@ -14,7 +14,6 @@ from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import RATE, tuned
 from template_control.whole_body.problem import (
     ROWS_PER_FOOT,
-    Limits,
     Matrices,
     assemble,
     follow,
@@ -94,7 +93,7 @@ class Solution:
 class _Workspace:
     """Matrices and ProxQP object for one number of stance feet."""
 
-    def __init__(self, nv: int, nu: int, feet: int) -> None:
+    def __init__(self, nv: int, nu: int, feet: int, weight: float) -> None:
         rows = nu + ROWS_PER_FOOT * feet
         self._identity = np.eye(nu)
         self.matrices = Matrices(
@@ -106,6 +105,9 @@ class _Workspace:
             lower=np.zeros(rows),
             upper=np.zeros(rows),
         )
+        self.limits = np.zeros(nu + feet + 2)
+        self.limits[-1] = weight
+        self.torque_limit, self.cap = self.limits[:nu], self.limits[nu : nu + feet]
         self.contact = np.zeros((2 * feet, nv + 2))
         self.jacobian = self.contact[:, :nv]
         self.bias, self.force = self.contact[:, nv], self.contact[:, nv + 1]
@@ -174,9 +176,10 @@ class WholeBodyQp:
         self.torque_limit: Array = robot.torque_limit * o.torque_scale
         self._contact_damping = o.contact_damping
         self._costs = np.array([o.force_cost, o.torque_cost])
-        self._weight = robot.mass * robot.gravity
         nu = len(self.torque_limit)
-        self._workspaces = [_Workspace(robot.nv, nu, feet) for feet in range(3)]
+        self._workspaces = [
+            _Workspace(robot.nv, nu, feet, robot.mass * robot.gravity) for feet in range(3)
+        ]
         self._torque = np.zeros(nu)
 
     def solve(self, tasks: TaskStack, stance: Stance, load: float = 1.0) -> Solution:
@@ -196,13 +199,15 @@ class WholeBodyQp:
             w.jacobian[rows] = robot.foot_jacobian[foot]
             w.bias[rows] = robot.foot_bias[foot] + self._contact_damping * robot.foot_velocity[foot]
         w.force[:] = stance.force
+        w.torque_limit[:], w.cap[:] = limit, stance.cap
+        w.limits[-2] = self.friction
         regular = assemble(
             robot.mass_matrix,
             robot.nonlinear_effects,
             w.contact,
             tasks.table,
             self._costs,
-            Limits(limit, stance.cap, self.friction, self._weight),
+            w.limits,
             w.matrices,
         )
         start = time.perf_counter()
@@ -214,5 +219,5 @@ class WholeBodyQp:
             np.clip(self._torque, -limit, limit, out=self._torque)
         force = np.empty(2 * len(stance.feet))
         acceleration = np.empty(robot.nv)
-        follow(w.matrices, self._torque, acceleration, force)
+        follow(w.matrices.a_map, w.matrices.f_map, self._torque, acceleration, force)
         return Solution(load * self._torque, force, acceleration, solved, seconds)

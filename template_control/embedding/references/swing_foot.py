@@ -10,6 +10,7 @@ downward speed at the end, so that it meets the ground for certain.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +110,7 @@ class SwingFoot:
             ground: height of the foothold [m].
         """
         o = self.options
-        if time_to_go <= o.horizon or not np.isfinite(foothold):
+        if time_to_go <= o.horizon or not isfinite(foothold):
             self._coast(dt)
         else:
             quintic_step(self.x, foothold, 0.0, max(time_to_go - o.early, o.horizon), dt)
@@ -137,7 +138,7 @@ class SwingFoot:
         """
         height = hip[1] - self.y[0]
         reach = self.options.leg_share * leg_length
-        return float(hip[0] + np.sqrt(max(reach**2 - height**2, 0.0)))
+        return float(hip[0] + sqrt(max(reach**2 - height**2, 0.0)))
 
     def _coast(self, dt: float) -> None:
         """Nearly there: hold the horizontal position, keep coming down."""

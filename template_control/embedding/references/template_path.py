@@ -8,7 +8,7 @@ time.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -44,19 +44,18 @@ class PathOptions:
 
 
 class Curve(NamedTuple):
-    """The segments of a path.
+    """The segments of a path, in as few arrays as can be: each costs time at every call.
 
     Attributes:
-        cx, cy: (n, ORDER + 1) polynomials.
+        coefficients: (2, n, ORDER + 1) polynomials of x and y.
         meta: (n, 7) start time, duration, node, toes, stiffnesses.
-        overrun, leap: of the :class:`PathOptions` [s].
+        look: (3,) x of the template's rear toe, from which x is taken [m]; overrun and leap of
+            the :class:`PathOptions` [s].
     """
 
-    cx: Array
-    cy: Array
+    coefficients: Array
     meta: Array
-    overrun: float
-    leap: float
+    look: Array
 
 
 class Landing(NamedTuple):
@@ -139,11 +138,9 @@ def join(strides: Sequence[Stride], options: PathOptions | None = None) -> Templ
     o = options or PathOptions()
     return TemplatePath(
         curve=Curve(
-            cx=np.concatenate([s.cx for s in strides]),
-            cy=np.concatenate([s.cy for s in strides]),
+            coefficients=np.concatenate([(s.cx, s.cy) for s in strides], axis=1),
             meta=meta,
-            overrun=o.overrun,
-            leap=o.leap,
+            look=np.array([meta[0, 3], o.overrun, o.leap]),
         ),
         events=tuple(events),
         landings=_landings(meta, resets),
@@ -182,69 +179,68 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
 
 
 @compiled
-def sample(curve: Curve, toe: float, time: float, out: Array) -> int:
-    """Write the path at a time into ``out``.
+def sample(coefficients: Array, meta: Array, look: Array, time: float, out: Array) -> int:
+    """Write the path at ``time`` into out (6,): x from the toe, y, and their two derivatives.
 
     Args:
-        curve: the path.
-        toe: x of the template's rear toe [m].
-        time: on the path [s]. The path goes on for a moment past either end, then stops.
-        out: (6,) overwritten: x from ``toe``, y, and their first and second derivatives
-            [m, m/s, m/s^2].
+        coefficients, meta, look: of a :class:`Curve`.
+        time: on the path [s].
+        out: overwritten [m, m/s, m/s^2].
 
     Returns:
-        The index of the path's segment at that time.
+        The segment.
     """
-    meta = curve.meta
     row = 0
     while row + 1 < meta.shape[0] and meta[row + 1, 0] <= time:
         row += 1
     # Past either end the path goes on along its last polynomial for a moment, then stops.
-    local = min(max(time - meta[row, 0], -curve.overrun), meta[row, 1] + curve.overrun)
-    _polynomial(curve.cx[row], local, out, 0)
-    _polynomial(curve.cy[row], local, out, 1)
-    out[0] -= toe
+    local = min(max(time - meta[row, 0], -look[1]), meta[row, 1] + look[1])
+    _polynomial(coefficients[0, row], local, out, 0)
+    _polynomial(coefficients[1, row], local, out, 1)
+    out[0] -= look[0]
     return row
 
 
 @compiled
 def at_direction(
-    curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
+    coefficients: Array, meta: Array, look: Array, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
     """Time at which the template sees its CoM in the direction of (x, y), and its path there.
 
     Args:
-        curve: the path.
-        toe: x of the template's rear toe, from which the direction is taken [m].
+        coefficients, meta, look: of a :class:`Curve`.
         x, y: the robot's CoM relative to its rear stance foot [m].
         guess: a time close to the answer [s].
-        out: (6,) overwritten with the path there, x relative to that toe.
+        out: (6,) overwritten with the path there, x relative to the template's rear toe.
 
     Returns:
         Template time [s], and its segment.
     """
-    last = curve.meta[curve.meta.shape[0] - 1]
-    end = last[0] + last[1]
+    last = meta[meta.shape[0] - 1]
+    end, leap = last[0] + last[1], look[2]
     t = guess
     for _ in range(_NEWTON):
-        sample(curve, toe, t, out)
+        sample(coefficients, meta, look, t, out)
         slope = out[2] * y - out[3] * x
         if slope < 1e-6:
             break
         step = (out[1] * x - out[0] * y) / slope
-        t = min(max(t + min(max(step, -curve.leap), curve.leap), 0.0), end)
+        t = min(max(t + min(max(step, -leap), leap), 0.0), end)
         if abs(step) < 1e-10:
             break
-    return t, sample(curve, toe, t, out)
+    return t, sample(coefficients, meta, look, t, out)
 
 
 @compiled
 def at_time(
-    curve: Curve, toe: float, x: float, y: float, guess: float, out: Array
+    coefficients: Array, meta: Array, look: Array, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
     """As :func:`at_direction`, but the time is ``guess`` itself, wherever the robot is."""
-    return guess, sample(curve, toe, guess, out)
+    return guess, sample(coefficients, meta, look, guess, out)
 
 
-LOCATE = {Clock.DIRECTION: at_direction, Clock.TIME: at_time}
+Locate = Callable[[Array, Array, Array, float, float, float, Array], tuple[float, int]]
+"""Arguments and results of :func:`at_direction`."""
+
+LOCATE: dict[Clock, Locate] = {Clock.DIRECTION: at_direction, Clock.TIME: at_time}
 """How a phase's clock finds the robot's place on the path."""
