@@ -2,7 +2,6 @@
 
 import shlex
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,16 +9,9 @@ import pytest
 import template_control as tc
 from template_control.cli.main import build_parser, main
 
-PACKAGE = Path(__file__).parents[1] / "template_control"
-
 
 def pytest_configure():
-    """Make what a test sees independent of the last run's kernels and of who runs the tests."""
-    # Drop compiled kernels older than a source: Numba looks at a function's own file only.
-    newest = max(path.stat().st_mtime for path in PACKAGE.rglob("*.py"))
-    for compiled in PACKAGE.rglob("*.nb[ic]"):
-        if compiled.stat().st_mtime < newest:
-            compiled.unlink(missing_ok=True)
+    """Make what a test sees independent of who runs the tests."""
     # A shell without job control starts its background jobs with SIGINT ignored, which the
     # processes that the tests interrupt would inherit.
     signal.signal(signal.SIGINT, signal.default_int_handler)
