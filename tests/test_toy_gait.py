@@ -130,14 +130,14 @@ class Deadbeat:
         z = np.array([0.0, height])
         stride = simulate_stride(P, "F_aa^hop", APEX.state(z), u, automaton=HOPPING)
         self.gait = Hop(z, u, stride.duration)
-        self.offset = np.zeros(2)
+        self.offset = np.zeros(3)
         self._map = ReturnMap(P, "hop", automaton=HOPPING)
 
     def reset(self):
-        self.offset = np.zeros(2)
+        self.offset = np.zeros(3)
 
     def decide(self, z, target=None, angles=ANY_ANGLE):
-        aim = (self.gait.state if target is None else target) - self.offset
+        aim = (self.gait.state if target is None else target) - self.offset[:2]
         low, high = np.maximum(angles[0], 1.3), np.minimum(angles[1], np.pi - 1.3)
 
         def controls(x):
@@ -152,10 +152,10 @@ class Deadbeat:
         found = least_squares(errors, start, bounds=([low, 0.5, 0.5], [high, 2.0, 2.0]))
         end, outcome = self._map.step(z, controls(found.x))
         done = outcome is Outcome.SECTION
-        return Decision(controls(found.x), np.append(end + self.offset, 0.0), done, done, done)
+        return Decision(controls(found.x), np.append(end, 0.0) + self.offset, done, done, done)
 
     def observe(self, decision, z):
-        self.offset += 0.3 * np.clip(z - decision.predicted[:2], -0.05, 0.05)
+        self.offset[:2] += 0.3 * np.clip(z - decision.predicted[:2], -0.05, 0.05)
 
 
 def hop(hops=HOPS, **options):

@@ -173,7 +173,7 @@ class StridePlanning:
                 goal=goal,
                 target=end.padded(goal.target),
                 decision=decision,
-                offset=end.padded(self.planner_of(goal).offset),
+                offset=self.planner_of(goal).offset.copy(),
                 learnt=learnt,
                 plan_seconds=seconds,
             )
