@@ -105,6 +105,7 @@ class _Workspace:
             lower=np.zeros(rows),
             upper=np.zeros(rows),
         )
+        self.out = tuple(self.matrices)
         self.limits = np.zeros(nu + feet + 2)
         self.limits[-1] = weight
         self.torque_limit, self.cap = self.limits[:nu], self.limits[nu : nu + feet]
@@ -208,7 +209,7 @@ class WholeBodyQp:
             tasks.table,
             self._costs,
             w.limits,
-            w.matrices,
+            w.out,
         )
         start = time.perf_counter()
         solved = regular and w.solve()
