@@ -105,6 +105,9 @@ class PlanarBiped:
         # Pinocchio keeps these arrays in place, so the views stay good.
         self.mass_matrix: Array = data.M
         self.nonlinear_effects: Array = data.nle
+        self._joint_places = [
+            data.oMi[joint].translation for joint in range(1 + BASE_DOF, self.nv + 1)
+        ]
         self._sources = sources(model, data, self._foot_ids, foot_radius)
         terms = PlanarTerms.zeros(self.nv)
         self._terms = tuple(terms)
@@ -197,9 +200,7 @@ class PlanarBiped:
 
     def joint_positions(self, out: Array) -> None:
         """Write the actuated joints' positions (nv - 3, 2) [m] at the last update."""
-        placements = self._data.oMi
-        for i in range(self.nv - BASE_DOF):
-            position = placements[i + 1 + BASE_DOF].translation
+        for i, position in enumerate(self._joint_places):
             out[i, 0], out[i, 1] = position[0], position[2]
 
     def hip_height(self, q: Array) -> float:
