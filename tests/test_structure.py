@@ -40,6 +40,7 @@ SHARED = (
     "compiling",
     "errors",
     "storage",
+    "version",
 )  # modules of the root that every room may import
 MOST_ROOMS = 12
 MOST_FILES = 12  # of a folder, its __init__.py included

@@ -6,7 +6,7 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from template_control.cli.output import INTERRUPTED
 from template_control.errors import TemplateControlError
@@ -62,6 +62,16 @@ _COMMANDS = {
 _USER_ERROR = 2
 
 
+class _Version(argparse.Action):
+    """``--version``; the metadata are looked up only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from template_control.version import __version__
+
+        print(f"{parser.prog} {__version__}")
+        parser.exit()
+
+
 def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     """The parser for ``arguments``.
 
@@ -72,6 +82,7 @@ def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
         prog="template-control",
         description="Bipedal SLIP templates, their control, and robots that follow them.",
     )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     # Before the command there are only options without a value.
     wanted = next((word for word in arguments if not word.startswith("-")), None)
