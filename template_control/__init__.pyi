@@ -42,6 +42,7 @@ from .slip.scenario.run import simulate_scenario as simulate_scenario
 from .slip.scenario.scenario import example_one as example_one
 from .slip.scenario.scenario import load_scenario as load_scenario
 from .version import __version__ as __version__
+from .view.figures import plot as plot
 from .view.figures import save_figures as save_figures
 from .view.replay.replay import replay as replay
 from .view.replay.replay import save_film as save_film

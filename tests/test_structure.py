@@ -39,6 +39,7 @@ SHARED = (
     "compiled",
     "compiling",
     "errors",
+    "settings",
     "storage",
     "version",
 )  # modules of the root that every room may import

@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,8 @@ class PlantOptions:
     Raises:
         ParameterError: if a number is not positive and finite.
     """
+
+    kind: ClassVar[str] = "pybullet"
 
     friction: float = 0.7
     time_step: float = 1e-3

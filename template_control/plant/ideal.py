@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -42,6 +43,8 @@ class IdealOptions:
     Raises:
         ParameterError: if a number is not positive and finite.
     """
+
+    kind: ClassVar[str] = "ideal"
 
     time_step: float = 1e-3
     mass_scale: float = 1.0
