@@ -24,6 +24,7 @@ from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
 from .robot.library import load_robot as load_robot
 from .robot.planar_biped import PlanarBiped as PlanarBiped
+from .run.config import RunConfig as RunConfig
 from .run.options import Push as Push
 from .run.options import SimulationOptions as SimulationOptions
 from .run.record import Record as Record

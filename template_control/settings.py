@@ -122,7 +122,7 @@ def _read(hint: Any, value: Any, where: str) -> Any:
 
 def _read_one_of(hints: list[Any], value: Any, where: str) -> Any:
     """A value of the first type, or of the dataclass whose ``kind`` the table names."""
-    kinds = {hint.kind: hint for hint in hints if is_dataclass(hint) and hasattr(hint, _KIND)}
+    kinds: dict[str, Any] = {hint.kind: hint for hint in hints if hasattr(hint, _KIND)}
     if not kinds:
         return _read(hints[0], value, where)
     if not isinstance(value, dict):

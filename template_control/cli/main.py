@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -95,6 +96,20 @@ def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     return parser
 
 
+def _with_values(arguments: Sequence[str]) -> list[str]:
+    """The words, an option joined with a value that begins with a minus and a digit.
+
+    Without it argparse takes ``-20@4`` in ``--push -20@4`` for an option; none begins so.
+    """
+    words: list[str] = []
+    for word in arguments:
+        if words and re.match(r"-[\d.]", word) and re.fullmatch(r"--[a-z-]+", words[-1]):
+            words[-1] += f"={word}"
+        else:
+            words.append(word)
+    return words
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit status.
 
@@ -102,6 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     try:
+        arguments = _with_values(arguments)
         options = build_parser(arguments).parse_args(arguments)
         # Not before: whoever asks for help need not wait for it.
         from rich.console import Console

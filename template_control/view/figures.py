@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import matplotlib as mpl
@@ -33,7 +34,6 @@ from template_control.view.style import (
 Array = NDArray[np.float64]
 
 _LEGS = (LEFT, RIGHT)
-_STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
 
 
 def _ground(axes: Axes, record: Record) -> None:
@@ -203,8 +203,12 @@ def plot(record: Record, figure: str = "stick_diagram") -> Figure:
     if figure not in FIGURES:
         raise ParameterError(f"there is no figure {figure!r}: give one of {', '.join(FIGURES)}")
     _check_samples(record)
-    with mpl.rc_context(_STYLE):
+    with _style():
         return FIGURES[figure](record)
+
+
+def _style() -> AbstractContextManager[None]:
+    return mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
 
 
 def _check_samples(record: Record) -> None:
@@ -228,7 +232,7 @@ def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Pat
     """
     _check_samples(record)
     paths = []
-    with mpl.rc_context(_STYLE):
+    with _style():
         for name, draw in FIGURES.items():
             path = Path(folder) / f"{name}.png"
             try:
