@@ -1,10 +1,12 @@
 """Run options in a file and on the command line: what a run writes repeats it to the last bit."""
 
 import math
+import re
 import shutil
 import sys
 import tomllib
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -244,6 +246,17 @@ def test_a_second_run_says_that_it_replaces_the_first(tmp_path, capfd):
     assert "replaced" not in capfd.readouterr().err
     assert main([*arguments, "--json"]) == 0
     assert f"the run in {tmp_path} will be replaced; --output" in capfd.readouterr().err
+
+
+def test_the_file_that_the_page_shows_is_understood(tmp_path):
+    page = (Path(__file__).parents[1] / "docs" / "options.md").read_text()
+    (shown,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    path = tmp_path / "shown.toml"
+    path.write_text(shown)
+    config = RunConfig.load(path)
+    assert config.robot == RobotChoice("rabbit")
+    assert config.planner == tc.LqrOptions(offset_gain=0.15)
+    assert config.simulation.pushes == (tc.Push(3.0, 2, 0.25),)
 
 
 def test_the_defaults_are_written_and_read():

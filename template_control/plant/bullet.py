@@ -156,6 +156,15 @@ class BulletPlant:
         for joint in self.joints:
             p.setJointMotorControl2(body, joint, p.VELOCITY_CONTROL, force=0.0, physicsClientId=c)
 
+    @property
+    def time_step(self) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.time_step
+
+    def ground_height(self, x: float) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.ground_height(x)
+
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
         self._contacts = None

@@ -103,6 +103,15 @@ class IdealPlant:
         self._impulse = np.zeros((2, 2))
         self._trunk_corners = _trunk_corners(self.robot)
 
+    @property
+    def time_step(self) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.time_step
+
+    def ground_height(self, x: float) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.ground_height(x)
+
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`.
 

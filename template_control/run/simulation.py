@@ -6,7 +6,7 @@ import json
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,8 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.section_report import SectionReport
 from template_control.errors import ParameterError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import state_at_vlo, state_in
@@ -263,7 +265,7 @@ def _metadata(
         "gait_mean_speed": gait.step_length / gait.step_duration,
         "planner": type(controller.planner).__name__,
         "plant": plant_name(o.plant),
-        "options": asdict(o),
+        "options": _told(o),
         "fall_reason": reason,
         "wall_seconds": seconds,
         "duration": recorder.ticks * o.plant.time_step,
@@ -272,6 +274,20 @@ def _metadata(
     }
     # As it will be read back: JSON knows lists, not tuples.
     return dict(json.loads(json.dumps(metadata, default=_plain)))
+
+
+def _told(o: SimulationOptions) -> dict[str, Any]:
+    """The options as data; a plant of one's own is not data."""
+    own = not isinstance(o.plant, PlantOptions | IdealOptions)
+    rest = {f.name: getattr(o, f.name) for f in fields(o) if not (own and f.name == "plant")}
+    told = {name: _data(value) for name, value in rest.items()}
+    return {**told, "plant": {}} if own else told
+
+
+def _data(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_data(entry) for entry in value]
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
 
 
 def _plain(value: Any) -> Any:

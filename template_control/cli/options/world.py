@@ -129,6 +129,7 @@ def simulation_choice(
 
 def _plant(options: argparse.Namespace, base: SimulationOptions) -> PlantOptions | IdealOptions:
     plant = base.plant
+    assert isinstance(plant, PlantOptions | IdealOptions)  # a file holds no other plant
     if options.plant not in (None, plant.kind):
         made = _PLANTS[options.plant]
         plant = made(time_step=plant.time_step, mass_scale=plant.mass_scale)
