@@ -78,8 +78,7 @@ def parsed(understood):
 
 
 def test_every_option_has_its_place(parsed):
-    line = DISTURBED.replace("--push -8@1:0.3", "--push=-8@1:0.3")
-    simulation = parsed(line)[0].simulation
+    simulation = parsed(DISTURBED)[0].simulation
     assert simulation.plant == tc.PlantOptions(friction=0.6, mass_scale=1.05)
     assert simulation.embedding == tc.EmbeddingOptions(friction=0.6, torque_scale=0.9)
     assert simulation.pushes == (tc.Push(-8.0, 1, 0.3), tc.Push(5.0, 0, 0.0))

@@ -73,13 +73,29 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+class _Parser(argparse.ArgumentParser):
+    """Takes a word like ``-20@4`` for an option's value: no option begins with a digit.
+
+    argparse does so with plain negative numbers only.
+    """
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As :meth:`argparse.ArgumentParser.parse_known_args`.
+
+        Args:
+            args: the words; None: of the process.
+            namespace: to fill.
+        """
+        return super().parse_known_args(_with_values(args), namespace)
+
+
 def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     """The parser for ``arguments``.
 
     It lists every command, but has the options of the one command that ``arguments`` name:
     importing them all would take seconds, even for ``--help``.
     """
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="template-control",
         description="Bipedal SLIP templates, their control, and robots that follow them.",
     )
@@ -96,13 +112,10 @@ def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     return parser
 
 
-def _with_values(arguments: Sequence[str]) -> list[str]:
-    """The words, an option joined with a value that begins with a minus and a digit.
-
-    Without it argparse takes ``-20@4`` in ``--push -20@4`` for an option; none begins so.
-    """
+def _with_values(arguments: Sequence[str] | None) -> list[str]:
+    """The words, an option joined with a value that begins with a minus and a digit."""
     words: list[str] = []
-    for word in arguments:
+    for word in sys.argv[1:] if arguments is None else arguments:
         if words and re.match(r"-[\d.]", word) and re.fullmatch(r"--[a-z-]+", words[-1]):
             words[-1] += f"={word}"
         else:
@@ -117,7 +130,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     try:
-        arguments = _with_values(arguments)
         options = build_parser(arguments).parse_args(arguments)
         # Not before: whoever asks for help need not wait for it.
         from rich.console import Console
