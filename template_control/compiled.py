@@ -8,9 +8,8 @@ all the files that compiled code comes from.
 
 from __future__ import annotations
 
+import gc
 import logging
-import os
-import re
 import shutil
 import sys
 import tempfile
@@ -18,7 +17,7 @@ from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from numba import njit
 from numba.core import config, event
@@ -27,87 +26,18 @@ from numba.core.dispatcher import Dispatcher
 from numba.misc.appdirs import AppDirs
 
 from template_control.compiling import TELLER
+from template_control.file_lock import FileLock, locked
+from template_control.source_stamp import stamp
 
 Decorator = Callable[[Callable[..., Any]], Any]
 
 _LOG = logging.getLogger("template_control")
 _PACKAGE = Path(__file__).parent
 _NAME = _PACKAGE.name
-_IMPORT = re.compile(rb"^(?:from|import) ([\w.]+)", re.MULTILINE)
-_HOLDS_COMPILED = b"\nfrom template_control.compiled import"
 _KEPT = 3  # folders of other contents: who goes back and forth in a history compiles once
 
 
-def sources(folder: Path) -> dict[str, bytes]:
-    """Contents by path of the files of a package that compiled code can depend on.
-
-    They are the modules that hold compiled functions and, as their integers are frozen into
-    the code, all modules of the package that these import.
-
-    Args:
-        folder: the package's.
-    """
-    contents: dict[str, bytes] = {}
-    for place, _, names in os.walk(folder):
-        for name in names:
-            if name.endswith(".py"):
-                path = os.path.join(place, name)
-                with open(path, "rb") as file:
-                    contents[path] = file.read()
-    start = len(str(folder.parent)) + 1
-    modules = {path[start:-3].replace(os.sep, "."): path for path in contents}
-    waiting = [path for path, content in contents.items() if _HOLDS_COMPILED in b"\n" + content]
-    found: dict[str, bytes] = {}
-    while waiting:
-        path = waiting.pop()
-        if path not in found:
-            found[path] = contents[path]
-            imported = (match.decode() for match in _IMPORT.findall(contents[path]))
-            waiting += [modules[name] for name in imported if name in modules]
-    return found
-
-
-class Stamp(NamedTuple):
-    """One content of the sources.
-
-    Attributes:
-        digest: of names and contents; "" where they cannot be read, as in a zip file.
-        files: (path, size, time of the last change [ns]) of each.
-    """
-
-    digest: str
-    files: tuple[tuple[str, int, int], ...]
-
-    @property
-    def holds(self) -> bool:
-        """Whether the files are as they were."""
-        try:
-            return all(_state(path) == (size, time) for path, size, time in self.files)
-        except OSError:
-            return False
-
-
-def _state(path: str) -> tuple[int, int]:
-    found = os.stat(path)
-    return found.st_size, found.st_mtime_ns
-
-
-@cache
-def stamp(folders: tuple[Path, ...]) -> Stamp:
-    """Of the :func:`sources` of packages, as they are when this process first asks."""
-    digest, files = sha256(), []
-    try:
-        for folder in folders:
-            for path, content in sorted(sources(folder).items()):
-                files.append((path, *_state(path)))
-                digest.update(f"{os.path.relpath(path, folder)} {len(content)}\n".encode())
-                digest.update(content)
-    except OSError:
-        return Stamp("", ())
-    return Stamp(digest.hexdigest()[:16], tuple(files))
-
-
-def _folders(function: Callable[..., Any]) -> tuple[Path, ...]:
+def packages_of(function: Callable[..., Any]) -> tuple[Path, ...]:
     """Of the packages that ``function`` is compiled from: this one, and its own."""
     package = sys.modules.get(function.__module__.partition(".")[0])
     path = getattr(package, "__path__", None)
@@ -177,7 +107,7 @@ class _Locator(_CacheLocator):
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Locator | None:
-        folders = _folders(py_func)
+        folders = packages_of(py_func)
         return cls(py_func, folders)
 
 
@@ -186,11 +116,32 @@ class _CacheImpl(CompileResultCacheImpl):
 
 
 class _Cache(FunctionCache):
-    """Numba's cache of one function, in our folder; it fails silently, never an import."""
+    """Numba's cache of one function, in our folder; it fails silently, never an import.
+
+    A function that several processes need is compiled by one of them. The others wait for it.
+    They do not wait in a circle: who compiles a function waits only for those that it calls.
+    """
 
     _impl_class = _CacheImpl
 
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._locks: dict[Any, FileLock] = {}
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
+        found = self._read(sig, target_context)
+        if found is None and sig not in self._locks:
+            name = sha256(repr((self._impl.filename_base, sig)).encode()).hexdigest()[:16]
+            lock = self._locks[sig] = FileLock(lock_folder(Path(self.cache_path)) / name)
+            if not lock.take():
+                with TELLER.waiting():
+                    lock.wait(TELLER.look)
+            found = self._read(sig, target_context)
+            if found is not None:
+                self.release(sig)
+        return found
+
+    def _read(self, sig: Any, target_context: Any) -> Any:
         try:
             return super().load_overload(sig, target_context)
         except (OSError, EOFError) as error:
@@ -198,22 +149,54 @@ class _Cache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        if not stamp(_folders(self._py_func)).holds:
-            return  # the files have changed under this process: whose code is this?
         try:
-            super().save_overload(sig, data)
+            # If the files have changed under this process, whose code is this?
+            if stamp(packages_of(self._py_func)).holds:
+                # Numba reads the function's index, adds to it and writes it.
+                with locked(lock_folder(Path(self.cache_path)) / self._impl.filename_base):
+                    super().save_overload(sig, data)
+                TELLER.kept += 1
         except OSError as error:
             _LOG.debug("%s is not written to the cache: %s", self._name, error)
+        finally:
+            self.release(sig)
+
+    def release(self, sig: Any) -> None:
+        """Let others compile the function for ``sig``."""
+        lock = self._locks.pop(sig, None)
+        if lock is not None:
+            lock.release()
+
+
+def lock_folder(folder: Path) -> Path:
+    """Where the locks of a cache folder lie."""
+    return folder / "locks"
 
 
 class _Listener(event.Listener):
-    """Passes on that Numba compiles a function; one read from the cache is no event."""
+    """Takes part when Numba compiles a function; one read from the cache is no event."""
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._collects = False
 
     def on_start(self, event: Any) -> None:
         TELLER.begin()
+        if self._depth == 0:
+            # The collector would look at Numba's many objects again and again: a fifth of all
+            # the time. What they leave is collected afterwards.
+            self._collects = gc.isenabled()
+            gc.disable()
+        self._depth += 1
 
     def on_end(self, event: Any) -> None:
+        self._depth -= 1
+        if self._depth == 0 and self._collects:
+            gc.enable()
         TELLER.end()
+        cache = event.data["dispatcher"]._cache
+        if sys.exc_info()[0] is not None and isinstance(cache, _Cache):
+            cache.release(tuple(event.data["args"]))  # what fails is not saved
 
 
 event.register("numba:compile", _Listener())
@@ -221,7 +204,7 @@ event.register("numba:compile", _Listener())
 
 def _cached(dispatcher: Any) -> Any:
     function = dispatcher.py_func
-    known = cache_folder(_folders(function)) and _own_stamp(function) != "no file"
+    known = cache_folder(packages_of(function)) and _own_stamp(function) != "no file"
     dispatcher._cache = _Cache(function) if known else NullCache()
     return dispatcher
 

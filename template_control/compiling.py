@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
 
 _LOG = logging.getLogger("template_control")
 _QUIET = 1.0  # [s] of compiling that nobody is told of
-_USUAL = 70  # functions that a first walk compiles, one for each type of its arguments
+_USUAL = 95  # functions that are compiled before a first walk, one for each type of its arguments
 _ROUNDING = 5.0  # [s] of the time that is foretold
 
 
@@ -21,11 +21,14 @@ class Teller:
     Attributes:
         console: where to; with None only the logger "template_control" is told, level INFO.
         done: functions compiled.
+        kept: those of them that were written to the cache.
     """
 
     def __init__(self) -> None:
         self.console: Console | None = None
-        self.done = 0
+        self.done = self.kept = 0
+        self._hands = 1
+        self._others: Callable[[], int] = lambda: 0
         self._text = ""
         self._depth = 0
         self._begin = self._before = 0.0
@@ -38,13 +41,44 @@ class Teller:
 
     def end(self) -> None:
         """The function begun last is compiled, or has failed to be."""
-        self._depth -= 1
         self.done += 1
-        spent = self._before + time.monotonic() - self._begin
-        if self._depth == 0:
-            self._before = spent
+        self._pause()
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """While this lasts, the process waits for what another one compiles."""
+        self.begin()
+        try:
+            yield
+        finally:
+            self._pause()
+
+    @contextmanager
+    def helped(self, hands: int, others: Callable[[], int]) -> Iterator[None]:
+        """While this lasts, other processes compile too.
+
+        Args:
+            hands: processes that compile, this one included.
+            others: gives the number of functions that the others have compiled.
+        """
+        self._hands, self._others = hands, others
+        try:
+            yield
+        finally:
+            self.done += others()
+            self._hands, self._others = 1, lambda: 0
+
+    def look(self) -> None:
+        """Tell how far it is, if it takes long."""
+        spent = self._before + (time.monotonic() - self._begin if self._depth else 0.0)
         if spent > _QUIET:
             self._tell(spent)
+
+    def _pause(self) -> None:
+        self._depth -= 1
+        if self._depth == 0:
+            self._before += time.monotonic() - self._begin
+        self.look()
 
     def clear(self) -> None:
         """Take the line away again, where it was in a terminal."""
@@ -52,10 +86,11 @@ class Teller:
             self.console.print(" " * (self.console.width - 1), end="\r")
 
     def _tell(self, spent: float) -> None:
-        share = min(self.done / _USUAL, 1.0)
+        done = max(self.done + self._others(), 1)
+        share = min(done / _USUAL, 1.0)
         first = not self._text
         if first:
-            expected = _ROUNDING * max(round(spent / share / _ROUNDING), 1)
+            expected = _ROUNDING * max(round(spent / share / self._hands / _ROUNDING), 1)
             self._text = f"compiling once, about {expected:.0f} s"
             _LOG.info(self._text)
         if self.console is None:

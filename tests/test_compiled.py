@@ -10,6 +10,7 @@ import pytest
 
 from template_control import compiled
 from template_control.slip.dynamics.guards import guard
+from template_control.source_stamp import sources
 
 _FACTOR = """\
 from template_control.compiled import inner
@@ -118,7 +119,7 @@ def test_a_script_is_its_own_source(toy, tmp_path):
 
 def test_the_stamp_covers_compiled_modules_and_what_they_import():
     package = Path(compiled.__file__).parent
-    found = {str(Path(p).relative_to(package)) for p in compiled.sources(package)}
+    found = {str(Path(p).relative_to(package)) for p in sources(package)}
     assert "slip/dynamics/guards.py" in found
     assert "slip/automaton/vocabulary.py" in found  # its integers are frozen into the code
     assert "cli/main.py" not in found

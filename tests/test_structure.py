@@ -39,7 +39,10 @@ SHARED = (
     "compiled",
     "compiling",
     "errors",
+    "file_lock",
+    "parts",
     "settings",
+    "source_stamp",
     "storage",
     "version",
 )  # modules of the root that every room may import

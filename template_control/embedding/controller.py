@@ -24,6 +24,7 @@ from template_control.embedding.learners.load import LoadEstimate
 from template_control.embedding.learners.momentum_trim import MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.planners.walk_kernels import CONTROL
 from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.section_report import Learnt, SectionReport
@@ -31,6 +32,7 @@ from template_control.embedding.sensing import Sensed
 from template_control.embedding.station import stations
 from template_control.embedding.stride_planning import StridePlanning
 from template_control.errors import ParameterError
+from template_control.parts import ready
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
@@ -78,6 +80,7 @@ class EmbeddingController:
         route: Route | None = None,
         automaton: Automaton = AUTOMATON,
     ) -> None:
+        ready(CONTROL)
         self.robot = robot
         if isinstance(planners, Planner):
             gait = planners.gait

@@ -20,9 +20,11 @@ from template_control import settings, storage
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import ParameterError
+from template_control.parts import ready
 from template_control.robot.library import ROBOTS, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.options import SimulationOptions
@@ -240,6 +242,7 @@ class RunConfig:
             TemplateControlError: if one of them is not to be had.
         """
         robot = self.robot.load()
+        ready(WALK)  # before the gait is looked for, which would compile a part of it alone
         route: Route | None = None
         if self.scenario is None:
             gait = self.gait.of(robot)

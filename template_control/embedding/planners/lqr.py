@@ -24,6 +24,8 @@ from template_control.embedding.planners.step_search import (
     price,
     search,
 )
+from template_control.embedding.planners.walk_kernels import WALK
+from template_control.parts import ready
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WALKING_SLOTS, WalkingGait, vlo_jacobians
@@ -142,6 +144,7 @@ class LqrPlanner:
     """
 
     def __init__(self, gait: WalkingGait, options: LqrOptions | None = None) -> None:
+        ready(WALK)
         self.options = scaled(options or LqrOptions(), Scale.of(gait.parameters))
         self.offset: Array = np.zeros(3)
         self._family = WalkingFamily(gait)
@@ -149,9 +152,6 @@ class LqrPlanner:
         grid, spread = self.options.search, self.options.spread
         self._grid = Grid(grid.coarse, grid.fine, grid.rounds, *spread, grid.narrowing)
         self._settle_on(gait)
-        # Compile now what a step would otherwise wait for; the search only once a step needs
-        # it, as it takes as long again and a walk without disturbances never does.
-        self.decide(gait.vlo)
 
     def _settle_on(self, gait: WalkingGait) -> None:
         """Make ``gait`` the one that the law leads to."""

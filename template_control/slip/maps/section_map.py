@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
+from numba.extending import overload
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled, entry
@@ -44,6 +46,28 @@ def closed_form(kind: MapKind) -> int | None:
     return None if kind is MapKind.EXACT else int(kind)
 
 
+def _stride(
+    kernel: Kernel, kind: int | None, state: Array, toes: Array, controls: Array, scratch: Scratch
+) -> int:
+    """One stride from ``state``, which is overwritten; returns the Outcome's value."""
+    if kind is None:
+        return int(run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0])
+    return int(closed_form_stride(kernel, kind, state, toes, controls, scratch))
+
+
+@overload(_stride)
+def _branch(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratch: Any) -> Any:
+    """The branch of :func:`_stride` that the type of ``kind`` takes: Numba would compile both."""
+
+    def exact(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratch: Any) -> Any:
+        return run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0]
+
+    def closed(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratch: Any) -> Any:
+        return closed_form_stride(kernel, kind, state, toes, controls, scratch)
+
+    return exact if isinstance(kind, types.NoneType) else closed
+
+
 @entry
 def section_map(
     kernel: Kernel,
@@ -69,10 +93,7 @@ def section_map(
     state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
     toes[0] = toes[1] = 0.0
     bottom[0] = bottom[1] = np.nan
-    if kind is None:
-        outcome = run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0]
-    else:
-        outcome = closed_form_stride(kernel, kind, state, toes, controls, scratch)
+    outcome = _stride(kernel, kind, state, toes, controls, scratch)
     result[0], result[1], result[2], result[3] = state[2], state[1], state[3], state[0]
     result[4], result[5] = bottom[0], bottom[1]
     return outcome

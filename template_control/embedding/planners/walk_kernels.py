@@ -1,0 +1,109 @@
+"""The compiled code of a walk, in parts that processes can compile side by side.
+
+Each part calls compiled functions with arguments of the types that a walk calls them with. It
+has no result: what counts is that they are compiled then.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from template_control.embedding.planners.step_search import Grid, Law, linear, price, search
+from template_control.embedding.references.leg_forces import leg_forces
+from template_control.embedding.references.swing_foot import quintic_step
+from template_control.embedding.references.template_path import LOCATE
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.dynamics.kernel import new_scratch
+from template_control.slip.dynamics.model import stride_kernel
+from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.dynamics.taylor import ORDER
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
+from template_control.slip.parameters import SlipParameters
+from template_control.whole_body.problem import (
+    ROWS_PER_FOOT,
+    Matrices,
+    assemble,
+    follow,
+    torques,
+)
+
+_TEMPLATE = SlipParameters()
+_K0 = _TEMPLATE.leg_stiffness
+_STATE = np.array([1.1, 0.978, 0.0])
+_CONTROLS = controls(1.152, _K0, _K0)  # near a gait's, so that a stride passes all of its phases
+
+
+def closed_form_map() -> None:
+    """The improved closed-form map, which the search tries steps on."""
+    ReturnMap(_TEMPLATE, kind=MapKind.IMPROVED).step(_STATE, _CONTROLS)
+
+
+def derivatives() -> None:
+    """The exact map's Jacobian, from which a planner's law is made."""
+    ReturnMap(_TEMPLATE).linearise(_STATE, _CONTROLS)
+
+
+def exact_map() -> None:
+    """The exact map, with which gaits are found and steps planned."""
+    ReturnMap(_TEMPLATE).step(_STATE, _CONTROLS)
+    simulate_stride(_TEMPLATE, STRIDE_START["w"], VLO.state(_STATE), _CONTROLS)
+
+
+def whole_body() -> None:
+    """The whole-body QP, of two degrees of freedom, one motor and one foot."""
+    matrices = Matrices(
+        a_map=np.zeros((2, 2)),
+        f_map=np.zeros((2, 2)),
+        factor=np.zeros((1, 1)),
+        gradient=np.zeros(1),
+        constraint=np.zeros((1 + ROWS_PER_FOOT, 1)),
+        lower=np.zeros(1 + ROWS_PER_FOOT),
+        upper=np.zeros(1 + ROWS_PER_FOOT),
+    )
+    mass_matrix = np.asfortranarray(np.eye(2))
+    bias, limits, costs = np.zeros(2), np.ones(1 + 1 + 2), np.ones(2)
+    assemble(mass_matrix, bias, np.zeros((2, 4)), np.zeros((1, 5)), costs, limits, matrices)
+    torques(np.ones((1, 1)), np.zeros(1), np.ones(1), np.zeros(1))
+    follow(matrices.a_map, matrices.f_map, np.zeros(1), np.zeros(2), np.zeros(2))
+
+
+def step_search() -> None:
+    """The planner's look-ahead: its law, what a step is worth, and the search for a better one."""
+    law = Law(
+        target=_STATE,
+        control=np.ones(3),
+        gain=np.zeros((3, 3)),
+        cost=np.eye(3),
+        offset=np.zeros(3),
+        lower=np.ones(3),
+        upper=np.ones(3),
+        second_steps=np.ones((1, 3)),
+        enough=1.0,
+        first_weight=0.3,
+        top_margin=0.01,
+        stiffness=_K0,
+        kernel=stride_kernel(_TEMPLATE, "w"),
+    )
+    scratch, u, first = new_scratch(), np.ones(3), np.empty(3)
+    linear(law, _STATE, u)
+    price(law, None, scratch, _STATE, u, np.inf, first)
+    search(law, Grid((1, 1, 1), (2, 2), 1, 0.1, 0.1, 0.4), scratch, _STATE, u, first)
+
+
+def references() -> None:
+    """The template's path, its leg forces and the swing of a foot."""
+    coefficients, meta = np.ones((2, 1, ORDER + 1)), np.ones((1, 7))
+    for locate in LOCATE.values():
+        locate(coefficients, meta, np.ones(3), 0.1, 1.0, 0.0, np.zeros(6))
+    leg_forces(meta[0], 0.1, 1.0, 1.0, np.zeros((2, 2)))
+    quintic_step(np.zeros(3), 0.1, 0.0, 1.0, 1e-3)
+
+
+# The search calls the maps, so it comes after them; the others in order of their length.
+CONTROL = (whole_body, references)
+"""What a tick of the controller calls."""
+
+WALK = (closed_form_map, derivatives, exact_map, whole_body, step_search, references)
+"""What the default planner and the controller call."""
