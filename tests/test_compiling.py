@@ -74,3 +74,31 @@ def test_numba_tells_of_what_it_compiles():
     assert compiling.TELLER.done == before + 1
     assert double(3.0) == 6.0
     assert compiling.TELLER.done == before + 1
+
+
+def test_what_others_compile_counts(teller):
+    """One function of a hundred takes each of two processes 2 s: 50 s are left."""
+
+    def run():
+        others = []
+        with compiling.TELLER.helped(2, lambda: len(others)):
+            others.append("theirs")
+            teller(2.0)
+            others += ["theirs"] * 47
+            teller(2.0)
+        teller(2.0)
+
+    lines = told(True, run).split("\r")
+    assert lines[0] == "compiling once, about 50 s:   2%"
+    assert lines[1].endswith(" 50%")
+    assert lines[2].endswith(" 51%")
+
+
+def test_waiting_for_others_is_told_of(teller, monkeypatch):
+    def run():
+        with compiling.TELLER.helped(2, lambda: 10), compiling.TELLER.waiting():
+            now = compiling.time.monotonic()
+            monkeypatch.setattr(compiling.time, "monotonic", lambda: now + 2.0)
+            compiling.TELLER.look()
+
+    assert told(False, run) == "compiling once, about 10 s\n"

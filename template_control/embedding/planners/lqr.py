@@ -215,7 +215,7 @@ class LqrPlanner:
             law = law._replace(lower=lower, upper=upper)
         u, first = np.empty(3), np.empty(3)
         linear(law, z, u)
-        cost = price(law, None, s, z, u, np.inf, first)
+        cost = price(law, True, s, z, u, np.inf, first)
         nominal = cost < self.options.trusted_price
         if not nominal:
             cost = search(law, self._grid, s, z, u, first)

@@ -21,8 +21,9 @@ from template_control.slip.maps.section_map import RESULTS, section_map
 
 Array = NDArray[np.float64]
 
-# Numba would compile the map once more for a literal int.
+# Numba would compile once more for a literal int or bool.
 _FAST = np.int64(MapKind.IMPROVED)
+_ON_EXACT, _ON_FAST = np.bool_(True), np.bool_(False)
 _ANGLE, _K_SC, _K_SD = int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
@@ -119,12 +120,12 @@ def linear(law: Law, z: Array, u: Array) -> None:
 
 
 @compiled
-def step(law: Law, kind: int | None, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
+def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
     """Take one walking step of the template, and add the robot's offset to where it ends.
 
     Args:
         law: the template's step and the offset.
-        kind: of map, from :func:`~template_control.slip.maps.section_map.closed_form`.
+        exact: try it on the exact map; else on the improved closed form.
         s: overwritten.
         z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
         u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
@@ -137,7 +138,10 @@ def step(law: Law, kind: int | None, s: Scratch, z: Array, u: Array, z_next: Arr
     controls[_ANGLE] = u[0]
     controls[_K_SC], controls[_K_SD] = u[1] * law.stiffness, u[2] * law.stiffness
     result = np.empty(RESULTS)
-    outcome = section_map(law.kernel, kind, z, controls, s, result)
+    if exact:
+        outcome = section_map(law.kernel, None, z, controls, s, result)
+    else:
+        outcome = section_map(law.kernel, _FAST, z, controls, s, result)
     for i in range(3):
         z_next[i] = result[i] + law.offset[i]
     return outcome
@@ -154,13 +158,13 @@ def _cost_to_go(law: Law, z: Array) -> float:
 
 @compiled
 def price(
-    law: Law, kind: int | None, s: Scratch, z: Array, u: Array, limit: float, first: Array
+    law: Law, exact: bool, s: Scratch, z: Array, u: Array, limit: float, first: Array
 ) -> float:
     """Cost of taking ``u`` at ``z``.
 
     Args:
         law: says what a state costs.
-        kind: of map, from :func:`~template_control.slip.maps.section_map.closed_form`.
+        exact: see :func:`step`.
         s: overwritten.
         z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
         u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
@@ -168,7 +172,7 @@ def price(
         first: (3,) overwritten with the state after one step.
     """
     second, u2 = np.empty(3), np.empty(3)
-    if step(law, kind, s, z, u, first) != 0:
+    if step(law, exact, s, z, u, first) != 0:
         return 2.0 * FALL_PRICE
     here = _cost_to_go(law, first)
     share = law.first_weight * here
@@ -184,7 +188,7 @@ def price(
                 break
             _copy(law.second_steps[i], u2)
             bounded(law, first, u2)
-        if step(law, kind, s, first, u2, second) == 0:
+        if step(law, exact, s, first, u2, second) == 0:
             best = min(best, _cost_to_go(law, second) + share)
     return best
 
@@ -234,7 +238,7 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
         The price of ``best``.
     """
     u, end, centre = np.empty(3), np.empty(3), np.empty(3)
-    cheapest = price(law, _FAST, s, z, best, np.inf, first)
+    cheapest = price(law, _ON_FAST, s, z, best, np.inf, first)
     coarse = grid.coarse[0] * grid.coarse[1] * grid.coarse[2]
     widths = grid.width_alpha, grid.width_kappa
     for level in range(1 + grid.rounds):
@@ -245,7 +249,7 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
             else:
                 _fine(grid, centre, widths, i, u)
             bounded(law, z, u)
-            cost = price(law, _FAST, s, z, u, cheapest, end)
+            cost = price(law, _ON_FAST, s, z, u, cheapest, end)
             if cost < cheapest:
                 cheapest = cost
                 _copy(u, best)
@@ -253,4 +257,4 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
         _copy(best, centre)
         if level > 0:
             widths = grid.narrowing * widths[0], grid.narrowing * widths[1]
-    return price(law, None, s, z, best, np.inf, first)
+    return price(law, _ON_EXACT, s, z, best, np.inf, first)

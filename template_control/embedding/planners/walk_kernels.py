@@ -88,7 +88,7 @@ def step_search() -> None:
     )
     scratch, u, first = new_scratch(), np.ones(3), np.empty(3)
     linear(law, _STATE, u)
-    price(law, None, scratch, _STATE, u, np.inf, first)
+    price(law, True, scratch, _STATE, u, np.inf, first)
     search(law, Grid((1, 1, 1), (2, 2), 1, 0.1, 0.1, 0.4), scratch, _STATE, u, first)
 
 
