@@ -12,6 +12,7 @@ from template_control.embedding.planners.step_search import Grid, Law, linear, p
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.swing_foot import quintic_step
 from template_control.embedding.references.template_path import LOCATE
+from template_control.robot.library import load_robot
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.dynamics.kernel import new_scratch
@@ -64,9 +65,16 @@ def whole_body() -> None:
     )
     mass_matrix = np.asfortranarray(np.eye(2))
     bias, limits, costs = np.zeros(2), np.ones(1 + 1 + 2), np.ones(2)
-    assemble(mass_matrix, bias, np.zeros((2, 4)), np.zeros((1, 5)), costs, limits, matrices)
+    contact, tasks, out = np.zeros((2, 4)), np.zeros((1, 5)), tuple(matrices)
+    assemble(mass_matrix, bias, contact, tasks, costs, limits, out)
     torques(np.ones((1, 1)), np.zeros(1), np.ones(1), np.zeros(1))
     follow(matrices.a_map, matrices.f_map, np.zeros(1), np.zeros(2), np.zeros(2))
+
+
+def planar_terms() -> None:
+    """The sagittal part of what Pinocchio computes; only Pinocchio knows how its arrays lie."""
+    robot = load_robot("five-link")
+    robot.update(np.zeros(robot.nv), np.zeros(robot.nv))
 
 
 def step_search() -> None:
@@ -102,8 +110,8 @@ def references() -> None:
 
 
 # The search calls the maps, so it comes after them; the others in order of their length.
-CONTROL = (whole_body, references)
+CONTROL = (whole_body, planar_terms, references)
 """What a tick of the controller calls."""
 
-WALK = (closed_form_map, derivatives, exact_map, whole_body, step_search, references)
+WALK = (closed_form_map, derivatives, exact_map, whole_body, step_search, planar_terms, references)
 """What the default planner and the controller call."""
