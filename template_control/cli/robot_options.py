@@ -49,7 +49,8 @@ def robot_from(options: argparse.Namespace) -> PlanarBiped:
 
     Raises:
         RobotError: if there is no such robot.
-        ParameterError: if options for a URDF of one's own come with a shipped robot.
+        ParameterError: if options for a URDF of one's own come with a shipped robot, or lack
+            another that they need.
     """
     own = {
         "feet": options.feet,
@@ -62,4 +63,8 @@ def robot_from(options: argparse.Namespace) -> PlanarBiped:
     if options.robot in ROBOTS:
         flags = ", ".join("--" + name.replace("_", "-") for name in given)
         raise ParameterError(f"{flags} go with a URDF, not with {options.robot}: leave them out")
+    if options.foot_radius is not None and options.sagittal_joints is None:
+        raise ParameterError(
+            "--foot-radius goes with --sagittal-joints: give both, or change the URDF's feet"
+        )
     return PlanarBiped.from_urdf(options.robot, **given)
