@@ -1,10 +1,17 @@
-"""Records on disk: a compressed ``.npz`` with one array a field and the metadata as JSON."""
+"""Files: how they are written whole or not at all, and how records are kept in them.
+
+A record is a ``.npz`` with one array a field and the metadata as JSON.
+"""
 
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import uuid
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,23 +23,90 @@ from template_control.errors import RecordError
 T = TypeVar("T")
 
 
-def save(record: Any, path: str | Path, kind: str) -> Path:
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Where to write a file, so that what was there is replaced by a whole one or stays.
+
+    Args:
+        path: the file's. A link keeps pointing where it does; a device is written as it is.
+
+    Yields:
+        A path beside it with the same ending, that of an empty file. It takes the file's name
+        when the ``with`` block is done, and is removed if an error ends the block.
+
+    Raises:
+        RecordError: for an OSError, also of the ``with`` block.
+    """
+    target = Path(os.path.realpath(path))
+    device = target.exists() and not (target.is_file() or target.is_dir())
+    beside = target if device else target.with_name(f".part-{uuid.uuid4().hex[:12]}{target.suffix}")
+    try:
+        if target.is_dir() or (target.exists() and not os.access(target, os.W_OK)):
+            target.open("ab").close()  # which raises what is the matter with it
+        beside.touch()
+        yield beside
+        if not device:
+            with beside.open("rb+") as file:
+                os.fsync(file.fileno())  # some file systems notice only now that they are full
+            if target.exists():
+                shutil.copymode(target, beside)
+            beside.replace(target)
+    except OSError as error:
+        raise RecordError(
+            f"cannot write {path}: {error.strerror or error}; make room, or give another place"
+        ) from None
+    finally:
+        if not device:
+            with suppress(OSError):
+                beside.unlink(missing_ok=True)
+
+
+class Files:
+    """Writes files, so that a command's table is printed whatever becomes of them."""
+
+    def __init__(self) -> None:
+        self._trouble: RecordError | KeyboardInterrupt | None = None
+
+    def write(self, write: Callable[[], T]) -> T | None:
+        """Call ``write``; None where it fails, or Ctrl-C came before or meanwhile."""
+        if isinstance(self._trouble, KeyboardInterrupt):
+            return None
+        try:
+            return write()
+        except RecordError as error:
+            self._trouble = self._trouble or error
+        except KeyboardInterrupt:
+            self._trouble = KeyboardInterrupt("interrupted: not all files are written")
+        return None
+
+    def tell(self) -> None:
+        """Once the table is printed.
+
+        Raises:
+            RecordError: if a file could not be written.
+            KeyboardInterrupt: if Ctrl-C came while files were written.
+        """
+        if self._trouble is not None:
+            raise self._trouble
+
+
+def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
     """Write a dataclass of arrays with a ``metadata`` dictionary.
 
     Args:
         record: the dataclass instance.
-        path: of the ``.npz``.
+        path: of the ``.npz``, taken as it is.
         kind: what :func:`load` must ask for.
+        quick: do not compress, for somebody who waits.
 
     Raises:
         RecordError: if the file cannot be written.
     """
     arrays = {f.name: getattr(record, f.name) for f in fields(record) if f.name != "metadata"}
     text = json.dumps({"format": kind, **record.metadata})
-    try:
-        np.savez_compressed(path, metadata=np.array(text), **arrays)
-    except OSError as error:
-        raise RecordError(f"cannot write the run to {path}: {error.strerror}") from None
+    write = np.savez if quick else np.savez_compressed
+    with replacing(path) as place, place.open("wb") as file:
+        write(file, metadata=np.array(text), **arrays)
     return Path(path)
 
 

@@ -138,7 +138,9 @@ def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
     monkeypatch.setattr(walk, "progress_bar", impatient)
     arguments = ["walk", "--steps", "100000", "--no-figures", "--output", str(tmp_path)]
     assert main(arguments) == 130
-    assert "interrupted: the run up to here is saved" in capfd.readouterr().out
+    told = capfd.readouterr()
+    assert "mean speed" in told.out
+    assert f"interrupted: the run up to here is in {tmp_path / 'run.npz'}" in told.err
     record = Record.load(tmp_path / "run.npz")
     assert record.steps == 2
     assert record.metadata["interrupted"]

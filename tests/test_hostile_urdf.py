@@ -226,6 +226,18 @@ def test_a_urdf_is_read_in_its_own_encoding(load, five_link, encoding):
     assert load(changed(text, '"five-link"', '"fünf"'), encoding).name == "fünf"
 
 
+def test_a_urdf_in_utf_8_walks_where_the_locale_is_ascii(command, tmp_path, five_link):
+    path = tmp_path / "robot.urdf"
+    path.write_text(changed(five_link, '"five-link"', '"fünf"'), encoding="utf-8")
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    words = ["walk", "--robot", str(path), "--steps", "1", "--no-figures"]
+    table = tmp_path / "table.txt"
+    with table.open("w") as out:
+        status, told = command(*words, "--output", str(tmp_path), stdout=out, **ascii_only)
+    assert status == 0, told
+    assert "f?nf" in table.read_text()
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_dtd_is_read(load, five_link, bolt, dimension):
     text, options = (five_link, {}) if dimension == 2 else (bolt, BOLT)

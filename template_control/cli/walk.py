@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -26,16 +27,17 @@ from template_control.plant.ideal import IdealOptions
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.options import SimulationOptions
-from template_control.run.record import Record
+from template_control.run.record import RunInterrupted
 from template_control.run.simulation import perturbed_start, simulate
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.gaits.gait import WalkingGait, gait_for_speed
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.scenario.scenario import load_scenario
-from template_control.storage import writable
+from template_control.storage import Files, writable
 
 _STEPS = 50
+_MEAN = 50  # steps at most whose VLO states the summary averages
 _LONG = 200  # steps beyond which samples are thinned
 
 
@@ -44,8 +46,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Walk a robot in PyBullet or on an ideal plant: a planner on the SLIP template chooses"
         " each step, a whole-body QP makes the robot follow it. Ends with a table, and a folder"
-        " with the run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input,"
-        " 130 after Ctrl-C (what was walked by then is saved)."
+        " with the run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input or"
+        " a file that cannot be written, 130 after Ctrl-C (what was walked by then is saved,"
+        " without figures)."
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot_options(parser)
@@ -85,8 +88,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--map",
         choices=("paper", "improved", "exact"),
-        default="exact",
-        help="return map that the modified planner tries its steps on",
+        help="return map that the modified planner tries its steps on (default: exact)",
     )
     parser.add_argument(
         "--plant",
@@ -142,7 +144,8 @@ def run(options: argparse.Namespace) -> int:
         options.steps = options.steps or _STEPS
     planner: Planner = LqrPlanner(gait)
     if options.planner == "modified":
-        planner = ModifiedPlanner(gait, ModifiedOptions(map_kind=MapKind[options.map.upper()]))
+        kind = MapKind[(options.map or "exact").upper()]
+        planner = ModifiedPlanner(gait, ModifiedOptions(map_kind=kind))
     every = options.record_every or (1 if (options.steps or 0) <= _LONG else 5)
     simulation = SimulationOptions(
         steps=options.steps,
@@ -154,20 +157,27 @@ def run(options: argparse.Namespace) -> int:
         record_every=every,
     )
     console = Console(stderr=True)
+    files = Files()
     with stdout_to_stderr():
-        with progress_bar(console, "walking", options.steps) as advance:
-            record = simulate(
-                robot, route or planner, simulation, advance, planners={gait.stride: planner}
-            )
-        path = record.save(folder / "run.npz")
-        if not options.no_figures:
-            view.save_figures(record, folder)
-    figures = summarise(record, str(path))
+        try:
+            with progress_bar(console, "walking", options.steps) as advance:
+                record = simulate(
+                    robot, route or planner, simulation, advance, planners={gait.stride: planner}
+                )
+        except RunInterrupted as stop:
+            record = stop.record
+        interrupted = record.metadata["interrupted"]
+        path = files.write(lambda: record.save(folder / "run.npz"))
+        if not (options.no_figures or interrupted):
+            files.write(lambda: view.save_figures(record, folder))
+    figures = summarise(record, None if path is None else str(path))
     if options.json:
         print(json.dumps(figures))
     else:
-        print_table(figures, record)
-    if record.metadata["interrupted"]:
+        print_table(figures)
+    files.tell()
+    if interrupted:
+        print(f"template-control: interrupted: the run up to here is in {path}", file=sys.stderr)
         return INTERRUPTED
     return 1 if record.fell else 0
 
@@ -195,6 +205,11 @@ def _check(options: argparse.Namespace) -> None:
             raise ParameterError(f"{flag} is {value:g}: give a number from {low:g} to {high:g}")
     if options.speed is not None and options.gait != "walk":
         raise ParameterError(f"--speed does not go with --gait {options.gait}: leave one out")
+    if options.map is not None and options.planner != "modified":
+        raise ParameterError(
+            f"--map does not go with --planner {options.planner}: leave it out, or give"
+            " --planner modified"
+        )
     if options.scenario is not None:
         for flag, given in (
             ("--speed", options.speed is not None),
@@ -213,12 +228,11 @@ def _gait(options: argparse.Namespace, robot: PlanarBiped) -> WalkingGait:
     return default_gait(robot)
 
 
-def print_table(figures: dict[str, Any], record: Record) -> None:
+def print_table(figures: dict[str, Any]) -> None:
     """The summary as a table on standard output.
 
     Args:
         figures: of the run, from :func:`~template_control.run.summary.summarise`.
-        record: the run; it knows whether Ctrl-C ended it.
     """
     table = Table(title=f"{figures['robot']}, gait {figures['gait']}", show_header=False)
     table.add_column()
@@ -231,7 +245,10 @@ def print_table(figures: dict[str, Any], record: Record) -> None:
     row("falls", "0" if not figures["fell"] else f"1: {figures['fall_reason']}")
     row("duration", f"{figures['duration']:.2f} s")
     row("mean speed", f"{figures['mean_speed']:.3f} m/s")
-    for name, key in (("VLO target", "vlo_target"), ("VLO, last 50 steps", "vlo_mean_last_50")):
+    for name, key in (
+        ("VLO target", "vlo_target"),
+        (f"VLO, last {min(figures['steps'], _MEAN)} steps", "vlo_mean_last_50"),
+    ):
         z = figures[key]
         if z is not None:
             row(
@@ -262,7 +279,5 @@ def print_table(figures: dict[str, Any], record: Record) -> None:
         t = figures[key]
         row(f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us")
     row("real-time factor", f"{figures['real_time_factor']:.1f}")
-    row("record", figures["record"])
+    row("record", figures["record"] or "not saved")
     Console().print(table)
-    if record.metadata["interrupted"]:
-        Console().print("interrupted: the run up to here is saved")

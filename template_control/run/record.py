@@ -113,12 +113,12 @@ class Record:
         return self.template_com - self.com
 
     def save(self, path: str | Path) -> Path:
-        """Write the run as a compressed ``.npz``.
+        """Write the run as an ``.npz``, compressed unless Ctrl-C ended it: somebody waits then.
 
         Raises:
             RecordError: if the file cannot be written.
         """
-        return storage.save(self, path, FORMAT)
+        return storage.save(self, path, FORMAT, quick=bool(self.metadata.get("interrupted")))
 
     @classmethod
     def load(cls, path: str | Path) -> Record:
@@ -128,3 +128,17 @@ class Record:
             RecordError: if the file is missing or is no recorded run.
         """
         return storage.load(cls, path, FORMAT, {_WALKS: from_walk})
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """Ctrl-C ended a run.
+
+    It is a KeyboardInterrupt, so that it ends a loop of runs too.
+
+    Attributes:
+        record: what was recorded until then, marked ``interrupted`` in its metadata.
+    """
+
+    def __init__(self, record: Record) -> None:
+        super().__init__("the run was interrupted")
+        self.record = record
