@@ -9,12 +9,11 @@ import json
 import os
 import shutil
 import uuid
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -114,10 +113,25 @@ Upgrade = Callable[[dict[str, Any]], dict[str, Any]]
 """From the fields of an older format, by name, to those of today."""
 
 
+class Layout(NamedTuple):
+    """What the fields of a record look like in its file.
+
+    Attributes:
+        fields: by name the sizes of each field's axes, such as "T nv 2". A letter is the same
+            number in all fields, "S+1" one more than "S". A last word "<nodes" says that it holds
+            indices into ``metadata["nodes"]``, "<2" that they are below 2.
+        metadata: by name the types that an entry may have.
+    """
+
+    fields: Mapping[str, str]
+    metadata: Mapping[str, tuple[type, ...]]
+
+
 def load(
     record_type: Callable[..., T],
     path: str | Path,
     kind: str,
+    layout: Layout,
     older: Mapping[str, Upgrade] | None = None,
 ) -> T:
     """Read what :func:`save` wrote with the same ``kind``, or an older one.
@@ -126,35 +140,91 @@ def load(
         record_type: the dataclass.
         path: of the ``.npz``.
         kind: format of today.
+        layout: of that format.
         older: how formats of earlier versions are upgraded.
 
     Raises:
-        RecordError: if the file is missing or is no such record.
+        RecordError: if the file is missing or is no such record, naming the field that is wrong.
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
-            metadata = json.loads(str(data["metadata"]))
-            found = str(metadata.pop("format", ""))
-            upgrade = (older or {}).get(found)
-            if upgrade is not None:
-                names = [name for name in data.files if name != "metadata"]
-                values = {name: data[name] for name in names}
-                return record_type(**upgrade({**values, "metadata": metadata}))
-            if found != kind:
-                if found.rpartition(" ")[0] == kind.rpartition(" ")[0]:
-                    raise RecordError(
-                        f"{path} was written by another version of this library ({found!r}, not"
-                        f" {kind!r}): record it anew"
-                    )
-                raise KeyError("format")
-            names = [f.name for f in fields(record_type) if f.name != "metadata"]  # type: ignore[arg-type]
-            return record_type(**{name: data[name] for name in names}, metadata=metadata)
-    except RecordError:
-        raise
+        values = _values(path, kind, older or {})
+        _check(values, layout)
     except FileNotFoundError:
         raise RecordError(f"there is no run at {path}: give a run.npz") from None
-    except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile):
-        raise RecordError(f"{path} is no recorded run: give a run.npz of this library") from None
+    except _NoRecordError as error:
+        raise RecordError(
+            f"{path} is no recorded run ({error}): give a run.npz of this library"
+        ) from None
+    return record_type(**{name: values[name] for name in (*layout.fields, "metadata")})
+
+
+class _NoRecordError(Exception):
+    """Why a file is none."""
+
+
+def _values(path: str | Path, kind: str, older: Mapping[str, Upgrade]) -> dict[str, Any]:
+    """The fields of today by name, and the metadata."""
+    name = "it"
+    values: dict[str, Any] = {}
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            for name in data.files:
+                values[name] = data[name]
+        name = "metadata"
+        values[name] = json.loads(str(values[name]))
+        found = str(values[name].pop("format", ""))
+        if found in older:
+            return older[found](values)
+    except FileNotFoundError:
+        raise
+    except KeyError as error:
+        raise _NoRecordError(f"it lacks {error.args[0]}") from None
+    except Exception as error:  # a damaged file has any of a dozen
+        raise _NoRecordError(f"{name} cannot be read: {error}") from None
+    if found != kind:
+        if found.rpartition(" ")[0] == kind.rpartition(" ")[0]:
+            raise RecordError(
+                f"{path} was written by another version of this library ({found!r}, not"
+                f" {kind!r}): record it anew"
+            )
+        raise _NoRecordError("its metadata tells another format")
+    return values
+
+
+def _check(values: Mapping[str, Any], layout: Layout) -> None:
+    """Check what was read against the layout."""
+    metadata = values["metadata"]
+    for name, types in layout.metadata.items():
+        if not isinstance(metadata.get(name), types):
+            raise _NoRecordError(f"its metadata has no {name}, or another kind of it")
+    sizes: dict[str, int] = {}
+    for name, text in layout.fields.items():
+        if name not in values:
+            raise _NoRecordError(f"it lacks {name}")
+        *axes, bound = text.split() if "<" in text else (*text.split(), "")
+        array = values[name]
+        if array.dtype.kind not in ("iu" if bound else "fiub"):
+            raise _NoRecordError(f"{name} holds {array.dtype} and not numbers as it should")
+        wanted = _wanted(axes, array.shape, sizes)
+        # Of nothing, numpy does not know how wide it is.
+        if array.shape != wanted and not (array.size == 0 and array.shape[:1] == wanted[:1]):
+            raise _NoRecordError(f"{name} has the shape {array.shape} and not {wanted}")
+        if bound and array.size:
+            end = bound.removeprefix("<")
+            limit = int(end) if end.isdigit() else len(metadata[end])
+            if array.min() < 0 or array.max() >= limit:
+                raise _NoRecordError(f"{name} holds indices that are not from 0 to {limit - 1}")
+
+
+def _wanted(axes: Sequence[str], shape: tuple[int, ...], sizes: dict[str, int]) -> tuple[int, ...]:
+    """The shape that a field is to have; a letter met for the first time is what it is here."""
+    wanted = []
+    for i, axis in enumerate(axes):
+        letter, _, more = axis.partition("+")
+        if not letter.isdigit() and i < len(shape):
+            sizes.setdefault(letter, shape[i] - int(more or 0))
+        wanted.append((int(letter) if letter.isdigit() else sizes.get(letter, 0)) + int(more or 0))
+    return tuple(wanted)
 
 
 def writable(folder: Path) -> Path:
