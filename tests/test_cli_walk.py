@@ -47,7 +47,8 @@ def test_json_is_all_there_is_on_stdout(tmp_path):
 def test_table_and_no_figures(tmp_path, capfd):
     assert main(["walk", "--steps", "2", "--no-figures", "--output", str(tmp_path)]) == 0
     out = capfd.readouterr().out
-    for text in ("steps", "falls", "mean speed", "CoM error", "left_knee", "real-time factor"):
+    texts = ("steps", "falls", "mean speed", "CoM error", "left_knee", "real-time factor")
+    for text in (*texts, "VLO, last 2 steps"):
         assert text in out
     assert not list(tmp_path.glob("*.png"))
 
@@ -158,6 +159,7 @@ def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
         (["--torque-scale", "0"], "--torque-scale"),
         (["--speed", "5"], "5 m/s"),
         (["--speed", "1", "--gait", "paper"], "--speed"),
+        (["--map", "paper"], "--map does not go with --planner lqr"),
         (["--output", "/proc/none"], "/proc/none"),
         (["--seed", "-1"], "--seed"),
     ],
