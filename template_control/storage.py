@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from template_control.errors import RecordError
+from template_control.errors import RecordError, TemplateControlError
 
 T = TypeVar("T")
 
@@ -64,7 +64,7 @@ class Files:
     """Writes files, so that a command's table is printed whatever becomes of them."""
 
     def __init__(self) -> None:
-        self._trouble: RecordError | KeyboardInterrupt | None = None
+        self._trouble: TemplateControlError | KeyboardInterrupt | None = None
 
     def write(self, write: Callable[[], T]) -> T | None:
         """Call ``write``; None where it fails, or Ctrl-C came before or meanwhile."""
@@ -72,7 +72,7 @@ class Files:
             return None
         try:
             return write()
-        except RecordError as error:
+        except TemplateControlError as error:
             self._trouble = self._trouble or error
         except KeyboardInterrupt:
             self._trouble = KeyboardInterrupt("interrupted: not all files are written")
@@ -82,7 +82,7 @@ class Files:
         """Once the table is printed.
 
         Raises:
-            RecordError: if a file could not be written.
+            TemplateControlError: if a file could not be written.
             KeyboardInterrupt: if Ctrl-C came while files were written.
         """
         if self._trouble is not None:
@@ -225,6 +225,21 @@ def _wanted(axes: Sequence[str], shape: tuple[int, ...], sizes: dict[str, int]) 
             sizes.setdefault(letter, shape[i] - int(more or 0))
         wanted.append((int(letter) if letter.isdigit() else sizes.get(letter, 0)) + int(more or 0))
     return tuple(wanted)
+
+
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a text file.
+
+    Args:
+        path: of the file.
+        text: all of it.
+
+    Raises:
+        RecordError: if the file cannot be written.
+    """
+    with replacing(path) as place:
+        place.write_text(text, encoding="utf-8")
+    return Path(path)
 
 
 def writable(folder: Path) -> Path:
