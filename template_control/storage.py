@@ -37,9 +37,11 @@ def replacing(path: str | Path) -> Iterator[Path]:
         RecordError: for an OSError, also of the ``with`` block.
     """
     target = Path(os.path.realpath(path))
-    device = target.exists() and not (target.is_file() or target.is_dir())
-    beside = target if device else target.with_name(f".part-{uuid.uuid4().hex[:12]}{target.suffix}")
+    beside = target.with_name(f".part-{uuid.uuid4().hex[:12]}{target.suffix}")
+    device = False
     try:
+        if target.exists() and not (target.is_file() or target.is_dir()):
+            device, beside = True, target
         if target.is_dir() or (target.exists() and not os.access(target, os.W_OK)):
             target.open("ab").close()  # which raises what is the matter with it
         beside.touch()

@@ -11,11 +11,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from template_control.errors import ParameterError
+from template_control.errors import ParameterError, RecordError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Outcome, Reset, Slot
-from template_control.storage import Files, writable
+from template_control.storage import Files
 from template_control.view.automaton_figure import (
     GAIT_NAMES,
     automaton_figure,
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     """Draw and print as told; returns 0."""
     files, figure = Files(), None
     if not options.no_figure:
-        writable(options.output.parent)
+        _check(options.output)
         figure = files.write(lambda: save(AUTOMATON, options.output))
     if options.json:
         print(json.dumps(describe(AUTOMATON)))
@@ -74,7 +74,7 @@ def _print(figure: Path | None) -> None:
 
 
 def save(automaton: Automaton, path: Path) -> Path:
-    """Draw an automaton into a file; its folder is there.
+    """Draw an automaton into a file; folders on the way to it are made.
 
     Args:
         automaton: what to draw.
@@ -84,9 +84,20 @@ def save(automaton: Automaton, path: Path) -> Path:
         ParameterError: if the suffix is none of these.
         RecordError: if the file cannot be written.
     """
+    _check(path)
+    return save_figure(automaton_figure(automaton), path, dpi=100)
+
+
+def _check(path: Path) -> None:
     if path.suffix.lower() not in _SUFFIXES:
         raise ParameterError(f"--output is {path}: give a file ending in {', '.join(_SUFFIXES)}")
-    return save_figure(automaton_figure(automaton), path, dpi=100)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        reason = "it is a folder" if path.is_dir() else None
+    except OSError as error:
+        reason = error.strerror
+    if reason is not None:
+        raise RecordError(f"cannot write {path}: {reason}; give another --output")
 
 
 def describe(automaton: Automaton) -> dict[str, Any]:
