@@ -28,6 +28,7 @@ from .run.config import RunConfig as RunConfig
 from .run.options import Push as Push
 from .run.options import SimulationOptions as SimulationOptions
 from .run.record import Record as Record
+from .run.record import RunInterrupted as RunInterrupted
 from .run.sensing import SensorOptions as SensorOptions
 from .run.simulation import simulate as simulate
 from .slip.automaton.vocabulary import MapKind as MapKind

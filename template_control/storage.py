@@ -1,38 +1,113 @@
-"""Records on disk: a compressed ``.npz`` with one array a field and the metadata as JSON."""
+"""Files: how they are written whole or not at all, and how records are kept in them.
+
+A record is a ``.npz`` with one array a field and the metadata as JSON.
+"""
 
 from __future__ import annotations
 
 import json
-import zipfile
-from collections.abc import Callable, Mapping
+import os
+import shutil
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from template_control.errors import RecordError
+from template_control.errors import RecordError, TemplateControlError
 
 T = TypeVar("T")
 
 
-def save(record: Any, path: str | Path, kind: str) -> Path:
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Where to write a file, so that what was there is replaced by a whole one or stays.
+
+    Args:
+        path: the file's. A link keeps pointing where it does; a device is written as it is.
+
+    Yields:
+        A path beside it with the same ending, that of an empty file. It takes the file's name
+        when the ``with`` block is done, and is removed if an error ends the block.
+
+    Raises:
+        RecordError: for an OSError, also of the ``with`` block.
+    """
+    target = Path(os.path.realpath(path))
+    beside = target.with_name(f".part-{uuid.uuid4().hex[:12]}{target.suffix}")
+    device = False
+    try:
+        if target.exists() and not (target.is_file() or target.is_dir()):
+            device, beside = True, target
+        if target.is_dir() or (target.exists() and not os.access(target, os.W_OK)):
+            target.open("ab").close()  # which raises what is the matter with it
+        beside.touch()
+        yield beside
+        if not device:
+            with beside.open("rb+") as file:
+                os.fsync(file.fileno())  # some file systems notice only now that they are full
+            if target.exists():
+                shutil.copymode(target, beside)
+            beside.replace(target)
+    except OSError as error:
+        raise RecordError(
+            f"cannot write {path}: {error.strerror or error}; make room, or give another place"
+        ) from None
+    finally:
+        if not device:
+            with suppress(OSError):
+                beside.unlink(missing_ok=True)
+
+
+class Files:
+    """Writes files, so that a command's table is printed whatever becomes of them."""
+
+    def __init__(self) -> None:
+        self._trouble: TemplateControlError | KeyboardInterrupt | None = None
+
+    def write(self, write: Callable[[], T]) -> T | None:
+        """Call ``write``; None where it fails, or Ctrl-C came before or meanwhile."""
+        if isinstance(self._trouble, KeyboardInterrupt):
+            return None
+        try:
+            return write()
+        except TemplateControlError as error:
+            self._trouble = self._trouble or error
+        except KeyboardInterrupt:
+            self._trouble = KeyboardInterrupt("interrupted: not all files are written")
+        return None
+
+    def tell(self) -> None:
+        """Once the table is printed.
+
+        Raises:
+            TemplateControlError: if a file could not be written.
+            KeyboardInterrupt: if Ctrl-C came while files were written.
+        """
+        if self._trouble is not None:
+            raise self._trouble
+
+
+def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
     """Write a dataclass of arrays with a ``metadata`` dictionary.
 
     Args:
         record: the dataclass instance.
-        path: of the ``.npz``.
+        path: of the ``.npz``, taken as it is.
         kind: what :func:`load` must ask for.
+        quick: do not compress, for somebody who waits.
 
     Raises:
         RecordError: if the file cannot be written.
     """
     arrays = {f.name: getattr(record, f.name) for f in fields(record) if f.name != "metadata"}
     text = json.dumps({"format": kind, **record.metadata})
-    try:
-        np.savez_compressed(path, metadata=np.array(text), **arrays)
-    except OSError as error:
-        raise RecordError(f"cannot write the run to {path}: {error.strerror}") from None
+    write = np.savez if quick else np.savez_compressed
+    with replacing(path) as place, place.open("wb") as file:
+        write(file, metadata=np.array(text), **arrays)
     return Path(path)
 
 
@@ -40,10 +115,25 @@ Upgrade = Callable[[dict[str, Any]], dict[str, Any]]
 """From the fields of an older format, by name, to those of today."""
 
 
+class Layout(NamedTuple):
+    """What the fields of a record look like in its file.
+
+    Attributes:
+        fields: by name the sizes of each field's axes, such as "T nv 2". A letter is the same
+            number in all fields, "S+1" one more than "S". A last word "<nodes" says that it holds
+            indices into ``metadata["nodes"]``, "<2" that they are below 2.
+        metadata: by name the types that an entry may have.
+    """
+
+    fields: Mapping[str, str]
+    metadata: Mapping[str, tuple[type, ...]]
+
+
 def load(
     record_type: Callable[..., T],
     path: str | Path,
     kind: str,
+    layout: Layout,
     older: Mapping[str, Upgrade] | None = None,
 ) -> T:
     """Read what :func:`save` wrote with the same ``kind``, or an older one.
@@ -52,35 +142,91 @@ def load(
         record_type: the dataclass.
         path: of the ``.npz``.
         kind: format of today.
+        layout: of that format.
         older: how formats of earlier versions are upgraded.
 
     Raises:
-        RecordError: if the file is missing or is no such record.
+        RecordError: if the file is missing or is no such record, naming the field that is wrong.
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
-            metadata = json.loads(str(data["metadata"]))
-            found = str(metadata.pop("format", ""))
-            upgrade = (older or {}).get(found)
-            if upgrade is not None:
-                names = [name for name in data.files if name != "metadata"]
-                values = {name: data[name] for name in names}
-                return record_type(**upgrade({**values, "metadata": metadata}))
-            if found != kind:
-                if found.rpartition(" ")[0] == kind.rpartition(" ")[0]:
-                    raise RecordError(
-                        f"{path} was written by another version of this library ({found!r}, not"
-                        f" {kind!r}): record it anew"
-                    )
-                raise KeyError("format")
-            names = [f.name for f in fields(record_type) if f.name != "metadata"]  # type: ignore[arg-type]
-            return record_type(**{name: data[name] for name in names}, metadata=metadata)
-    except RecordError:
-        raise
+        values = _values(path, kind, older or {})
+        _check(values, layout)
     except FileNotFoundError:
         raise RecordError(f"there is no run at {path}: give a run.npz") from None
-    except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile):
-        raise RecordError(f"{path} is no recorded run: give a run.npz of this library") from None
+    except _NoRecordError as error:
+        raise RecordError(
+            f"{path} is no recorded run ({error}): give a run.npz of this library"
+        ) from None
+    return record_type(**{name: values[name] for name in (*layout.fields, "metadata")})
+
+
+class _NoRecordError(Exception):
+    """Why a file is none."""
+
+
+def _values(path: str | Path, kind: str, older: Mapping[str, Upgrade]) -> dict[str, Any]:
+    """The fields of today by name, and the metadata."""
+    name = "it"
+    values: dict[str, Any] = {}
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            for name in data.files:
+                values[name] = data[name]
+        name = "metadata"
+        values[name] = json.loads(str(values[name]))
+        found = str(values[name].pop("format", ""))
+        if found in older:
+            return older[found](values)
+    except FileNotFoundError:
+        raise
+    except KeyError as error:
+        raise _NoRecordError(f"it lacks {error.args[0]}") from None
+    except Exception as error:  # a damaged file has any of a dozen
+        raise _NoRecordError(f"{name} cannot be read: {error}") from None
+    if found != kind:
+        if found.rpartition(" ")[0] == kind.rpartition(" ")[0]:
+            raise RecordError(
+                f"{path} was written by another version of this library ({found!r}, not"
+                f" {kind!r}): record it anew"
+            )
+        raise _NoRecordError("its metadata tells another format")
+    return values
+
+
+def _check(values: Mapping[str, Any], layout: Layout) -> None:
+    """Check what was read against the layout."""
+    metadata = values["metadata"]
+    for name, types in layout.metadata.items():
+        if not isinstance(metadata.get(name), types):
+            raise _NoRecordError(f"its metadata has no {name}, or another kind of it")
+    sizes: dict[str, int] = {}
+    for name, text in layout.fields.items():
+        if name not in values:
+            raise _NoRecordError(f"it lacks {name}")
+        *axes, bound = text.split() if "<" in text else (*text.split(), "")
+        array = values[name]
+        if array.dtype.kind not in ("iu" if bound else "fiub"):
+            raise _NoRecordError(f"{name} holds {array.dtype} and not numbers as it should")
+        wanted = _wanted(axes, array.shape, sizes)
+        # Of nothing, numpy does not know how wide it is.
+        if array.shape != wanted and not (array.size == 0 and array.shape[:1] == wanted[:1]):
+            raise _NoRecordError(f"{name} has the shape {array.shape} and not {wanted}")
+        if bound and array.size:
+            end = bound.removeprefix("<")
+            limit = int(end) if end.isdigit() else len(metadata[end])
+            if array.min() < 0 or array.max() >= limit:
+                raise _NoRecordError(f"{name} holds indices that are not from 0 to {limit - 1}")
+
+
+def _wanted(axes: Sequence[str], shape: tuple[int, ...], sizes: dict[str, int]) -> tuple[int, ...]:
+    """The shape that a field is to have; a letter met for the first time is what it is here."""
+    wanted = []
+    for i, axis in enumerate(axes):
+        letter, _, more = axis.partition("+")
+        if not letter.isdigit() and i < len(shape):
+            sizes.setdefault(letter, shape[i] - int(more or 0))
+        wanted.append((int(letter) if letter.isdigit() else sizes.get(letter, 0)) + int(more or 0))
+    return tuple(wanted)
 
 
 def write_text(path: str | Path, text: str) -> Path:
@@ -93,10 +239,8 @@ def write_text(path: str | Path, text: str) -> Path:
     Raises:
         RecordError: if the file cannot be written.
     """
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise RecordError(f"cannot write {path}: {error.strerror}") from None
+    with replacing(path) as place:
+        place.write_text(text, encoding="utf-8")
     return Path(path)
 
 

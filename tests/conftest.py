@@ -1,7 +1,10 @@
 """What tests share: robot, gaits, a short walk, how a mistake is told, and their own setting."""
 
+import os
 import shlex
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -110,3 +113,27 @@ def log(tmp_path, monkeypatch):
     path = tmp_path / "calls.log"
     monkeypatch.setenv("SWEEP_LOG", str(path))
     return path
+
+
+@pytest.fixture
+def command():
+    """Runs a command in a process of its own; its status, and what it says on stderr.
+
+    With None for ``stdout`` the process begins with a closed standard output.
+    """
+
+    def run(*words, stdout, stderr=subprocess.PIPE, **environment):
+        line = [sys.executable, "-m", "template_control.cli.main", *words]
+        if stdout is None:
+            line = ["sh", "-c", 'exec "$@" >&-', "sh", *line]
+        done = subprocess.run(
+            line,
+            stdout=stdout,
+            stderr=stderr,
+            text=True,
+            timeout=120,
+            env={**os.environ, **environment},
+        )
+        return done.returncode, done.stderr or ""
+
+    return run

@@ -1,5 +1,6 @@
 """What the tests of sweeps sweep, and how they look at files and processes."""
 
+import ctypes
 import json
 import math
 import os
@@ -94,3 +95,8 @@ def calls(log):
     found = [tuple(map(int, line.split())) for line in lines(log)]
     log.unlink(missing_ok=True)
     return found
+
+
+def hold(seconds):
+    """Sleeps as compiled code works: no other thread of the process runs meanwhile."""
+    ctypes.PyDLL(None).usleep(int(1e6 * seconds))

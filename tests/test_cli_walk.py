@@ -47,7 +47,8 @@ def test_json_is_all_there_is_on_stdout(tmp_path):
 def test_table_and_no_figures(tmp_path, capfd):
     assert main(["walk", "--steps", "2", "--no-figures", "--output", str(tmp_path)]) == 0
     out = capfd.readouterr().out
-    for text in ("steps", "falls", "mean speed", "CoM error", "left_knee", "real-time factor"):
+    texts = ("steps", "falls", "mean speed", "CoM error", "left_knee", "real-time factor")
+    for text in (*texts, "VLO, last 2 steps"):
         assert text in out
     assert not list(tmp_path.glob("*.png"))
 
@@ -138,7 +139,9 @@ def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
     monkeypatch.setattr(walk, "progress_bar", impatient)
     arguments = ["walk", "--steps", "100000", "--no-figures", "--output", str(tmp_path)]
     assert main(arguments) == 130
-    assert "interrupted: the run up to here is saved" in capfd.readouterr().out
+    told = capfd.readouterr()
+    assert "mean speed" in told.out
+    assert f"interrupted: the run up to here is in {tmp_path / 'run.npz'}" in told.err
     record = Record.load(tmp_path / "run.npz")
     assert record.steps == 2
     assert record.metadata["interrupted"]
@@ -156,6 +159,7 @@ def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
         (["--torque-scale", "0"], "--torque-scale"),
         (["--speed", "5"], "5 m/s"),
         (["--speed", "1", "--gait", "paper"], "speed does not go with gait paper"),
+        (["--map", "paper"], "--map does not go with planner lqr"),
         (["--output", "/proc/none"], "/proc/none"),
         (["--seed", "-1"], "--seed"),
     ],

@@ -25,7 +25,7 @@ def record(short_walk):
 
 
 def with_urdf(record, old, new):
-    text = record.metadata["urdf"]
+    text = record.metadata["urdf"].replace(" />", "/>")  # as it stands in the file
     assert old in text
     return replace(record, metadata={**record.metadata, "urdf": text.replace(old, new)})
 

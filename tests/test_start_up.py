@@ -94,6 +94,7 @@ def test_every_command_has_its_own_help(command, capfd):
     assert stop.value.code == 0
     out = capfd.readouterr().out
     assert out.startswith(f"usage: template-control {command} ")
+    assert "%%" not in out
     options = [line.split()[0] for line in out.splitlines() if line.startswith("  --")]
     assert options
 
@@ -172,3 +173,17 @@ def test_a_function_named_as_its_module_stays_a_function(first):
     code = f"import template_control as tc\n{first}\nfrom template_control.sweep import sweep\n"
     done = python("-c", code + "print(tc.sweep.sweep is sweep, callable(sweep))")
     assert done.stdout == "True True\n", done.stderr
+
+
+def test_where_no_folder_takes_a_cache_everything_is_imported_and_compiles(tmp_path):
+    code = """
+import template_control as tc
+tc.simulate, tc.ReturnMap, tc.PlantOptions
+from template_control.compiled import compiled
+print(compiled(lambda x: x + 1)(1))
+"""
+    nowhere = tmp_path / "file"
+    nowhere.touch()
+    done = python("-c", code, NUMBA_CACHE_DIR=str(nowhere / "cache"), HOME=str(nowhere))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "2\n"

@@ -54,12 +54,26 @@ def linked(folder):
     return tc.FiveLink("x", good, good, bad, (1.0, 1.0))
 
 
+def massless(link):
+    """A link's element in the five-link robot's URDF; the same without ``<inertial>``."""
+    text = robot_path("five-link").read_text()
+    (element,) = re.findall(rf'<link name="{link}">.*?</link>', text, flags=re.DOTALL)
+    return element, re.sub("<inertial>.*?</inertial>", "", element, flags=re.DOTALL)
+
+
 SPHERE = '<collision>\n      <geometry><sphere radius="0.01"/>'
+MESH = '<collision>\n      <geometry><mesh filename="none.stl"/>'
+KNEE_LIMIT = '<limit lower="0" upper="2.5" effort="350" velocity="20"/>'
 HIP = '<joint name="left_hip" type="revolute">'
 MISTAKES = {
     "there is no URDF at …": lambda folder: tc.load_robot(folder / "none.urdf"),
     "there is no robot …": lambda _: tc.load_robot("none"),
-    "is no URDF that Pinocchio reads": changed("</robot>", ""),
+    "is no URDF that can be read": changed("</robot>", ""),
+    "is no URDF that Pinocchio reads": changed(KNEE_LIMIT, ""),
+    "has … give a finite number": changed('mass value="2.4"', 'mass value="nan"'),
+    "its inertia is no body's": changed('iyy="0.04124"', 'iyy="4.124"'),
+    "weighs nothing, and so does what is fixed to it": changed(*massless("left_shank")),
+    "its collision mesh … is missing": changed(SPHERE, MESH),
     "is not planar: its first joints are …": bolt(joints=()),
     "and must be revolute about y": changed(HIP, HIP.replace("revolute", "continuous")),
     "hinges in its legs: a hip and a knee each": bolt(BOLT_JOINTS[:3]),
@@ -101,11 +115,10 @@ def test_a_mistake_gives_its_message(message, tmp_path):
         MISTAKES[message](tmp_path)
 
 
-def test_a_link_without_inertial_weighs_a_kilogram_in_pybullet_only(tmp_path):
-    # The trap that the page warns of; the day PyBullet drops it, the page can.
-    massless = re.compile(r'(<link name="left_foot">)\s*<inertial>.*?</inertial>', re.DOTALL)
+def test_a_frame_without_inertial_weighs_nothing_in_pybullet_too(tmp_path):
+    # PyBullet alone would take it for a kilogram.
     path = tmp_path / "light.urdf"
-    path.write_text(massless.sub(r"\1", robot_path("five-link").read_text()))
+    path.write_text(robot_path("five-link").read_text().replace(*massless("left_foot")))
     robot = tc.load_robot(path)
     assert robot.mass == pytest.approx(80.0)
     with BulletPlant(robot, tc.PlantOptions()) as plant:
@@ -114,4 +127,4 @@ def test_a_link_without_inertial_weighs_a_kilogram_in_pybullet_only(tmp_path):
             pybullet.getDynamicsInfo(plant.body, link, physicsClientId=plant.client)[0]
             for link in links
         )
-    assert mass == pytest.approx(81.0)
+    assert mass == pytest.approx(80.0)

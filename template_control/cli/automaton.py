@@ -15,12 +15,14 @@ from template_control.errors import ParameterError, RecordError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Outcome, Reset, Slot
+from template_control.storage import Files
 from template_control.view.automaton_figure import (
     GAIT_NAMES,
     automaton_figure,
     gaits,
     words,
 )
+from template_control.view.figure_file import save_figure
 
 _SUFFIXES = (".png", ".svg", ".pdf")
 _PIPE_WIDTH = 140  # columns where there is no terminal to ask
@@ -51,20 +53,27 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw and print as told; returns 0."""
+    files, figure = Files(), None
     if not options.no_figure:
-        save(AUTOMATON, options.output)
+        _check(options.output)
+        figure = files.write(lambda: save(AUTOMATON, options.output))
     if options.json:
         print(json.dumps(describe(AUTOMATON)))
-        return 0
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
-    for table in tables(AUTOMATON):
-        console.print(table)
-    if not options.no_figure:
-        console.print(f"figure: {options.output}", markup=False, soft_wrap=True)
+    else:
+        _print(figure)
+    files.tell()
     return 0
 
 
-def save(automaton: Automaton, path: Path) -> None:
+def _print(figure: Path | None) -> None:
+    console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
+    for table in tables(AUTOMATON):
+        console.print(table)
+    if figure is not None:
+        console.print(f"figure: {figure}", markup=False, soft_wrap=True)
+
+
+def save(automaton: Automaton, path: Path) -> Path:
     """Draw an automaton into a file; folders on the way to it are made.
 
     Args:
@@ -75,13 +84,20 @@ def save(automaton: Automaton, path: Path) -> None:
         ParameterError: if the suffix is none of these.
         RecordError: if the file cannot be written.
     """
+    _check(path)
+    return save_figure(automaton_figure(automaton), path, dpi=100)
+
+
+def _check(path: Path) -> None:
     if path.suffix.lower() not in _SUFFIXES:
         raise ParameterError(f"--output is {path}: give a file ending in {', '.join(_SUFFIXES)}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        automaton_figure(automaton).savefig(path, dpi=100)
+        reason = "it is a folder" if path.is_dir() else None
     except OSError as error:
-        raise RecordError(f"cannot write {path}: {error.strerror}; give another --output") from None
+        reason = error.strerror
+    if reason is not None:
+        raise RecordError(f"cannot write {path}: {reason}; give another --output")
 
 
 def describe(automaton: Automaton) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
@@ -27,7 +26,8 @@ from template_control.slip.gaits.gait_branch import Family
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.storage import writable
+from template_control.storage import Files, writable
+from template_control.view.figure_file import save_figure
 from template_control.view.stability_figures import UNITS, branch_figure
 
 Array = NDArray[np.float64]
@@ -150,15 +150,17 @@ def run(options: argparse.Namespace) -> int:
     else:
         points = _passive(wanted)
         show = [q for q in QUANTITIES if q not in held and q != options.over]
-    paths = []
+    files = Files()
+    path = None
     if folder is not None:
-        paths = [folder / "branch.png"]
-        with mpl.rc_context({"savefig.dpi": 110}):
-            branch_figure(points, options.over, show, bool(options.controlled)).savefig(paths[0])
+        figure = branch_figure(points, options.over, show, bool(options.controlled))
+        path = files.write(lambda: save_figure(figure, folder / "branch.png"))
+    paths = [] if path is None else [path]
     if options.json:
         print(json.dumps({"points": [_data(p) for p in points], "figures": list(map(str, paths))}))
     else:
         _print(points, options.gait, options.over, paths)
+    files.tell()
     return 0
 
 

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
+import os
 import re
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from types import FrameType
 from typing import Any, NamedTuple
 
 from template_control.cli.output import INTERRUPTED
@@ -61,6 +67,11 @@ _COMMANDS = {
     ),
 }
 _USER_ERROR = 2
+_STDOUT, _STDERR = 1, 2
+_PIPE_CLOSED = 141  # as shells have it where SIGPIPE ended a program
+_NOTHING_KEPT = "interrupted, nothing is kept"
+_PROCESS = os.getpid()
+_STOPPED = threading.Event()
 
 
 class _Version(argparse.Action):
@@ -126,9 +137,29 @@ def _with_values(arguments: Sequence[str] | None) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit status.
 
-    A user's mistake is told in one line, status 2; Ctrl-C is status 130.
+    A user's mistake is told in one line, status 2; Ctrl-C is status 130, and so is SIGTERM or a
+    terminal that was closed.
+
+    Args:
+        arguments: the command's words; None for those of this process, which then ends with it.
     """
-    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments is not None:
+        return _command(arguments)
+    output = _standard_streams()
+    _on_signals(_end_at_once)
+    try:
+        status = _command(sys.argv[1:], output)
+        if _STOPPED.is_set():
+            with suppress(OSError):
+                sys.stdout.flush()
+            os._exit(status)  # to take everything apart takes Python up to a second
+        return status
+    finally:
+        _on_signals(_end_quietly)
+
+
+def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
+    """Run a command; with the ``output`` of the process, its signals are its affair too."""
     try:
         options = build_parser(arguments).parse_args(arguments)
         # Not before: whoever asks for help need not wait for it.
@@ -136,14 +167,109 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         from template_control.compiling import compiling
 
+        if output is not None:
+            _on_signals(_interrupt)
         with compiling(Console(stderr=True)):
-            return int(options.run(options))
+            status = int(options.run(options))
+        sys.stdout.flush()
+        return status
+    except KeyboardInterrupt as error:
+        if output is not None:
+            _on_signals(_end_quietly)
+        return _told(str(error) or _NOTHING_KEPT, INTERRUPTED)
     except TemplateControlError as error:
-        print(f"template-control: {error}", file=sys.stderr)
-        return _USER_ERROR
-    except KeyboardInterrupt:
-        print("template-control: interrupted before anything was done", file=sys.stderr)
-        return INTERRUPTED
+        return _told(str(error), _USER_ERROR)
+    except (Exception, SystemExit):
+        if _STOPPED.is_set():  # an import that Ctrl-C ends may end with any error
+            return _told(_NOTHING_KEPT, INTERRUPTED)
+        if output is None:
+            raise
+        with suppress(OSError):
+            sys.stdout.flush()
+        if output.failure is None:
+            raise
+        if isinstance(output.failure, BrokenPipeError):
+            return _PIPE_CLOSED
+        return _told(f"cannot write to standard output: {output.failure.strerror}", _USER_ERROR)
+
+
+def _told(line: str, status: int) -> int:
+    """The status, once the line is on stderr."""
+    with suppress(OSError):
+        print(f"template-control: {line}", file=sys.stderr, flush=True)
+    return status
+
+
+class _Standard(io.FileIO):
+    """Standard output or error, which takes no more after its first failure.
+
+    What a full device has not taken would be tried again, and fail again, when Python ends. Of
+    standard error even the first failure is no reason to end a command.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        super().__init__(descriptor, "w", closefd=False)
+        self.failure: OSError | None = None
+
+    def write(self, data: Any) -> int | None:  # type: ignore[override]
+        if self.failure is None:
+            try:
+                return super().write(data)
+            except OSError as error:
+                self.failure = error
+                if self.fileno() == _STDOUT:
+                    raise
+        return len(data)
+
+
+def _standard_streams() -> _Standard:
+    """Open what is closed: a file would take its place, and what is printed with it.
+
+    No character is one too many for the streams, whatever the locale. Returns standard output's.
+    """
+    for descriptor in range(_STDERR + 1):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
+    streams = _Standard(_STDOUT), _Standard(_STDERR)
+    sys.stdout, sys.stderr = (
+        io.TextIOWrapper(
+            io.BufferedWriter(stream),
+            encoding=None if old is None else old.encoding,
+            errors="replace",
+            line_buffering=stream.isatty() or stream is streams[1],
+        )
+        for stream, old in zip(streams, (sys.stdout, sys.stderr), strict=True)
+    )
+    return streams[0]
+
+
+def _on_signals(handler: Callable[[int, FrameType | None], None]) -> None:
+    """What Ctrl-C does, SIGTERM does too, and the end of the terminal; not what nohup ignores."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+def _end_at_once(number: int, frame: FrameType | None) -> None:
+    """While a command is imported, which Ctrl-C cannot end well."""
+    os.write(_STDERR, b"template-control: interrupted before anything was done\n")
+    os._exit(INTERRUPTED)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    # A process that was just forked still has the handler, but is not the command.
+    if os.getpid() == _PROCESS:
+        _STOPPED.set()
+        raise KeyboardInterrupt
+
+
+def _end_quietly(number: int, frame: FrameType | None) -> None:
+    """When all is written and told."""
+    os._exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

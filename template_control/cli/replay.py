@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -85,8 +84,6 @@ def _film(record: Record, path: Path, part: dict[str, Any]) -> Path:
 
 
 def _serve(record: Record, part: dict[str, Any], no_browser: bool) -> None:
-    # A plain kill must end the server too, which is a process of its own.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with replay(record, **part) as server:
             print(f"replay at {server.url}, until Ctrl-C", flush=True)

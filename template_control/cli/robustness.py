@@ -15,13 +15,14 @@ from rich.table import Table
 
 from template_control.cli.options.robot import add_robot
 from template_control.cli.output import INTERRUPTED
-from template_control.errors import ParameterError, RecordError
+from template_control.errors import ParameterError
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.library import load_robot
 from template_control.robustness.campaign import SETTLED, Finding, Robustness, measure
 from template_control.robustness.disturbances import AFTER, DISTURBANCES
-from template_control.storage import writable
-from template_control.sweep.executor import worker_processes
+from template_control.storage import Files, writable
+from template_control.sweep.executor import workers
+from template_control.view.figure_file import save_figure
 from template_control.view.robustness_figure import robustness_figure
 
 _NAMES = tuple(d.name for d in DISTURBANCES)
@@ -43,7 +44,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " noise and delay level by level, with several trials each, until the walk breaks."
         f" A trial succeeds if the robot does not fall within {AFTER} more steps and, after"
         " a push or a step, its mean speed and VLO height over the last 5 of them are"
-        f" within {100 * SETTLED:g} %% of its gait's. Ends with a table and a figure. Ctrl-C"
+        f" within {100 * SETTLED:g} % of its gait's. Ends with a table and a figure. Ctrl-C"
         " and the same command again go on where it was. Exit status: 0, 2 for bad input"
         " or a robot that falls undisturbed, 130 after Ctrl-C."
     )
@@ -92,9 +93,8 @@ def run(options: argparse.Namespace) -> int:
         )
     load_robot(options.robot)  # before a folder is made for it
     folder = writable(options.output or Path("runs/robustness") / Path(options.robot).stem)
-    pool = worker_processes(options.workers)
     try:
-        with stdout_to_stderr():
+        with workers(options.workers) as pool, stdout_to_stderr():
             found = measure(options.robot, options.disturbance, folder, pool, options.quick)
     except KeyboardInterrupt:
         print(
@@ -103,26 +103,21 @@ def run(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return INTERRUPTED
-    finally:
-        pool.shutdown(cancel_futures=True)
-    figure = _draw(found, folder)
+    files = Files()
+    figure = files.write(lambda: _draw(found, folder))
     if options.json:
-        print(json.dumps({**data(found), "figure": str(figure)}))
+        print(json.dumps({**data(found), "figure": None if figure is None else str(figure)}))
     elif options.markdown:
         print(markdown(found))
     else:
         _print_table(found, figure)
+    files.tell()
     return 0
 
 
 def _draw(found: Robustness, folder: Path) -> Path:
-    path = folder / "robustness.png"
     with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
-        try:
-            robustness_figure(found).savefig(path, dpi=110)
-        except OSError as error:
-            raise RecordError(f"cannot write {path}: {error.strerror}") from None
-    return path
+        return save_figure(robustness_figure(found), folder / "robustness.png")
 
 
 def data(found: Robustness) -> dict[str, Any]:
@@ -191,7 +186,7 @@ def markdown(found: Robustness) -> str:
     return "\n".join([_title(found) + ":", "", *("| " + " | ".join(r) + " |" for r in rows)])
 
 
-def _print_table(found: Robustness, figure: Path) -> None:
+def _print_table(found: Robustness, figure: Path | None) -> None:
     table = Table(title=_title(found))
     for column in _COLUMNS:
         table.add_column(column, no_wrap=column == _COLUMNS[0])
@@ -199,4 +194,5 @@ def _print_table(found: Robustness, figure: Path) -> None:
         table.add_row(*_row(finding))
     console = Console()
     console.print(table)
-    console.print(f"figure: {figure}", highlight=False)
+    if figure is not None:
+        console.print(f"figure: {figure}", highlight=False)

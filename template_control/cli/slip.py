@@ -19,6 +19,7 @@ from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario
+from template_control.storage import Files
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}
 _NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
@@ -57,14 +58,16 @@ def run(options: argparse.Namespace) -> int:
     folder = output_folder(options.output)
     with Console(stderr=True).status("simulating") as status:
         record = simulate_scenario(scenario, lambda now: status.update(f"simulating, {now:.1f} s"))
-    path = record.save(folder / "run.npz")
+    files = Files()
+    path = files.write(lambda: record.save(folder / "run.npz"))
     if not options.no_figures:
-        view.save_scenario_figures(record, folder)
-    figures = {**summarise_scenario(record), "record": str(path)}
+        files.write(lambda: view.save_scenario_figures(record, folder))
+    figures = {**summarise_scenario(record), "record": None if path is None else str(path)}
     if options.json:
         print(json.dumps(figures))
     else:
         _print(figures)
+    files.tell()
     return 0 if record.completed else 1
 
 
@@ -107,5 +110,5 @@ def _print(figures: dict[str, Any]) -> None:
     table.add_row(
         "last section dx/dt, y, dy/dt", "  ".join(f"{z:.4f}" for z in figures["last_section"])
     )
-    table.add_row("record", figures["record"])
+    table.add_row("record", figures["record"] or "not saved")
     Console().print(table)

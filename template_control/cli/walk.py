@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from typing import Any
 
 from rich.console import Console
@@ -21,8 +22,11 @@ from template_control.cli.options.world import (
 )
 from template_control.cli.output import INTERRUPTED, progress_bar
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.run.record import Record
+from template_control.run.record import RunInterrupted
 from template_control.run.summary import summarise
+from template_control.storage import Files
+
+_MEAN = 50  # steps at most whose VLO states the summary averages
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -31,7 +35,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "Walk a robot in PyBullet or on an ideal plant: a planner on the SLIP template chooses"
         " each step, a whole-body QP makes the robot follow it. Ends with a table, and a folder"
         " with the run (run.npz), what repeats it (run.toml) and figures. Exit status: 0, 1 after"
-        " a fall, 2 for bad input, 130 after Ctrl-C (what was walked by then is saved)."
+        " a fall, 2 for bad input or a file that cannot be written, 130 after Ctrl-C (what was"
+        " walked by then is saved, without figures)."
     )
     add_config(parser)
     add_robot_options(parser)
@@ -48,29 +53,35 @@ def run(options: argparse.Namespace) -> int:
     config, ready = prepared(options)
     folder = output_folder(options.output)
     console = Console(stderr=True)
+    files = Files()
     with stdout_to_stderr():
-        with progress_bar(console, "walking", config.simulation.steps) as advance:
-            record = ready.run(config.simulation, advance)
-        path = record.save(folder / "run.npz")
-        config.save(folder / "run.toml")
-        if not options.no_figures:
-            view.save_figures(record, folder)
-    figures = summarise(record, str(path))
+        try:
+            with progress_bar(console, "walking", config.simulation.steps) as advance:
+                record = ready.run(config.simulation, advance)
+        except RunInterrupted as stop:
+            record = stop.record
+        interrupted = record.metadata["interrupted"]
+        path = files.write(lambda: record.save(folder / "run.npz"))
+        files.write(lambda: config.save(folder / "run.toml"))
+        if not (options.no_figures or interrupted):
+            files.write(lambda: view.save_figures(record, folder))
+    figures = summarise(record, None if path is None else str(path))
     if options.json:
         print(json.dumps(figures))
     else:
-        print_table(figures, record)
-    if record.metadata["interrupted"]:
+        print_table(figures)
+    files.tell()
+    if interrupted:
+        print(f"template-control: interrupted: the run up to here is in {path}", file=sys.stderr)
         return INTERRUPTED
     return 1 if record.fell else 0
 
 
-def print_table(figures: dict[str, Any], record: Record) -> None:
+def print_table(figures: dict[str, Any]) -> None:
     """The summary as a table on standard output.
 
     Args:
         figures: of the run, from :func:`~template_control.run.summary.summarise`.
-        record: the run; it knows whether Ctrl-C ended it.
     """
     table = Table(title=f"{figures['robot']}, gait {figures['gait']}", show_header=False)
     table.add_column()
@@ -83,7 +94,10 @@ def print_table(figures: dict[str, Any], record: Record) -> None:
     row("falls", "0" if not figures["fell"] else f"1: {figures['fall_reason']}")
     row("duration", f"{figures['duration']:.2f} s")
     row("mean speed", f"{figures['mean_speed']:.3f} m/s")
-    for name, key in (("VLO target", "vlo_target"), ("VLO, last 50 steps", "vlo_mean_last_50")):
+    for name, key in (
+        ("VLO target", "vlo_target"),
+        (f"VLO, last {min(figures['steps'], _MEAN)} steps", "vlo_mean_last_50"),
+    ):
         z = figures[key]
         if z is not None:
             row(
@@ -114,7 +128,5 @@ def print_table(figures: dict[str, Any], record: Record) -> None:
         t = figures[key]
         row(f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us")
     row("real-time factor", f"{figures['real_time_factor']:.1f}")
-    row("record", figures["record"])
+    row("record", figures["record"] or "not saved")
     Console().print(table)
-    if record.metadata["interrupted"]:
-        Console().print("interrupted: the run up to here is saved")

@@ -6,15 +6,13 @@ import argparse
 import json
 from pathlib import Path
 
-import matplotlib as mpl
 from rich.console import Console
 from rich.table import Table
 
 from template_control.errors import ParameterError
 from template_control.paper.reproduction import REPRODUCTIONS, Reproduction
-from template_control.storage import writable
-
-_DPI = 110
+from template_control.storage import Files, writable
+from template_control.view.figure_file import save_figure
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -44,21 +42,19 @@ def run(options: argparse.Namespace) -> int:
     folder = None if options.no_figures else writable(options.output)
     with Console(stderr=True).status(f"computing {options.name}"):
         result = REPRODUCTIONS[options.name]()
-    paths = _save(result, folder) if folder is not None else []
+    files, paths = Files(), []
+    if folder is not None:
+        paths = files.write(lambda: _save(result, folder)) or []
     if options.json:
         print(json.dumps({"name": options.name, **result.data, "figures": [str(p) for p in paths]}))
     else:
         _print(result, paths)
+    files.tell()
     return 0
 
 
 def _save(result: Reproduction, folder: Path) -> list[Path]:
-    paths = []
-    with mpl.rc_context({"savefig.dpi": _DPI}):
-        for name, figure in result.figures.items():
-            paths.append(folder / f"{name}.png")
-            figure.savefig(paths[-1])
-    return paths
+    return [save_figure(figure, folder / f"{name}.png") for name, figure in result.figures.items()]
 
 
 def _print(result: Reproduction, paths: list[Path]) -> None:

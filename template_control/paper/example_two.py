@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -36,6 +35,7 @@ from template_control.slip.gaits.basin import velocity_angle, vlo_state
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
+from template_control.sweep.executor import workers
 from template_control.view.figures import stick_diagram
 
 Array = NDArray[np.float64]
@@ -186,7 +186,7 @@ def fig12() -> Reproduction:
     """From z_0: where the robot settles, by planner and by plant."""
     plants = (TEMPLATE, *PLANTS)
     cases = [(planner, plant) for planner in PLANNERS for plant in plants]
-    with ProcessPoolExecutor() as pool:
+    with workers() as pool:
         walks = dict(zip(cases, pool.map(_walk, cases), strict=True))
     _, record = robot_walk("LQR", "PyBullet", steps=6)
     sticks = stick_diagram(beginning(record, 2.2))
@@ -244,7 +244,7 @@ def _liftoffs(case: tuple[str, str]) -> tuple[Liftoff, Record, Walk, Record]:
 def fig13() -> Reproduction:
     """Torques with the template's liftoff and with predefined ones."""
     cases = [(rule, plant) for plant in ("PyBullet", "ideal") for rule in _LIFTOFFS]
-    with ProcessPoolExecutor() as pool:
+    with workers() as pool:
         results = dict(zip(cases, pool.map(_liftoffs, cases), strict=True))
     rows: list[tuple[str, ...]] = []
     for (rule, plant), (event, _, walk, _) in results.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 
 import numpy as np
@@ -17,6 +16,7 @@ from template_control.slip.gaits.gait import WalkingGait, gait_from_energy
 from template_control.slip.gaits.gait_branch import Family
 from template_control.slip.gaits.stability import Kind
 from template_control.slip.parameters import SlipParameters
+from template_control.sweep.executor import workers
 from template_control.view.stability_figures import basin_figure, deadbeat_figure
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ def fig8() -> Reproduction:
     lost = next(p for p in points if p.special is Special.SADDLE_NODE)
     torus = next(p for p in points if p.special is Special.NEIMARK_SACKER)
     low = lower_limit()
-    with ProcessPoolExecutor() as pool:
+    with workers() as pool:
         slices = list(pool.map(basin_slice, _ENERGIES))
     steps, converges = (np.array([s[i] for s in slices]) for i in range(2))
     rows: list[tuple[str, ...]] = [

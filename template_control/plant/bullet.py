@@ -7,15 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.errors import ParameterError
+from template_control.errors import ParameterError, RobotError
 from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import silenced
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
+from template_control.robot.urdf import link_masses
 
 with silenced():  # PyBullet announces its build time on standard output or stderr
     import pybullet
@@ -24,15 +26,29 @@ Array = NDArray[np.float64]
 
 # By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
+_CLOSE = 1e-6  # of the robot's mass
 _BOX = (1000.0, 1.0, 1.0)  # half sides of a step's box [m]
 
 
-def _load(urdf: str, client: int) -> int:
-    """Body of a URDF given as text; PyBullet only reads files."""
+def _load(robot: PlanarBiped, client: int) -> int:
+    """Body of a robot's URDF; PyBullet only reads files.
+
+    Raises:
+        RobotError: if PyBullet does not read it.
+    """
+    tree = ElementTree.fromstring(robot.urdf)
+    for link in tree.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)  # which PyBullet would read all the same
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "robot.urdf"
-        path.write_text(urdf)
-        body = pybullet.loadURDF(str(path), useFixedBase=True, flags=_FLAGS, physicsClientId=client)
+        path.write_bytes(ElementTree.tostring(tree, encoding="utf-8"))
+        try:
+            body = pybullet.loadURDF(
+                str(path), useFixedBase=True, flags=_FLAGS, physicsClientId=client
+            )
+        except pybullet.error as error:
+            raise RobotError(f"PyBullet does not read {robot.path} ({error}): change it") from None
     return int(body)
 
 
@@ -96,6 +112,9 @@ class BulletPlant:
         robot: whose URDF to load and whose joint order to speak.
         options: friction, physics step, mass error, step of the ground.
 
+    Raises:
+        RobotError: if PyBullet does not read the URDF, or reads another mass.
+
     Attributes:
         client, body: PyBullet's handles of the world and the robot.
         joints: PyBullet's joint indices in the order of q.
@@ -109,11 +128,13 @@ class BulletPlant:
         p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
         p.setTimeStep(options.time_step, physicsClientId=c)
         self._ground = _ground_bodies(options.ground_step, c)
-        self.body = _load(robot.urdf, c)
-        info = [
-            p.getJointInfo(self.body, i, physicsClientId=c)
-            for i in range(p.getNumJoints(self.body, physicsClientId=c))
-        ]
+        try:
+            self.body = _load(robot, c)
+            info = self._info()
+            self._compare_masses(info)
+        except RobotError:
+            self.close()
+            raise
         by_name = {row[1].decode(): row[0] for row in info}
         by_link = {row[12].decode(): row[0] for row in info}
         # Pinocchio sorts sibling joints by name, Bullet keeps the file's order.
@@ -124,6 +145,27 @@ class BulletPlant:
         self._trunk = self.joints[BASE_DOF - 1]
         self._contacts: Sequence[Any] | None = None
         self._configure(len(info))
+
+    def _info(self) -> list[tuple[Any, ...]]:
+        p, c = pybullet, self.client
+        count = p.getNumJoints(self.body, physicsClientId=c)
+        return [p.getJointInfo(self.body, i, physicsClientId=c) for i in range(count)]
+
+    def _compare_masses(self, info: list[tuple[Any, ...]]) -> None:
+        """Check that the robot weighs here what it weighs in its model.
+
+        Raises:
+            RobotError: naming the link that does not.
+        """
+        told = link_masses(self.robot.urdf)
+        for row in info:
+            link = row[12].decode()
+            mass = pybullet.getDynamicsInfo(self.body, row[0], physicsClientId=self.client)[0]
+            if abs(mass - told[link]) > _CLOSE * self.robot.mass:
+                raise RobotError(
+                    f"{self.robot.path}: link {link!r} weighs {mass:g} kg in PyBullet and"
+                    f" {told[link]:g} kg in the URDF: give it an <inertial> with its mass"
+                )
 
     def _configure(self, joints: int) -> None:
         p, c, body = pybullet, self.client, self.body

@@ -16,9 +16,17 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import ParameterError, RobotError
+from template_control.robot.meshes import find_meshes
 from template_control.robot.planar_terms import PlanarTerms, gather, sources
 from template_control.robot.planarise import planarise
 from template_control.robot.requirements import BASE_DOF, check_hips, check_planar, foot_radius_of
+from template_control.robot.urdf import (
+    build_model,
+    check_bodies,
+    check_shapes,
+    read_urdf,
+    write_out_massless,
+)
 
 Array = NDArray[np.float64]
 
@@ -148,18 +156,30 @@ class PlanarBiped:
             foot_radius: of spheres to be put into the feet of a 3D URDF [m].
             walk: see the attribute.
 
+        Meshes are looked for beside the URDF and in its package. One that is only shown may be
+        missing: the log says so.
+
         Raises:
-            RobotError: if the file is missing, no URDF, not planar, or lacks a foot.
+            RobotError: if the file is missing, no URDF, not planar, or lacks a foot; if a mass,
+                an inertia or a size is none; if a mesh that touches the ground is missing.
         """
         path = Path(path)
-        if not path.is_file():
-            raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
-        urdf = _read(path)
+        tree = read_urdf(path)
         if sagittal_joints:
-            tree = ElementTree.fromstring(urdf)
-            urdf = planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
-        model = pin.buildModelFromXML(urdf)
+            planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
+        find_meshes(path, tree)
+        check_shapes(path, tree)
+        write_out_massless(tree)
+        urdf = ElementTree.tostring(tree, encoding="unicode")
+        model = build_model(path, urdf)
         check_planar(path, model)
+        for name, value in (("foot_radius", foot_radius), ("locked", locked or None)):
+            if value is not None and not sagittal_joints:
+                raise RobotError(
+                    f"{path}: {name} is for a 3D URDF, and no sagittal_joints are named: name them"
+                    " too, or leave it out"
+                )
+        check_bodies(path, tree, model, BASE_DOF)
         if len(feet) != 2:
             raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
         for foot in feet:
@@ -210,17 +230,6 @@ class PlanarBiped:
     def hip_height(self, q: Array) -> float:
         """Height of the point the legs hang from [m]; the base joint is placed there."""
         return float(q[1])
-
-
-def _read(path: Path) -> str:
-    """Text of a URDF that Pinocchio can read."""
-    try:
-        urdf = path.read_text()
-        pin.buildModelFromXML(urdf)
-    except (OSError, ValueError, RuntimeError) as error:
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else "unreadable"
-        raise RobotError(f"{path} is no URDF that Pinocchio reads ({reason})") from None
-    return urdf
 
 
 def _sagittal(placement: pin.SE3) -> float:

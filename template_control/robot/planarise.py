@@ -1,6 +1,6 @@
 """A 3D biped held in its sagittal plane: its URDF rewritten as a planar one.
 
-The rewritten text serves Pinocchio, PyBullet and the viewer alike: three base joints (x, z,
+The rewritten URDF serves Pinocchio, PyBullet and the viewer alike: three base joints (x, z,
 pitch) carry the root link, all joints but the hips and knees are fixed where they are locked,
 and the feet are spheres. What the plane takes away is only what it holds: masses and inertias
 are kept, and forces out of the plane are the guide's.
@@ -9,7 +9,7 @@ are kept, and forces out of the plane are the guide's.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import RobotError
+from template_control.robot.urdf import build_model
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,8 @@ _BASE = (
     ("base_pitch", "revolute", "0 1 0"),
 )
 _WORLD = ("world", "slide_x", "slide_z")
+_SAGITTAL = 4  # joints that stay
+_HINGES = ("revolute", "continuous")
 
 
 def planarise(
@@ -35,11 +38,11 @@ def planarise(
     sagittal_joints: Sequence[str],
     locked: Mapping[str, float],
     foot_radius: float | None,
-) -> str:
-    """The text of the planar URDF.
+) -> None:
+    """Make a 3D URDF a planar one.
 
     Args:
-        path: of the 3D URDF, for messages and to find its meshes.
+        path: of the 3D URDF, for messages.
         robot: its root element; changed.
         feet: the two foot links.
         sagittal_joints: hips and knees, the four hinges about the lateral axis that stay.
@@ -47,14 +50,25 @@ def planarise(
         foot_radius: of spheres to put into the feet [m]; None to keep the feet's own.
 
     Raises:
-        RobotError: if a joint is missing, or a sagittal joint's axis is not lateral.
+        RobotError: if a joint is missing or named twice, or a sagittal joint's axis is not lateral.
     """
+    if len(set(sagittal_joints)) != _SAGITTAL:
+        raise RobotError(
+            f"{path}: sagittal_joints are {list(sagittal_joints)}: name {_SAGITTAL} different"
+            " hinges in its legs: a hip and a knee each"
+        )
     if foot_radius is not None and not 0.0 < foot_radius < np.inf:
         raise RobotError(f"foot_radius is {foot_radius!r} m: give a positive number")
     joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
     for name in (*sagittal_joints, *locked):
         if name not in joints:
             raise RobotError(f"{path} has no joint {name!r}: its joints are {sorted(joints)}")
+    for name in sagittal_joints:
+        if joints[name].get("type") not in _HINGES:
+            raise RobotError(
+                f"{path}: joint {name!r} is {joints[name].get('type')}: name hips and knees, which"
+                " are revolute, as sagittal_joints"
+            )
     for name, joint in joints.items():
         if name not in sagittal_joints and joint.get("type") != "fixed":
             _fix(joint, locked.get(name, 0.0))
@@ -64,21 +78,27 @@ def planarise(
     root = _root_link(robot)
     _shift(robot, root, hips)
     _spheres(robot, feet, foot_radius)
-    _find_meshes(path, robot)
-    for link in _WORLD:
-        element = ET.SubElement(robot, "link", name=link)
-        if link != "world":
-            inertial = ET.SubElement(element, "inertial")
-            ET.SubElement(inertial, "mass", value="0")
-            zero = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0")
-            ET.SubElement(inertial, "inertia", zero)
-    for (name, kind, axis), parent, child in zip(_BASE, _WORLD, (*_WORLD[1:], root), strict=True):
+    links = _free(_WORLD, {str(link.get("name")) for link in robot.findall("link")})
+    for link in links:
+        ET.SubElement(robot, "link", name=link)
+    names = _free([name for name, _, _ in _BASE], joints)
+    rows = zip(names, _BASE, links, (*links[1:], root), strict=True)
+    for name, (_, kind, axis), parent, child in rows:
         joint = ET.SubElement(robot, "joint", name=name, type=kind)
         ET.SubElement(joint, "parent", link=parent)
         ET.SubElement(joint, "child", link=child)
         ET.SubElement(joint, "axis", xyz=axis)
         ET.SubElement(joint, "limit", lower="-1e3", upper="1e3", effort="0", velocity="1e3")
-    return ET.tostring(robot, encoding="unicode")
+
+
+def _free(names: Sequence[str], taken: Collection[str]) -> list[str]:
+    """Names that no other part of the robot has, by underscores at their ends."""
+    found = []
+    for name in names:
+        while name in taken:
+            name += "_"
+        found.append(name)
+    return found
 
 
 def _parent(joint: ET.Element) -> str:
@@ -130,7 +150,7 @@ def _bound(path: Path, joint: ET.Element) -> None:
 
 def _check_axes(path: Path, robot: ET.Element, sagittal: Sequence[str]) -> Array:
     """Midpoint (3,) of the hips in the root link's frame [m], once all hinges are lateral."""
-    model = pin.buildModelFromXML(ET.tostring(robot, encoding="unicode"))
+    model = build_model(path, ET.tostring(robot, encoding="unicode"))
     data = model.createData()
     jacobians = pin.computeJointJacobians(model, data, pin.neutral(model))
     for name in sagittal:
@@ -171,15 +191,3 @@ def _spheres(robot: ET.Element, feet: Sequence[str], radius: float | None) -> No
         if foot and radius is not None:
             geometry = ET.SubElement(ET.SubElement(link, "collision"), "geometry")
             ET.SubElement(geometry, "sphere", radius=f"{radius:g}")
-
-
-def _find_meshes(path: Path, robot: ET.Element) -> None:
-    """Absolute paths for meshes, so that the text can be read from anywhere."""
-    for mesh in robot.iter("mesh"):
-        name = str(mesh.get("filename"))
-        inside = name.removeprefix("package://")
-        folders = path.resolve().parents if inside != name else path.resolve().parents[:1]
-        for folder in folders:
-            if (folder / inside).is_file():
-                mesh.set("filename", str(folder / inside))
-                break

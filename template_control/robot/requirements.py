@@ -87,7 +87,13 @@ def foot_radius_of(path: Path, urdf: str, model: pin.Model, feet: Sequence[str])
     Raises:
         RobotError: if a foot has no sphere about its link's origin, or the radii differ.
     """
-    geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
+    try:
+        geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
+    except (ValueError, RuntimeError) as error:
+        raise RobotError(
+            f"{path}: a collision mesh cannot be read ({str(error).strip().splitlines()[0]}): give"
+            " another, or a box, cylinder or sphere"
+        ) from None
     radii = set()
     for foot in feet:
         frame = model.getFrameId(foot)

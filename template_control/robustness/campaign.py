@@ -242,8 +242,6 @@ def measure(
 
 def _undisturbed(robot: str, model: PlanarBiped, gait: WalkingGait) -> Record:
     record = simulate(model, LqrPlanner(gait), SimulationOptions(steps=BEGIN + 1 + AFTER))
-    if record.metadata["interrupted"]:
-        raise KeyboardInterrupt
     if record.fell:
         raise RobotError(
             f"{robot} falls without a disturbance ({record.metadata['fall_reason']}):"

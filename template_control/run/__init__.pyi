@@ -7,6 +7,7 @@ from .options import FallOptions as FallOptions
 from .options import Push as Push
 from .options import SimulationOptions as SimulationOptions
 from .record import Record as Record
+from .record import RunInterrupted as RunInterrupted
 from .sensing import SensorOptions as SensorOptions
 from .simulation import perturbed_start as perturbed_start
 from .simulation import simulate as simulate

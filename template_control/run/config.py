@@ -67,7 +67,7 @@ class RobotChoice:
             "foot_radius": self.foot_radius,
             "locked": self.locked,
         }
-        given = {name: value for name, value in own.items() if value}
+        given = {name: value for name, value in own.items() if value not in (None, (), {})}
         if not given:
             return load_robot(self.model)
         if self.model in ROBOTS:

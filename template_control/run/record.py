@@ -21,6 +21,50 @@ Array = NDArray[np.float64]
 
 FORMAT = "template-control run 3"
 _WALKS = "template-control run 2"  # which knew VLO and walking steps only
+_LAYOUT = storage.Layout(
+    fields={
+        "time": "T",
+        "q": "T nv",
+        "v": "T nv",
+        "torque": "T nu",
+        "com": "T 2",
+        "com_velocity": "T 2",
+        "angular_momentum": "T",
+        "template_com": "T 2",
+        "template_velocity": "T 2",
+        "foot": "T 2 2",
+        "joint": "T nu 2",
+        "contact_force": "T 2 2",
+        "template_force": "T 2 2",
+        "node": "T <nodes",
+        "rear": "T <2",
+        "solved": "T",
+        "swing_reference": "T 2 2",
+        "push": "T",
+        "section": "S <sections",
+        "section_time": "S",
+        "section_state": "S 3",
+        "stride": "S <strides",
+        "section_target": "S 3",
+        "section_predicted": "S 3",
+        "section_controls": "S 5",
+        "section_offset": "S 3",
+        "section_nominal": "S",
+        "section_feasible": "S",
+        "section_load": "S",
+        "section_trim": "S",
+        "tick_seconds": "ticks",
+        "solve_seconds": "ticks",
+        "plan_seconds": "S",
+    },
+    metadata={
+        **dict.fromkeys(("robot", "gait", "fall_reason"), (str,)),
+        **dict.fromkeys(("mass", "trunk_com", "duration", "wall_seconds"), (float, int)),
+        **dict.fromkeys(("joints", "torque_limit", "feet", "legs"), (list,)),
+        **dict.fromkeys(("nodes", "phases", "stiffness_slots", "sections", "strides"), (list,)),
+        **dict.fromkeys(("template", "options", "summary"), (dict,)),
+    },
+)
 
 
 @dataclass(frozen=True)
@@ -152,18 +196,32 @@ class Record:
         return importlib.import_module("template_control").plot(self, figure)
 
     def save(self, path: str | Path) -> Path:
-        """Write the run as a compressed ``.npz``.
+        """Write the run as an ``.npz``, compressed unless Ctrl-C ended it: somebody waits then.
 
         Raises:
             RecordError: if the file cannot be written.
         """
-        return storage.save(self, path, FORMAT)
+        return storage.save(self, path, FORMAT, quick=bool(self.metadata.get("interrupted")))
 
     @classmethod
     def load(cls, path: str | Path) -> Record:
         """Read a run that :meth:`save` wrote, now or in an earlier version.
 
         Raises:
-            RecordError: if the file is missing or is no recorded run.
+            RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
-        return storage.load(cls, path, FORMAT, {_WALKS: from_walk})
+        return storage.load(cls, path, FORMAT, _LAYOUT, {_WALKS: from_walk})
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """Ctrl-C ended a run.
+
+    It is a KeyboardInterrupt, so that it ends a loop of runs too.
+
+    Attributes:
+        record: what was recorded until then, marked ``interrupted`` in its metadata.
+    """
+
+    def __init__(self, record: Record) -> None:
+        super().__init__("the run was interrupted")
+        self.record = record

@@ -24,7 +24,7 @@ from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import state_at_vlo, state_in
 from template_control.run.options import Push, SimulationOptions
-from template_control.run.record import Record
+from template_control.run.record import Record, RunInterrupted
 from template_control.run.recorder import Recorder, Truth
 from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -67,7 +67,7 @@ def simulate(
 ) -> Record:
     """Run ``robot`` along a route and record it; a fall ends the run and raises nothing.
 
-    Ctrl-C ends the run too; what was done by then is returned, marked ``interrupted``.
+    Ctrl-C ends the run, and the loop it stands in; the exception carries what was recorded.
 
     Args:
         robot: model of the controller, and whose URDF the plant loads.
@@ -83,6 +83,8 @@ def simulate(
         RobotError: if the robot's legs do not reach the start.
         ParameterError: if there is no planner for a stride of the route, or no pose to start in.
         ScenarioError: if the scenario asks for what the robot cannot do.
+        RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
+            the first sample.
     """
     o = options or SimulationOptions()
     if isinstance(route, Scenario):
@@ -97,22 +99,24 @@ def simulate(
     controller.start(0 if o.pose is None else o.pose.rear)
     _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
     begin = time.perf_counter()
-    interrupted = False
+    stop: KeyboardInterrupt | None = None
     with open_plant(robot, o.plant) as plant:
         plant.reset(q, v)
         try:
             reason = _loop(plant, controller, recorder, o, progress)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
             if not recorder.rows:
                 raise
-            reason, interrupted = "", True
+            reason, stop = "", error
     seconds = time.perf_counter() - begin
     if reason:
         _LOG.warning("%s fell: %s", robot.name, reason)
     metadata = _metadata(controller, recorder, o, reason, seconds)
-    metadata["interrupted"] = interrupted
+    metadata["interrupted"] = stop is not None
     record = recorder.record(metadata)
     _LOG.info("%r in %.2f s of wall-clock time", record, seconds)
+    if stop is not None:
+        raise RunInterrupted(record) from stop
     return record
 
 

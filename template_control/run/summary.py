@@ -27,12 +27,12 @@ def _quantiles(seconds: Array) -> dict[str, float]:
     return {"median": float(median), "p99": float(p99)}
 
 
-def summarise(record: Record, path: str) -> dict[str, Any]:
+def summarise(record: Record, path: str | None) -> dict[str, Any]:
     """Summary of a run in SI units.
 
     Args:
         record: the run.
-        path: where it was saved.
+        path: where it was saved; None where it was not.
 
     Returns:
         robot, gait, steps, fell, fall_reason, duration, mean_speed, vlo_target and

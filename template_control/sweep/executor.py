@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pickle
 import signal
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import parent_process
@@ -20,6 +21,8 @@ from template_control.errors import SweepError
 from template_control.sweep.file import Outcome, plain
 
 _REFRESH = 0.2  # [s] between two looks of the progress bar
+_PR_SET_PDEATHSIG = 1
+_GRACE = 0.5  # [s] in which calls may end that Ctrl-C found running
 
 
 class ExecutorLostError(Exception):
@@ -76,8 +79,8 @@ def run_calls(
     done: SimpleQueue[Future[Outcome]] = SimpleQueue()
     under_way: dict[Future[Outcome], int] = {}
     due = time.monotonic()
-    try:
-        with _workers(executor) as pool:
+    with _workers(executor) as pool:
+        try:
             while True:
                 for index, arguments in islice(calls, in_flight - len(under_way)):
                     future = _submit(pool, token, function, arguments)
@@ -94,13 +97,17 @@ def run_calls(
                     continue
                 keep(under_way[future], _outcome(future))
                 del under_way[future]
-    except SweepError:
-        _cancel(under_way)
-        raise
-    except BaseException:
-        for future, index in _cancel(under_way):
-            keep(index, future.result())
-        raise
+        except SweepError:
+            _cancel(under_way)
+            raise
+        except BaseException:
+            _cancel(under_way)
+            # Our own processes are ended next: what needs little more time gets it.
+            wait(under_way, _GRACE if executor is None else 0.0)
+            for future, index in under_way.items():
+                if future.done() and not future.cancelled() and future.exception() is None:
+                    keep(index, future.result())
+            raise
 
 
 def _submit(
@@ -151,14 +158,10 @@ def _outcome(future: Future[Outcome]) -> Outcome:
     return Outcome(None, _reason(error))
 
 
-def _cancel(under_way: dict[Future[Outcome], int]) -> list[tuple[Future[Outcome], int]]:
-    """Give up what has not begun; the calls that had finished by themselves."""
-    finished = []
-    for future, index in under_way.items():
+def _cancel(under_way: Iterable[Future[Outcome]]) -> None:
+    """Give up what has not begun."""
+    for future in under_way:
         future.cancel()
-        if future.done() and not future.cancelled() and future.exception() is None:
-            finished.append((future, index))
-    return finished
 
 
 @contextmanager
@@ -167,11 +170,34 @@ def _workers(executor: Executor | None) -> Iterator[Executor]:
     if executor is not None:
         yield executor
         return
-    own = worker_processes(os.cpu_count())
-    try:
+    with workers() as own:
         yield own
+
+
+@contextmanager
+def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
+    """:func:`worker_processes` for the time of a ``with`` block.
+
+    An error in the block, Ctrl-C for one, kills them whatever they are doing. So does the end of
+    the thread that the block is in: calls are submitted from there.
+
+    Args:
+        count: how many; None for one a core.
+    """
+    pool = ProcessPoolExecutor(count, initializer=_obey_parent_only, initargs=(True,))
+    try:
+        yield pool
+    except BaseException:
+        # The executor forgets both when it is told to shut down.
+        processes, results = list((pool._processes or {}).values()), pool._result_queue
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.kill()
+        # Without a writer the executor's thread does not wait for the rest of half a result.
+        results._writer.close()  # type: ignore[attr-defined]
+        raise
     finally:
-        own.shutdown(cancel_futures=True)
+        pool.shutdown(cancel_futures=True)
 
 
 def worker_processes(count: int | None) -> ProcessPoolExecutor:
@@ -183,9 +209,20 @@ def worker_processes(count: int | None) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(count, initializer=_obey_parent_only)
 
 
-def _obey_parent_only() -> None:
-    """In a worker: leave Ctrl-C to the parent, and end when it is killed."""
+def _obey_parent_only(at_once: bool = False) -> None:
+    """In a worker: leave Ctrl-C to the parent, and end when it is killed.
+
+    Args:
+        at_once: also while compiled code runs, which lets no other thread of the worker run.
+            Linux does this when the thread ends that made the worker.
+    """
+    prctl = getattr(ctypes.CDLL(None), "prctl", None)
+    if at_once and prctl is not None:
+        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # A command line handles these in the parent; the executor ends its processes with the first.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
     parent = parent_process()
     if parent is not None:
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from template_control.errors import ParameterError, RecordError
 from template_control.run.record import Record
+from template_control.view.figure_file import save_figure
 from template_control.view.state_figures import (
     energies,
     phase_portrait,
@@ -234,10 +235,5 @@ def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Pat
     paths = []
     with _style():
         for name, draw in FIGURES.items():
-            path = Path(folder) / f"{name}.png"
-            try:
-                draw(record).savefig(path, dpi=dpi)
-            except OSError as error:
-                raise RecordError(f"cannot write {path}: {error.strerror}") from None
-            paths.append(path)
+            paths.append(save_figure(draw(record), Path(folder) / f"{name}.png", dpi))
     return paths

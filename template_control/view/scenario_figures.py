@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.scenario.record import ScenarioRecord
+from template_control.view.figure_file import save_figure
 
 Array = NDArray[np.float64]
 
@@ -131,13 +131,11 @@ def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Pa
 
     Returns:
         The paths of the files.
+
+    Raises:
+        RecordError: if a file cannot be written.
     """
     figures = {"scenario": scenario_figure(record)}
     if {"wr", "rw"} & set(record.strides):
         figures["energies"] = energy_figure(record)
-    paths = []
-    with mpl.rc_context({"savefig.dpi": 110}):
-        for name, figure in figures.items():
-            paths.append(Path(folder) / f"{name}.png")
-            figure.savefig(paths[-1])
-    return paths
+    return [save_figure(figure, Path(folder) / f"{name}.png") for name, figure in figures.items()]

@@ -14,6 +14,31 @@ from template_control import storage
 Array = NDArray[np.float64]
 
 FORMAT = "template-control scenario 1"
+_LAYOUT = storage.Layout(
+    fields={
+        "time": "T",
+        "state": "T 4",
+        "node": "T <nodes",
+        "toes": "T 2",
+        "stiffness": "T 2",
+        "foothold": "F 2",
+        "stride": "S <strides",
+        "section_time": "S+1",
+        "section_state": "S+1 3",
+        "wanted_speed": "S",
+        "target": "S 3",
+        "predicted": "S 3",
+        "controls": "S 5",
+        "residual": "S",
+        "reached": "S",
+        "solve_seconds": "S",
+    },
+    metadata={
+        **dict.fromkeys(("name", "map", "failure"), (str,)),
+        **dict.fromkeys(("nodes", "phases", "strides"), (list,)),
+        "parameters": (dict,),
+    },
+)
 
 
 @dataclass(frozen=True)
@@ -115,4 +140,4 @@ class ScenarioRecord:
     @classmethod
     def load(cls, path: str | Path) -> ScenarioRecord:
         """Read it; see :func:`~template_control.storage.load`."""
-        return storage.load(cls, path, FORMAT)
+        return storage.load(cls, path, FORMAT, _LAYOUT)

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
+from template_control.storage import replacing
 from template_control.view.replay.playback import (
     Playback,
     carrying,
@@ -131,21 +132,17 @@ def write_film(
         RecordError: if the ending is another, ffmpeg is missing, or the file cannot be written.
     """
     writer = _writer(path, fps, len(playback.rows))
-    try:
-        # Before any drawing: an unwritable place is known at once.
-        path.touch()
-    except OSError as error:
-        raise RecordError(f"cannot write {path}: {error.strerror}; give another file") from None
-    stage = _Stage(playback)
-    try:
-        with writer.saving(stage.figure, str(path), dpi):
-            for frame in range(len(playback.rows)):
-                stage.show(frame)
-                writer.grab_frame()
-                if progress is not None:
-                    progress(frame + 1)
-    except (OSError, subprocess.CalledProcessError) as error:
-        raise RecordError(f"cannot write {path}: {error}; give another file") from None
+    with replacing(path) as place:
+        stage = _Stage(playback)
+        try:
+            with writer.saving(stage.figure, str(place), dpi):
+                for frame in range(len(playback.rows)):
+                    stage.show(frame)
+                    writer.grab_frame()
+                    if progress is not None:
+                        progress(frame + 1)
+        except subprocess.CalledProcessError as error:
+            raise RecordError(f"cannot write {path}: {error}; give another file") from None
     return path
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import meshcat
 import umsgpack
 
-from template_control.errors import RecordError
+from template_control.storage import replacing
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
@@ -83,10 +83,6 @@ def write_page(path: Path, title: str, commands: list[Any]) -> Path:
         viewer=_VIEWER.read_text(encoding="utf-8"),
         commands=",\n".join(f'"{text}"' for text in packed),
     )
-    try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise RecordError(
-            f"cannot write {path}: {error.strerror}; give another file for the page"
-        ) from None
+    with replacing(path) as place:
+        place.write_text(page, encoding="utf-8")
     return path

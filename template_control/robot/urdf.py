@@ -1,0 +1,235 @@
+"""Reading a URDF: what Pinocchio and PyBullet would read otherwise, or not at all, is refused.
+
+Both libraries pass over a number they cannot read and go on without it, each in its own way:
+what is not checked here is a robot that falls for no reason.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from template_control.errors import RobotError
+
+Array = NDArray[np.float64]
+
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_LIMITS = ("lower", "upper", "effort", "velocity")
+_SIZES = (
+    ("box", "size", 3),
+    ("sphere", "radius", 1),
+    ("cylinder", "radius", 1),
+    ("cylinder", "length", 1),
+    ("capsule", "radius", 1),
+    ("capsule", "length", 1),
+)
+_ROUNDING = 1e-6  # of a link's largest moment of inertia: URDFs are written with few digits
+
+
+def read_urdf(path: Path) -> ET.Element:
+    """The root element of a URDF; entities of its DTD are replaced, whatever its encoding.
+
+    Args:
+        path: the file.
+
+    Raises:
+        RobotError: naming what is missing, named twice, no number, or no rigid body's inertia.
+    """
+    if not path.is_file():
+        raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
+    try:
+        robot = ET.fromstring(path.read_bytes())
+    except (OSError, ValueError, LookupError, ET.ParseError) as error:
+        raise RobotError(f"{path} is no URDF that can be read ({_line(error)})") from None
+    if robot.tag != "robot":
+        raise RobotError(f"{path} is no URDF: its root is <{robot.tag}> and not <robot>")
+    _check_names(path, robot)
+    for link in robot.findall("link"):
+        _check_inertial(path, link)
+    for joint in robot.findall("joint"):
+        _check_joint(path, joint)
+    return robot
+
+
+def build_model(path: Path, urdf: str) -> pin.Model:
+    """Pinocchio's model of a URDF's text.
+
+    Args:
+        path: of the file, for the message.
+        urdf: the text.
+
+    Raises:
+        RobotError: if Pinocchio does not read it.
+    """
+    try:
+        return pin.buildModelFromXML(urdf)
+    except (ValueError, RuntimeError) as error:
+        raise RobotError(f"{path} is no URDF that Pinocchio reads ({_line(error)})") from None
+
+
+def write_out_massless(robot: ET.Element) -> None:
+    """Give links without ``<inertial>`` one of zero: PyBullet takes them for a kilogram.
+
+    Args:
+        robot: the root element; changed.
+    """
+    for link in robot.findall("link"):
+        if link.find("inertial") is None:
+            inertial = ET.SubElement(link, "inertial")
+            ET.SubElement(inertial, "mass", value="0")
+            ET.SubElement(inertial, "inertia", dict.fromkeys(_MOMENTS, "0"))
+
+
+def link_masses(urdf: str) -> dict[str, float]:
+    """Mass of each link by its name [kg], 0 without ``<inertial>``.
+
+    Args:
+        urdf: text of a URDF.
+    """
+    links = ET.fromstring(urdf).findall("link")
+    masses = {str(link.get("name")): link.find("inertial/mass") for link in links}
+    return {
+        name: 0.0 if mass is None else float(mass.get("value", "0"))
+        for name, mass in masses.items()
+    }
+
+
+def check_bodies(path: Path, robot: ET.Element, model: pin.Model, first: int) -> None:
+    """Check that whatever a joint moves weighs something.
+
+    Args:
+        path: of the file, for the message.
+        robot: its root element.
+        model: of the robot.
+        first: index of the first joint whose body is looked at.
+
+    Raises:
+        RobotError: naming the link that weighs nothing.
+    """
+    children = {joint.get("name"): joint.find("child") for joint in robot.findall("joint")}
+    for index in range(first, model.njoints):
+        child = children.get(model.names[index])
+        if model.inertias[index].mass <= 0.0 and child is not None:
+            raise RobotError(
+                f"{path}: link {child.get('link')!r} weighs nothing, and so does what is fixed to"
+                " it: give it an <inertial> with its mass"
+            )
+
+
+def check_shapes(path: Path, robot: ET.Element) -> None:
+    """Check that shapes which touch the ground have a size.
+
+    Args:
+        path: of the file, for the message.
+        robot: its root element.
+
+    Raises:
+        RobotError: naming the link whose collision shape has none.
+    """
+    for link in robot.findall("link"):
+        for geometry in link.findall("collision/geometry"):
+            for kind, name, count in _SIZES:
+                for shape in geometry.findall(kind):
+                    where = f"{path}: link {link.get('name')!r}: collision {kind}"
+                    values = _numbers(where, shape, name, count)
+                    if values.min() <= 0.0:
+                        raise RobotError(
+                            f"{where} has {name} {shape.get(name)!r}: give a positive number"
+                        )
+
+
+def _line(error: Exception) -> str:
+    text = str(error).strip()
+    return text.splitlines()[0] if text else "unreadable"
+
+
+def _check_names(path: Path, robot: ET.Element) -> None:
+    links = [str(link.get("name")) for link in robot.findall("link")]
+    joints = [str(joint.get("name")) for joint in robot.findall("joint")]
+    for kind, names in (("link", links), ("joint", joints)):
+        twice = [name for name, count in Counter(names).items() if count > 1]
+        if twice:
+            raise RobotError(f"{path} has two {kind}s {twice[0]!r}: give each its own name")
+    for joint in robot.findall("joint"):
+        for end in ("parent", "child"):
+            element = joint.find(end)
+            name = None if element is None else element.get("link")
+            if name not in links:
+                raise RobotError(
+                    f"{path}: joint {joint.get('name')!r} has no {end} link {name!r}: its links"
+                    f" are {links}"
+                )
+
+
+def _numbers(where: str, element: ET.Element, name: str, count: int, default: str = "") -> Array:
+    """(count,) of an attribute.
+
+    Raises:
+        RobotError: if it has not as many finite numbers.
+    """
+    text = element.get(name, default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.array([])
+    if len(values) != count or not np.isfinite(values).all():
+        wanted = "a finite number" if count == 1 else f"{count} finite numbers"
+        raise RobotError(f"{where} has {name} {text!r}: give {wanted}")
+    return values
+
+
+def _check_origin(where: str, element: ET.Element) -> None:
+    for origin in element.findall("origin"):
+        for name in ("xyz", "rpy"):
+            _numbers(f"{where}: origin", origin, name, 3, "0 0 0")
+
+
+def _check_inertial(path: Path, link: ET.Element) -> None:
+    where = f"{path}: link {link.get('name')!r}"
+    for part in ("visual", "collision"):
+        for element in link.findall(part):
+            _check_origin(f"{where}: {part}", element)
+    inertial = link.find("inertial")
+    if inertial is None:
+        return
+    _check_origin(f"{where}: inertial", inertial)
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    if mass is None or inertia is None:
+        raise RobotError(f"{where}: <inertial> lacks <mass> or <inertia>: give both")
+    if _numbers(f"{where}: mass", mass, "value", 1)[0] < 0.0:
+        raise RobotError(f"{where}: mass has value {mass.get('value')!r}: give none below zero")
+    xx, xy, xz, yy, yz, zz = (
+        _numbers(f"{where}: inertia", inertia, name, 1, "0")[0] for name in _MOMENTS
+    )
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    slack = _ROUNDING * np.abs(moments).max()
+    if moments[0] < -slack:
+        raise RobotError(f"{where}: its inertia has a negative principal moment: give none")
+    if moments[2] > moments[0] + moments[1] + slack:
+        raise RobotError(
+            f"{where}: its inertia is no body's: the principal moment {moments[2]:.4g} kg m^2 is"
+            f" larger than the sum of the others, {moments[0] + moments[1]:.4g}; give all three"
+        )
+
+
+def _check_joint(path: Path, joint: ET.Element) -> None:
+    where = f"{path}: joint {joint.get('name')!r}"
+    _check_origin(where, joint)
+    for axis in joint.findall("axis"):
+        direction = _numbers(f"{where}: axis", axis, "xyz", 3, "1 0 0")
+        if not direction.any():
+            raise RobotError(f"{where}: axis is 0 0 0: give its direction")
+    for limit in joint.findall("limit"):
+        for name in _LIMITS:
+            text = limit.get(name, "0")
+            try:
+                unread = np.isnan(float(text))
+            except ValueError:
+                unread = True
+            if unread:
+                raise RobotError(f"{where}: limit has {name} {text!r}: give a number")

@@ -1,0 +1,169 @@
+"""Ctrl-C, SIGTERM and SIGKILL: everything stops at once, and what was done is kept and said."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sweep_work import alive, hold, wait_until
+
+import template_control as tc
+from template_control.cli import walk
+from template_control.cli.main import main
+from template_control.run.record import Record, RunInterrupted
+from template_control.sweep.executor import workers
+
+SECONDS = 2.0
+
+
+def allowed():
+    """[s] in which a command stops: two, times the processes that wait for each core."""
+    return SECONDS * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
+def group(leader):
+    """Processes of the group that ``leader`` leads, but for those that only wait to be buried."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state, _, number = (folder / "stat").read_text().rsplit(")", 1)[1].split()[:3]
+        except OSError:
+            continue
+        if int(number) == leader and state != "Z":
+            found.append(int(folder.name))
+    return found
+
+
+def test_ctrl_c_ends_a_loop_of_runs(robot, default_gait):
+    def impatient(_):
+        raise KeyboardInterrupt
+
+    def run(_):
+        options = tc.SimulationOptions(steps=5)
+        return tc.simulate(robot, tc.LqrPlanner(default_gait), options, impatient)
+
+    with pytest.raises(RunInterrupted) as stop:
+        _ = [run(i) for i in range(3)]
+    assert isinstance(stop.value, KeyboardInterrupt)
+    assert stop.value.record.steps == 1
+    assert stop.value.record.metadata["interrupted"]
+
+
+def test_ctrl_c_while_figures_are_drawn_keeps_the_run_and_its_table(tmp_path, capfd, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(walk.view, "save_figures", interrupted)
+    assert main(["walk", "--steps", "1", "--output", str(tmp_path)]) == 130
+    told = capfd.readouterr()
+    assert "mean speed" in told.out
+    assert "interrupted: not all files are written" in told.err.splitlines()[-1]
+    assert Record.load(tmp_path / "run.npz").steps == 1
+
+
+def test_an_error_kills_workers_whatever_they_do():
+    pids = []
+
+    def work():
+        with workers(2) as pool:
+            pids.extend(pool.submit(os.getpid).result() for _ in range(4))
+            for _ in range(4):
+                pool.submit(hold, 60.0)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    wait_until(lambda: not any(map(alive, pids)), allowed())
+
+
+def test_workers_end_with_their_parent_even_in_compiled_code():
+    code = """
+import os
+from sweep_work import hold
+from template_control.sweep.executor import workers
+with workers(2) as pool:
+    print(*{pool.submit(os.getpid).result() for _ in range(8)}, flush=True)
+    list(pool.map(hold, [60.0, 60.0]))
+"""
+    paths = [str(Path(__file__).parent), os.getcwd(), os.environ.get("PYTHONPATH", "")]
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        start_new_session=True,
+    )
+    pids = [int(word) for word in process.stdout.readline().split()]
+    assert pids
+    wait_until(lambda: len(group(process.pid)) == 3)
+    time.sleep(0.2)  # the workers are to be in the call
+    process.kill()
+    process.communicate()
+    wait_until(lambda: not group(process.pid), allowed())
+
+
+def catches(pid, number):
+    """Whether a process has a handler of its own for a signal."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    caught = int(status.partition("SigCgt:")[2].split()[0], 16)
+    return bool(caught >> (number - 1) & 1)
+
+
+COMMANDS = {
+    "walk": ["walk", "--steps", "200"],
+    "robustness": ["robustness", "--quick", "--disturbance", "friction"],
+    "fig12": ["reproduce", "fig12"],
+}
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+LATEST = 12.0  # [s] after a command has begun that it is stopped
+
+
+def moments(seed):
+    """Ten (command, signal, moment [s]); every command meets every signal."""
+    rng = np.random.default_rng(seed)
+    pairs = [(name, number) for name in COMMANDS for number in SIGNALS]
+    pairs.append(pairs[rng.integers(len(pairs))])
+    return [
+        (*pair, float(at)) for pair, at in zip(pairs, rng.uniform(0.0, LATEST, 10), strict=True)
+    ]
+
+
+@pytest.mark.slow(seconds=15)
+@pytest.mark.parametrize(("name", "number", "at"), moments(seed=12))
+def test_a_command_stops_at_any_moment_and_spoils_nothing(tmp_path, short_walk, name, number, at):
+    good = short_walk.save(tmp_path / "run.npz")
+    (tmp_path / "fig12.png").write_bytes(b"a good one")
+    process = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "template_control.cli.main", *COMMANDS[name]),
+            *("--output", str(tmp_path)),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    wait_until(lambda: catches(process.pid, signal.SIGTERM))
+    time.sleep(at)
+    process.send_signal(number)
+    sent = time.monotonic()
+    _, told = process.communicate(timeout=60)
+    wait_until(lambda: not group(process.pid), 60)
+    assert time.monotonic() - sent < allowed()
+    if number == signal.SIGKILL:
+        assert process.returncode == -signal.SIGKILL
+    else:
+        assert process.returncode == 130
+        assert "Traceback" not in told
+        last = told.strip().splitlines()[-1]
+        assert last.startswith("template-control: interrupted")
+        assert f"the run up to here is in {good}" in last or Record.load(good).steps == 4
+    assert Record.load(good).steps >= 0
+    assert (tmp_path / "fig12.png").read_bytes() == b"a good one"
+    for path in tmp_path.glob("trials-*.jsonl"):
+        whole = path.read_bytes().rpartition(b"\n")[0].splitlines()
+        assert all(json.loads(line) for line in whole)
