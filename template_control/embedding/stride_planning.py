@@ -34,6 +34,7 @@ from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 Array = NDArray[np.float64]
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
+_NEWTON = 4
 
 
 @dataclass(frozen=True)
@@ -221,21 +222,44 @@ class StridePlanning:
         u = report.decision.controls.copy()
         u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
         self.reaching = angle_drop > 0.0
-        first = self._simulator.run(node.name, state, u, toes)
+        start = node.name
+        first = self._simulator.run(start, state, u, toes)
         strides = [first]
-        if first.completed:
-            # The next foothold must be known when the swing begins, before the next section.
-            section = section_of(self.automaton.sections(node.name)[1])
-            z = section.of(first.state)
-            goal = self.route.ahead(section, z, now + first.duration) or report.goal
+        # The next foothold must be known when the swing begins, before the next section. Where
+        # no foot stands, the second one's is still further.
+        more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
+        at = now
+        while more and strides[-1].completed:
+            last = strides[-1]
+            at += last.duration
+            section = section_of(self.automaton.sections(start)[1])
+            z = section.of(last.state)
+            goal = self.route.ahead(section, z, at) or report.goal
             ahead = self.planner_of(goal).decide(z, goal.target)
             start = self.automaton.start(goal.stride).name
-            toes = (float(first.toes[0]), float(first.toes[1]))
-            strides.append(self._simulator.run(start, first.state, ahead.controls, toes))
+            toes = (float(last.toes[0]), float(last.toes[1]))
+            strides.append(self._simulator.run(start, last.state, ahead.controls, toes))
+            more -= 1
         self.path = join(strides, self.options.path)
         self._feet = sensed.feet
         self._planned_at = now
         self._look_ahead(0)
+
+    def land(self, node: Node, sensed: Sensed, now: float) -> None:
+        """A foot has landed: choose again what is still free, from where it did.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            now: time [s].
+        """
+        report = self.reports[-1]
+        z = self._back_to_section(self.automaton.start(report.goal.stride), report, sensed)
+        if z is not None:
+            angle = _landing_angle(sensed, self.parameters)
+            decision = self.planner.decide(z, report.goal.target, (angle, angle))
+            self.reports[-1] = replace(report, decision=decision)
+        self.follow(node, sensed, now)
 
     def due(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
@@ -334,3 +358,21 @@ class StridePlanning:
         if not past.completed:
             return None
         return report.section.mirror(report.section.of(past.state))
+
+
+def _landing_angle(sensed: Sensed, parameters: SlipParameters) -> float:
+    """Angle of the template's leg as it comes to l0 on the ballistic path through the robot [rad].
+
+    The robot's foot meets the ground a little before or after.
+    """
+    x, y, dx, dy = sensed.state.tolist()
+    x -= float(sensed.toes[0])
+    time = 0.0
+    for _ in range(_NEWTON):
+        px, py, speed = x + dx * time, y + dy * time - 0.5 * parameters.gravity * time**2, dy
+        speed -= parameters.gravity * time
+        slope = 2.0 * (px * dx + py * speed)
+        if slope >= 0.0:
+            break
+        time -= (px**2 + py**2 - parameters.rest_length**2) / slope
+    return float(np.arctan2(py, -px))

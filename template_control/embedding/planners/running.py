@@ -1,0 +1,175 @@
+"""Running planner: the next apex is the target, as far as moderate controls reach it.
+
+One stride ahead, least squares on the exact map: errors of the apex against changes of the
+controls, the regularised form of (36). Controls change from those of a gait near the present
+speed; a target far from it is approached step by step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import APEX, PADDED
+from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
+
+Array = NDArray[np.float64]
+
+_SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]
+_COLUMNS = np.array(_SLOTS) + PADDED
+
+
+@dataclass(frozen=True)
+class RunningOptions:
+    """Tuning of the running planner.
+
+    Attributes:
+        tolerance: errors of dx/dt and y at the next apex that count as 1.
+        change: changes of alpha [rad], k_sc and k_sd (shares of the gait's) that count as 1.
+        angle_range: alpha relative to the gait's [rad]. A flatter leg brakes with forces that the
+            hips cannot bear.
+        stiffness_range: k_sc and k_sd over the gait's.
+        top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the foot
+            would touch down at once.
+        pace: the speed aimed at is at most this far from the present one.
+        climb: the height aimed at is at most this far from the present one.
+        offset_gain: share of a stride's surprise that enters the offset estimate.
+        offset_bound: largest offset believed.
+        surprise_bound: a larger surprise counts as this much: a push is no offset.
+        rounds: Gauss-Newton steps.
+    """
+
+    tolerance: tuple[float, float] = tuned((0.02, 0.004), SPEED, LENGTH)
+    change: tuple[float, float, float] = tuned((0.02, 0.15, 0.15))
+    angle_range: tuple[float, float] = tuned((-0.1, 0.1))
+    stiffness_range: tuple[float, float] = tuned((0.6, 1.6))
+    top_margin: float = tuned(0.005)
+    pace: float = tuned(0.06, SPEED)
+    climb: float = tuned(0.02, LENGTH)
+    offset_gain: float = tuned(0.2)
+    offset_bound: tuple[float, float] = tuned((0.3, 0.03), SPEED, LENGTH)
+    surprise_bound: tuple[float, float] = tuned((0.06, 0.008), SPEED, LENGTH)
+    rounds: int = tuned(3)
+
+
+class RunningPlanner:
+    """min |(P(z, u) + d - z*) / tolerance|^2 + |(u - u_g) / change|^2 over bounded u.
+
+    Args:
+        gait: to settle on.
+        options: tuning.
+
+    Attributes:
+        gait: the one of the last target.
+        offset: (3,) the estimate of d.
+    """
+
+    def __init__(self, gait: RunningGait, options: RunningOptions | None = None) -> None:
+        self.gait = gait
+        self.options = scaled(options or RunningOptions(), Scale.of(gait.parameters))
+        self.offset: Array = np.zeros(PADDED)
+        self._family = RunningFamily(gait)
+        self._map = ReturnMap(gait.parameters, gait.stride)
+        self._grid = 0.5 * self.options.pace
+        # Compile now what a stride would otherwise wait for.
+        self.decide(gait.apex)
+
+    def reset(self) -> None:
+        """See :class:`~.planner.Planner`."""
+        self.offset = np.zeros(PADDED)
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :meth:`~.planner.Planner.decide`; the stride is a running step from apex to apex."""
+        o = self.options
+        if target is not None and target[0] != self.gait.apex[0]:
+            self.gait = self._family.at(float(target[0]))
+        wanted = self.gait.apex if target is None else target
+        near = self._near(z, wanted)
+        aim = np.array(
+            [
+                np.clip(wanted[0], z[0] - o.pace, z[0] + o.pace),
+                np.clip(wanted[1], z[1] - o.climb, z[1] + o.climb),
+            ]
+        )
+        u, end, outcome = self._search(z, aim, near, angles)
+        completed = outcome is Outcome.SECTION
+        predicted = APEX.padded(end) + self.offset
+        at_target = bool(np.all(np.abs(wanted - aim) < 1e-9))
+        return Decision(u, predicted, completed, completed, completed and at_target)
+
+    def _near(self, z: Array, wanted: Array) -> RunningGait:
+        """The gait about which the controls change, near the present speed."""
+        if abs(wanted[0] - z[0]) <= self.options.pace:
+            return self._family.at(float(wanted[0]))
+        return self._family.at(self._grid * round(float(z[0]) / self._grid))
+
+    def _search(
+        self, z: Array, aim: Array, near: RunningGait, angles: tuple[float, float]
+    ) -> tuple[Array, Array, Outcome]:
+        """Controls, the apex they lead to on the template, and how the stride ends."""
+        o, p = self.options, self.gait.parameters
+        base = near.controls[_SLOTS]
+        scale = np.array([1.0, base[1], base[2]])
+        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
+        low, high = base[0] + o.angle_range[0], min(base[0] + o.angle_range[1], top)
+        low, high = min(max(low, angles[0]), high), max(min(high, angles[1]), low)
+        if angles[0] == angles[1]:
+            low = high = angles[0]
+        lower = np.array([low, o.stiffness_range[0] * base[1], o.stiffness_range[0] * base[2]])
+        upper = np.array([high, o.stiffness_range[1] * base[1], o.stiffness_range[1] * base[2]])
+        x = np.clip(base, lower, upper)
+        u = near.controls.copy()
+        effort = 1.0 / (np.array(o.change) * scale)
+        tolerance = np.array(o.tolerance)
+        for _ in range(o.rounds):
+            u[_SLOTS] = x
+            result, jacobian, outcome = self._map.derivatives(z, u, _COLUMNS)
+            if outcome is not Outcome.SECTION:
+                break
+            errors = (result[:2] + self.offset[:2] - aim) / tolerance
+            rows = np.vstack((jacobian[:2] / tolerance[:, None], np.diag(effort)))
+            residual = np.concatenate((errors, (x - base) * effort))
+            x = _bounded_step(rows, residual, x, lower, upper)
+        u[_SLOTS] = x
+        end, outcome = self._map.step(z, u)
+        if outcome is not Outcome.SECTION:
+            u[_SLOTS] = np.clip(base, lower, upper)
+            end, outcome = self._map.step(z, u)
+        if outcome is not Outcome.SECTION:
+            end = z
+        return u, end, outcome
+
+    def observe(self, decision: Decision, z: Array) -> None:
+        """See :meth:`~.planner.Planner.observe`; only feasible, nominal strides teach."""
+        if not (decision.feasible and decision.nominal):
+            return
+        o = self.options
+        limit, bound = np.array(o.surprise_bound), np.array(o.offset_bound)
+        surprise = np.clip(z - decision.predicted[:2], -limit, limit)
+        self.offset[:2] = np.clip(self.offset[:2] + o.offset_gain * surprise, -bound, bound)
+
+
+def _bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Array) -> Array:
+    """x + dx with the least |rows dx + residual| between the bounds.
+
+    A variable that would leave its bounds is held there, and the others are solved for again.
+    """
+    free = upper > lower
+    step = np.clip(x, lower, upper) - x
+    for _ in range(len(x)):
+        left = residual + rows @ np.where(free, 0.0, step)
+        step[free] = -np.linalg.lstsq(rows[:, free], left, rcond=None)[0]
+        beyond = free & ((x + step < lower) | (x + step > upper))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(x + step, lower, upper)[beyond] - x[beyond]
+        free &= ~beyond
+    return np.clip(x + step, lower, upper)
