@@ -1,52 +1,53 @@
 """Where the feet are at the apex of a gait whose legs take turns, and how they move.
 
-Joint velocities that do not fit the gait cost a start far more torque than the gait itself.
+The trunk turns against the legs, so that the robot flies without angular momentum. Joint
+velocities that do not fit the gait cost a start far more torque than the gait itself.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions
+from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.phases import phase_control
+from template_control.embedding.references.swing_foot import SwingFoot
 from template_control.errors import ParameterError
-from template_control.robot.start import Pose
-from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton
+from template_control.robot.start import Pose, state_in
 from template_control.slip.automaton.vocabulary import Event, Reset
-from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.gait import Gait
+from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import APEX
 
 Array = NDArray[np.float64]
 
+_NEAR = 0.9  # of l0: a distance from the CoM that any leg reaches
+_REACH = 0.96  # of the leg: a straight knee may bend either way
 _TICK = 1e-3  # over which the references move on [s]; finer ones end in the same place
 
 
-def apex_pose(
-    gait: Gait, swing: SwingOptions, pitch: float = 0.0, automaton: Automaton = AUTOMATON
-) -> Pose:
-    """The pose at an apex of the gait, with both feet where their swing references have them.
+def apex_pose(controller: EmbeddingController, z: Array) -> Pose:
+    """The pose at the apex that a run begins at, with both feet where their references are.
 
     A foot that stood in one stride swings through the next and lands in the one after that. So
     one swing passes two apexes: at the first it is the foot that has just stood, at the second the
     foot that is about to land.
 
     Args:
-        gait: from apex to apex.
-        swing: shape of its swings, scaled to the robot.
-        pitch: of the trunk [rad].
-        automaton: that its stride is of.
+        controller: with its planners and its options; its robot's last update is overwritten.
+        z: (2,) dx/dt and y at the apex [m/s, m].
 
     Raises:
+        RobotError: if the legs do not reach the pose.
         ParameterError: if the gait's legs do not take turns in the air.
     """
-    start = automaton.start(gait.stride).name
-    stride = simulate_stride(
-        gait.parameters, start, APEX.state(gait.state), gait.controls, automaton=automaton
-    )
+    robot, o, planning = controller.robot, controller.options, controller.planning
+    planner, node = planning.begin(APEX)
+    gait, swing = planner.gait, phase_control(o.phases, node).swing or o.swing
+    simulator = StrideSimulator(gait.parameters, planning.automaton)
+    stride = simulator.run(node.name, APEX.state(gait.state), gait.controls)
     if not any(event.reset is Reset.SWAP for event in stride.events):
         raise ParameterError(
             f"the legs of gait {gait.name!r} do not take turns: give SimulationOptions a pose"
@@ -66,10 +67,22 @@ def apex_pose(
             now += dt
         feet.append([foot.x[0] - apex * gait.step_length, foot.y[0]])
         velocities.append([foot.x[1], foot.y[1]])
-    return Pose(
-        com=np.array([0.0, gait.state[1]]),
-        com_velocity=np.array([gait.state[0], 0.0]),
+    pose = Pose(
+        com=np.array([0.0, z[1]]),
+        com_velocity=np.array([z[0], 0.0]),
         feet=np.array(feet[::-1]),
         feet_velocity=np.array(velocities[::-1]),
-        pitch=pitch,
+        pitch=o.lean.pitch(gait.stride, float(gait.state[0]), o.trunk_pitch),
+        angular_momentum=0.0,
     )
+    # Fast references run ahead of what the legs reach. Where the feet are hardly moves the hips.
+    near = _within(pose, pose.com, _NEAR * gait.parameters.rest_length)
+    q, _ = state_in(robot, replace(pose, feet=near))
+    return replace(pose, feet=_within(pose, q[:2], _REACH * robot.leg_length))
+
+
+def _within(pose: Pose, centre: Array, reach: float) -> Array:
+    """(2, 2) the pose's feet, drawn to within ``reach`` of ``centre`` [m]."""
+    away = pose.feet - centre
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    return np.asarray(centre + away * np.minimum(reach / length, 1.0))

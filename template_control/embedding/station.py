@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from template_control.embedding.guards import PLACED
 from template_control.embedding.phases import PhaseControl, Phases, phase_control
+from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.embedding.references.template_path import LOCATE, Locate
 from template_control.errors import ParameterError
-from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Leg, Phase

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.apex_pose import apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
@@ -26,7 +27,7 @@ from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import WalkingGait
-from template_control.slip.maps.section import VLO
+from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.scenario import Scenario
 
@@ -109,17 +110,15 @@ def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array
     """(q, v) that the run begins in.
 
     Raises:
-        ParameterError: if the route does not begin at VLO and no pose is given.
+        ParameterError: if the route begins at an apex of a stride whose legs do not take turns,
+            and no pose is given.
     """
     robot, route = controller.robot, controller.planning.route
     if o.pose is not None:
         return state_in(robot, o.pose)
-    if route.section != VLO:
-        raise ParameterError(
-            f"the route begins at {route.section.name}, and only at VLO it is clear where the"
-            " feet are: give SimulationOptions a pose"
-        )
-    z = np.array(o.start) if o.start is not None else route.start
+    z = route.start if o.start is None else np.array(o.start)
+    if route.section == APEX:
+        return state_in(robot, apex_pose(controller, z[: APEX.dimension]))
     # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
     swing = np.array([0.0, controller.options.swing.clearance])
     pitch = controller.options.trunk_pitch

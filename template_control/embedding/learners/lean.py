@@ -60,6 +60,17 @@ class LeanOptions:
     error_bound: float = tuned(0.05)
     bound: float = tuned(0.25)
 
+    def pitch(self, stride: str, speed: float, upright: float) -> float:
+        """The mean pitch of a stride [rad].
+
+        Args:
+            stride: its kind.
+            speed: at its section [m/s].
+            upright: pitch of a kind without a lean of its own [rad].
+        """
+        lean = self.strides.get(stride)
+        return upright if lean is None else lean.at(speed)
+
 
 class TrunkLean:
     """The trunk's reference; it persists from stride to stride.
@@ -94,7 +105,7 @@ class TrunkLean:
             speed: wanted at its end [m/s].
         """
         lean = self.options.strides.get(stride)
-        self._goal = self._upright if lean is None else lean.at(speed)
+        self._goal = self.options.pitch(stride, speed, self._upright)
         if lean is not self._lean:
             self.correction = 0.0 if lean is None else lean.excess
             self._lean = lean

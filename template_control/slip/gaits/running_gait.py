@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,7 +143,7 @@ def _symmetric_angle(parameters: SlipParameters, z: Array, stiffness: float) -> 
     top = np.arcsin(min(z[1] / parameters.rest_length, 1.0)) - 1e-6
     angles = np.linspace(top, _FLATTEST, _SCAN)
     above = surplus(angles[0])
-    for steep, flat in zip(angles[:-1], angles[1:], strict=True):
+    for steep, flat in pairwise(angles):
         below = above
         above = surplus(flat)
         if below * above <= 0.0:
