@@ -39,7 +39,9 @@ SHARED = (
     "compiled",
     "compiling",
     "errors",
+    "settings",
     "storage",
+    "version",
 )  # modules of the root that every room may import
 MOST_ROOMS = 12
 MOST_FILES = 12  # of a folder, its __init__.py included

@@ -17,16 +17,22 @@ _WALK = (_TOUCHDOWN, 1.1 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_leng
 _STRETCH = 0.903514524055713
 
 
-def default_gait(robot: PlanarBiped) -> WalkingGait:
+def default_gait(robot: PlanarBiped, touchdown_angle: float | None = None) -> WalkingGait:
     """The robot's walk: its own if it has one, else 66 degrees and 1.1 m/s for l0 = 1 m.
 
     Args:
         robot: its last update is overwritten.
+        touchdown_angle: another one than the walk's, at the same speed at VLO [rad].
+
+    Raises:
+        GaitError: if there is no gait with that angle.
     """
     parameters = template_for(robot)
     angle, speed = robot.walk or _WALK
     unit = np.sqrt(parameters.gravity * parameters.rest_length)
-    return gait_at(parameters, angle, float(speed * unit))
+    return gait_at(
+        parameters, angle if touchdown_angle is None else touchdown_angle, float(speed * unit)
+    )
 
 
 def paper_gait(parameters: SlipParameters) -> WalkingGait:

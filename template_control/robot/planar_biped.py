@@ -121,6 +121,10 @@ class PlanarBiped:
         self.foot_jacobian = terms.foot_jacobian
         self.foot_bias = terms.foot_bias
 
+    def __repr__(self) -> str:
+        joints = ", ".join(self.joint_names)
+        return f"<PlanarBiped {self.name}: {self.mass:.4g} kg, joints {joints}>"
+
     @classmethod
     def from_urdf(
         cls,

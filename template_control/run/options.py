@@ -10,6 +10,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
+from template_control.plant.plant import Plant, check_world
 from template_control.robot.start import Pose
 from template_control.run.sensing import SensorOptions
 from template_control.slip.similarity import tuned
@@ -60,7 +61,8 @@ class SimulationOptions:
     Attributes:
         steps: largest number of steps from section to section. None: the run goes to the end of
             the route, or makes 50 steps where the route has no end.
-        plant: the world; the type of its options says which.
+        plant: the world; the type of its options says which. Or a plant of one's own: the run
+            resets it, and leaves it open.
         embedding: the controller's tuning.
         start: (3,) dx/dt, y, dy/dt to start in [m/s, m, m/s], dy/dt 0 at apex; None for the
             route's.
@@ -75,12 +77,12 @@ class SimulationOptions:
         falls: when the robot counts as fallen.
 
     Raises:
-        ParameterError: if a number is less than 1, or the delay is not a whole number of physics
-            steps up to 1 s.
+        ParameterError: if the plant is none, a number is less than 1, or the delay is not a whole
+            number of physics steps up to 1 s.
     """
 
     steps: int | None = None
-    plant: PlantOptions | IdealOptions = field(default_factory=PlantOptions)
+    plant: PlantOptions | IdealOptions | Plant = field(default_factory=PlantOptions)
     embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
     start: tuple[float, float, float] | None = None
     pose: Pose | None = None
@@ -91,6 +93,7 @@ class SimulationOptions:
     falls: FallOptions = field(default_factory=FallOptions)
 
     def __post_init__(self) -> None:
+        check_world(self.plant)
         if self.steps is not None and self.steps < 1:
             raise ParameterError(f"steps is {self.steps}: give at least 1")
         if self.record_every < 1:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import logging
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,10 @@ from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_route import robot_route
+from template_control.embedding.section_report import SectionReport
 from template_control.errors import ParameterError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, state_at_vlo, state_in
@@ -33,6 +37,8 @@ from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
+
+_LOG = logging.getLogger(__name__)
 
 _STEPS = 50  # of a run on a route that does not end, where the options do not say
 
@@ -91,6 +97,7 @@ def simulate(
     recorder = Recorder(controller, o.record_every)
     q, v = _start(controller, o)
     controller.start(0 if o.pose is None else o.pose.rear)
+    _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
     begin = time.perf_counter()
     interrupted = False
     with open_plant(robot, o.plant) as plant:
@@ -102,9 +109,13 @@ def simulate(
                 raise
             reason, interrupted = "", True
     seconds = time.perf_counter() - begin
+    if reason:
+        _LOG.warning("%s fell: %s", robot.name, reason)
     metadata = _metadata(controller, recorder, o, reason, seconds)
     metadata["interrupted"] = interrupted
-    return recorder.record(metadata)
+    record = recorder.record(metadata)
+    _LOG.info("%r in %.2f s of wall-clock time", record, seconds)
+    return record
 
 
 def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
@@ -171,6 +182,7 @@ def _loop(
             return f"{reason} at {now:.3f} s, in step {done + 1}"
         if len(controller.reports) - 1 > done:
             done = len(controller.reports) - 1
+            _tell(controller.reports[-1], done)
             if progress is not None:
                 progress(done)
         try:
@@ -179,6 +191,30 @@ def _loop(
             return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
     return ""
+
+
+def _tell(report: SectionReport, number: int) -> None:
+    """Log what was decided at a section, and where the template cannot do it."""
+    decision = report.decision
+    _LOG.debug(
+        "%.3f s, step %d: at %s %s, wanted %s, controls %s",
+        report.time,
+        number,
+        report.section.name,
+        report.state,
+        report.target,
+        decision.controls,
+    )
+    if not decision.feasible:
+        _LOG.warning(
+            "%.3f s, step %d: no stride of the template starts from %s at %s",
+            report.time,
+            number,
+            report.state,
+            report.section.name,
+        )
+    elif not decision.nominal:
+        _LOG.info("%.3f s, step %d: the planner left its own law", report.time, number)
 
 
 def _push(pushes: tuple[Push, ...], controller: EmbeddingController, now: float) -> float:
@@ -239,7 +275,7 @@ def _metadata(
         "gait_mean_speed": gait.step_length / gait.step_duration,
         "planner": type(controller.planner).__name__,
         "plant": plant_name(o.plant),
-        "options": asdict(o),
+        "options": _told(o),
         "fall_reason": reason,
         "wall_seconds": seconds,
         "duration": recorder.ticks * o.plant.time_step,
@@ -248,6 +284,20 @@ def _metadata(
     }
     # As it will be read back: JSON knows lists, not tuples.
     return dict(json.loads(json.dumps(metadata, default=_plain)))
+
+
+def _told(o: SimulationOptions) -> dict[str, Any]:
+    """The options as data; a plant of one's own is not data."""
+    own = not isinstance(o.plant, PlantOptions | IdealOptions)
+    rest = {f.name: getattr(o, f.name) for f in fields(o) if not (own and f.name == "plant")}
+    told = {name: _data(value) for name, value in rest.items()}
+    return {**told, "plant": {}} if own else told
+
+
+def _data(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_data(entry) for entry in value]
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
 
 
 def _plain(value: Any) -> Any:

@@ -9,6 +9,7 @@ gait and not beside it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +98,8 @@ class LqrOptions:
             virtual bottom than after takes energy out, the reverse puts some in.
     """
 
+    kind: ClassVar[str] = "lqr"
+
     state_cost: tuple[float, float, float] = tuned(
         (10.0, 100.0, 10.0), PER_SPEED_SQUARED, PER_LENGTH_SQUARED, PER_SPEED_SQUARED
     )
@@ -162,6 +165,9 @@ class LqrPlanner:
         )
         self._settling = _settling_map(self.a, self.b, np.array(o.tolerance), o.control_weight)
         self._law = self._aim()
+
+    def __repr__(self) -> str:
+        return f"<LqrPlanner on {self.gait!r}>"
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`."""

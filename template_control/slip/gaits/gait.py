@@ -78,6 +78,13 @@ class WalkingGait:
     step_length: float
     step_duration: float
 
+    def __repr__(self) -> str:
+        angle = np.degrees(self.controls[Slot.TOUCHDOWN_ANGLE])
+        return (
+            f"<WalkingGait {self.name}: {self.mean_speed:.3f} m/s, touchdown angle {angle:.2f} deg,"
+            f" at VLO {self.vlo[0]:.3f} m/s and {self.vlo[1]:.4f} m>"
+        )
+
     @property
     def stride(self) -> str:
         """Kind of stride: from VLO to VLO."""
@@ -216,7 +223,10 @@ def _nominal_angle(mean_speed: float, rest_length: float, gravity: float) -> flo
 
 
 def gait_for_speed(
-    parameters: SlipParameters, mean_speed: float, name: str = "walk"
+    parameters: SlipParameters,
+    mean_speed: float,
+    name: str = "walk",
+    touchdown_angle: float | None = None,
 ) -> WalkingGait:
     """The symmetric gait with a given mean forward speed.
 
@@ -224,6 +234,7 @@ def gait_for_speed(
         parameters: the template; both legs have its stiffness k0.
         mean_speed: step length over step duration [m/s].
         name: of the gait.
+        touchdown_angle: alpha, from the ground to the leg [rad]; None: the usual one at this speed.
 
     Raises:
         GaitError: if there is none, or the speed is not positive.
@@ -232,7 +243,9 @@ def gait_for_speed(
     if not (np.isfinite(mean_speed) and mean_speed > 0.0):
         raise GaitError(f"speed is {mean_speed!r} m/s: give a positive number")
     unit = np.sqrt(p.gravity * p.rest_length)
-    angle = _nominal_angle(mean_speed, p.rest_length, p.gravity)
+    angle = touchdown_angle
+    if angle is None:
+        angle = _nominal_angle(mean_speed, p.rest_length, p.gravity)
 
     def surplus(vlo_speed: float) -> float:
         try:
