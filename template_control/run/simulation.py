@@ -31,6 +31,7 @@ from template_control.run.recorder import Recorder, Truth
 from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.gaits.flight import flight_share
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.route import Route
@@ -262,6 +263,7 @@ def _metadata(
         "mass": robot.mass,
         "joints": list(robot.joint_names),
         "torque_limit": controller.qp.torque_limit.tolist(),
+        "velocity_limit": robot.velocity_limit.tolist(),
         "feet": list(robot.feet),
         "legs": [list(leg) for leg in robot.legs],
         "trunk_com": robot.trunk_com,
@@ -272,6 +274,7 @@ def _metadata(
         "template": parameters,
         "gait_state": gait.state.tolist(),
         "gait_controls": gait.controls.tolist(),
+        "gait_flight_share": flight_share(gait, controller.planning.automaton),
         "gait_mean_speed": gait.step_length / gait.step_duration,
         "planner": type(controller.planner).__name__,
         "plant": plant_name(o.plant),
