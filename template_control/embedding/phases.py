@@ -75,6 +75,11 @@ _RUNNING_STANCE = PhaseControl(
     swing=_RUNNING_SWING,
 )
 
+# As in walking, but a stride that is made once has nothing to be trimmed by.
+_LEAVING_THE_GROUND = PhaseControl(
+    tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,)
+)
+
 PHASES: Phases = {
     Phase.F: PhaseControl(
         # The CoM is ballistic, and the trunk can only be turned against the legs.
@@ -97,6 +102,12 @@ PHASES: Phases = {
     Phase.DS: PhaseControl(
         tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,), trims=True
     ),
+    "DS_sc^wr": _LEAVING_THE_GROUND,
+    "DS_sd^wr": _LEAVING_THE_GROUND,
+    "SS_sc^wr": _RUNNING_STANCE,
+    "SS_sd^wr": _RUNNING_STANCE,
+    "SS_sc^rw": replace(_RUNNING_STANCE, lands=True),
+    "SS_sd^rw": _RUNNING_STANCE,
 }
 """What walking and running need in each phase; transitions may start from it."""
 

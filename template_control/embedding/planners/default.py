@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planners
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.slip.gaits.running_gait import running_gait
+from template_control.embedding.planners.transition import (
+    RUN_TO_WALK,
+    WALK_TO_RUN,
+    TransitionPlanner,
+)
+from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.route import Route
@@ -22,7 +29,19 @@ def default_planners(route: Route) -> Planners:
     Raises:
         GaitError: if there is no gait at the speed the route begins with.
     """
-    speed = float(route.start[0])
+    p, speed = route.parameters, float(route.start[0])
+    slowest, fastest = running_speeds(p)
+
+    def runs(speed: float) -> RunningGait:
+        return running_gait(p, min(max(speed, slowest), fastest))
+
     if route.section == APEX:
-        return {"r": RunningPlanner(running_gait(route.parameters, speed))}
-    return {"w": LqrPlanner(walking_gait(route.parameters, speed))}
+        return {"r": RunningPlanner(runs(speed))}
+    walk = walking_gait(p, speed)
+    first = runs(slowest)
+    return {
+        "w": LqrPlanner(walk),
+        "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
+        "r": RunningPlanner(first),
+        "rw": TransitionPlanner("rw", first, partial(walking_gait, p), RUN_TO_WALK),
+    }
