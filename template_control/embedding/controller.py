@@ -134,6 +134,11 @@ class EmbeddingController:
         """Where the template's rear toe is in the world: at the foot, if that stands [m]."""
         return float(self._sensed.toes[0]) if self.station.stance else self.planning.toe
 
+    def first_pitch(self) -> float:
+        """Of the trunk where the route begins [rad]."""
+        goal = self.planning.first_goal()
+        return self.options.lean.pitch(goal, self.options.trunk_pitch)
+
     def start(self, rear: int = 0) -> None:
         """Begin where the route begins; the robot's model must be up to date.
 
@@ -279,8 +284,7 @@ class EmbeddingController:
         learnt = Learnt(self.load.factor, self.trim.acceleration, self.lean.correction)
         node = self.planning.decide(section, s, self.time, learnt)
         self._enter(node.name)
-        goal = self.reports[-1].goal
-        self.lean.aim(goal.stride, goal.wanted_speed)
+        self.lean.aim(self.reports[-1].goal)
         self.trim.expect(self.planning.path if self.station.trimmed else None, self.planner.gait)
         self._on_new_path()
 

@@ -102,7 +102,7 @@ PHASES: Phases = {
     Phase.DS: PhaseControl(
         tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,), trims=True
     ),
-    "DS_sc^wr": _LEAVING_THE_GROUND,
+    "DS_sc^wr": replace(_LEAVING_THE_GROUND, lands=True),
     "DS_sd^wr": _LEAVING_THE_GROUND,
     "SS_sc^wr": _RUNNING_STANCE,
     "SS_sd^wr": _RUNNING_STANCE,

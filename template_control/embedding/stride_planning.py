@@ -24,7 +24,7 @@ from template_control.embedding.sensing import Sensed
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
-from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot
+from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
@@ -118,10 +118,19 @@ class StridePlanning:
             planner.reset()
         self.reports.clear()
         self.arrived = False
-        goal = self.route.ahead(section, self.route.start, 0.0)
+        goal = self.first_goal()
+        return self.planner_of(goal), self.automaton.start(goal.stride)
+
+    def first_goal(self) -> StrideGoal:
+        """The stride that the route begins with.
+
+        Raises:
+            ParameterError: if the route is empty.
+        """
+        goal = self.route.ahead(self.route.section, self.route.start, 0.0)
         if goal is None:
             raise ParameterError("the route ends where it begins: give one with a stride")
-        return self.planner_of(goal), self.automaton.start(goal.stride)
+        return goal
 
     @property
     def planner(self) -> Planner:
@@ -254,11 +263,31 @@ class StridePlanning:
             now: time [s].
         """
         report = self.reports[-1]
-        z = self._back_to_section(self.automaton.start(report.goal.stride), report, sensed)
-        if z is not None:
-            angle = _landing_angle(sensed, self.parameters)
-            decision = self.planner.decide(z, report.goal.target, (angle, angle))
+        if hasattr(self.planner, "land"):
+            toes = (float(sensed.toes[0]), float(sensed.toes[1]))
+            state = sensed.state.copy()
+            end = section_of(self.automaton.sections(node.name)[1])
+
+            def ahead(u: Array) -> tuple[Array, Outcome]:
+                stride = self._simulator.run(node.name, state, u, toes)
+                return end.of(stride.state), stride.outcome
+
+            free = sorted(
+                {
+                    int(slot)
+                    for later in self.automaton.stride(node.name)
+                    for slot in (later.rear, later.front)
+                    if slot is not None
+                }
+            )
+            decision = self.planner.land(ahead, report.decision, report.goal.target, free)
             self.reports[-1] = replace(report, decision=decision)
+        else:
+            z = self._back_to_section(self.automaton.start(report.goal.stride), report, sensed)
+            if z is not None:
+                angle = self._landing_angle(node, sensed)
+                decision = self.planner.decide(z, report.goal.target, (angle, angle))
+                self.reports[-1] = replace(report, decision=decision)
         self.follow(node, sensed, now)
 
     def due(self, event: Event) -> float:
@@ -359,8 +388,15 @@ class StridePlanning:
             return None
         return report.section.mirror(report.section.of(past.state))
 
+    def _landing_angle(self, node: Node, sensed: Sensed) -> float:
+        """The touchdown angle with which the template would have landed where the robot has [rad]."""
+        if len(node.stance) == 1:
+            return _flown_angle(sensed, self.parameters)
+        # With a leg on the ground already, the guard compares heights: l0 sin(alpha) = y.
+        return float(np.arcsin(min(sensed.state[1] / self.parameters.rest_length, 1.0)))
 
-def _landing_angle(sensed: Sensed, parameters: SlipParameters) -> float:
+
+def _flown_angle(sensed: Sensed, parameters: SlipParameters) -> float:
     """Angle of the template's leg as it comes to l0 on the ballistic path through the robot [rad].
 
     The robot's foot meets the ground a little before or after.

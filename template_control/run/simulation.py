@@ -134,7 +134,7 @@ def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array
         return state_in(robot, _apex_pose(controller, z[: APEX.dimension]))
     # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
     swing = np.array([0.0, controller.options.swing.clearance])
-    pitch = controller.options.trunk_pitch
+    pitch = controller.first_pitch()
     return state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
 
 
@@ -143,7 +143,7 @@ def _apex_pose(controller: EmbeddingController, z: Array) -> Pose:
     planning, o = controller.planning, controller.options
     planner, node = planning.begin(APEX)
     gait = planner.gait
-    pitch = o.lean.pitch(gait.stride, float(z[0]), o.trunk_pitch)
+    pitch = controller.first_pitch()
     swing = phase_control(o.phases, node).swing or o.swing
     return apex_pose(controller.robot, ApexStart(z, gait, swing, pitch, planning.automaton))
 

@@ -253,13 +253,8 @@ def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Pat
     """
     _check_samples(record)
     paths = []
-<<<<<<< HEAD
     with _style():
-        for name, draw in FIGURES.items():
-=======
-    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         for name, draw in figures_of(record).items():
->>>>>>> 10fda2c (Show what running adds: joint speeds, flight share, cost of transport, apexes)
             path = Path(folder) / f"{name}.png"
             try:
                 draw(record).savefig(path, dpi=dpi)

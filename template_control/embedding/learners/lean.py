@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import RATE, SPEED, tuned
 
 
@@ -36,7 +37,11 @@ class Lean:
 
 def _leans() -> dict[str, Lean]:
     # Running knees carry twice the weight on a leg that is far from straight.
-    return {"r": Lean((2.0, 2.5, 3.0, 3.5, 4.0), (0.33, 0.34, 0.36, 0.40, 0.40), excess=0.1)}
+    return {
+        "wr": Lean((1.2,), (0.33,)),
+        "r": Lean((2.0, 2.5, 3.0, 3.5, 4.0), (0.33, 0.34, 0.36, 0.40, 0.40), excess=0.1),
+        "rw": Lean((1.2,), (0.33,), excess=0.1),
+    }
 
 
 @dataclass(frozen=True)
@@ -58,16 +63,19 @@ class LeanOptions:
     error_bound: float = tuned(0.05)
     bound: float = tuned(0.25)
 
-    def pitch(self, stride: str, speed: float, upright: float) -> float:
+    def of(self, goal: StrideGoal) -> Lean | None:
+        """The lean of a stride; one without a lean of its own prepares that of the next kind."""
+        return self.strides.get(goal.stride) or self.strides.get(goal.then or "")
+
+    def pitch(self, goal: StrideGoal, upright: float) -> float:
         """The mean pitch of a stride [rad].
 
         Args:
-            stride: its kind.
-            speed: at its section [m/s].
-            upright: pitch of a kind without a lean of its own [rad].
+            goal: the stride, and where it leads.
+            upright: pitch where no lean is known [rad].
         """
-        lean = self.strides.get(stride)
-        return upright if lean is None else lean.at(speed)
+        lean = self.of(goal)
+        return upright if lean is None else lean.at(goal.wanted_speed)
 
 
 class TrunkLean:
@@ -95,15 +103,14 @@ class TrunkLean:
         self._begun = False
         self._sum = self._time = 0.0
 
-    def aim(self, stride: str, speed: float) -> None:
+    def aim(self, goal: StrideGoal) -> None:
         """A stride begins.
 
         Args:
-            stride: its kind.
-            speed: wanted at its end [m/s].
+            goal: the stride, and where it leads.
         """
-        lean = self.options.strides.get(stride)
-        self._goal = self.options.pitch(stride, speed, self._upright)
+        lean = self.options.of(goal)
+        self._goal = self.options.pitch(goal, self._upright)
         if lean is not self._lean:
             self.correction = 0.0 if lean is None else lean.excess
             self._lean = lean

@@ -37,11 +37,11 @@ def default_planners(route: Route) -> Planners:
 
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
-    walk = walking_gait(p, speed)
-    first = runs(slowest)
+    walk = LqrPlanner(walking_gait(p, speed))
+    run = RunningPlanner(runs(slowest))
     return {
-        "w": LqrPlanner(walk),
+        "w": walk,
         "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
-        "r": RunningPlanner(first),
-        "rw": TransitionPlanner("rw", first, partial(walking_gait, p), RUN_TO_WALK),
+        "r": run,
+        "rw": TransitionPlanner("rw", run, partial(walking_gait, p), RUN_TO_WALK),
     }

@@ -7,15 +7,21 @@ target, the next gait's planner makes good.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.embedding.planners.regularised import Prior, solve_stride
-from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision, Planner
+from template_control.embedding.planners.regularised import (
+    Ahead,
+    Prior,
+    from_here,
+    from_section,
+    solve_stride,
+)
+from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED, VLO
@@ -35,6 +41,7 @@ class TransitionOptions:
         change: changes of each that count as 1 [rad, shares of the base].
         range: bounds of each: alpha relative to the base [rad], shares of the base.
         tolerance: errors of dx/dt, y, dy/dt at the end that count as 1.
+        again: change of each, a share, that counts as 1 when a foot has landed.
         rounds: Gauss-Newton steps.
     """
 
@@ -43,6 +50,7 @@ class TransitionOptions:
     change: tuple[float, ...] = tuned((0.3, 0.3))
     range: tuple[tuple[float, float], ...] = tuned(((0.5, 2.0), (0.5, 2.0)))
     tolerance: tuple[float, float, float] = tuned((0.05, 0.01, 0.1), SPEED, LENGTH, SPEED)
+    again: float = tuned(0.3)
     rounds: int = tuned(6)
 
 
@@ -63,7 +71,8 @@ class TransitionPlanner:
 
     Args:
         stride: kind of the stride, a key of the automaton's ``starts``.
-        before: the gait that the stride begins in; fixed controls are its own.
+        before: planner of the gait that the stride begins in. Controls that are not free are those
+            of its stride from the same state.
         after: makes the gait that it leads to, from dx/dt at its section [m/s].
         options: tuning.
 
@@ -75,16 +84,16 @@ class TransitionPlanner:
     def __init__(
         self,
         stride: str,
-        before: Gait,
+        before: Planner,
         after: Callable[[float], Gait],
         options: TransitionOptions,
     ) -> None:
         self._before, self._after = before, after
-        p = before.parameters
+        p = before.gait.parameters
         self.options = scaled(options, Scale.of(p))
         self.offset: Array = np.zeros(PADDED)
         self._map = ReturnMap(p, stride)
-        self.gait = after(float(before.state[0]))
+        self.gait = after(float(before.gait.state[0]))
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`."""
@@ -102,12 +111,27 @@ class TransitionPlanner:
         size = self._map.dimensions[1]
         prior = self._prior(z, angles)
         tolerance = np.array(self.options.tolerance)[:size]
-        u, end, outcome = solve_stride(self._map, z, wanted, prior, tolerance)
-        completed = outcome is Outcome.SECTION
-        return Decision(u, self._map.sections[1].padded(end), completed, completed, False)
+        u, end = solve_stride(from_section(self._map, z, prior.slots), wanted, prior, tolerance)
+        return self._decision(u, end, wanted)
+
+    def land(self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]) -> Decision:
+        """See :meth:`~.planner.Planner.land`."""
+        o, controls = self.options, decision.controls
+        stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE]
+        base = controls[stiff]
+        prior = Prior(
+            controls.copy(), stiff, base, o.again * base, 0.5 * base, 2.0 * base, o.rounds
+        )
+        tolerance = np.array(o.tolerance)[: len(target)]
+        u, end = solve_stride(from_here(ahead, stiff), target, prior, tolerance)
+        return self._decision(u, end, target)
+
+    def _decision(self, u: Array, end: Array | None, wanted: Array) -> Decision:
+        predicted = self._map.sections[1].padded(wanted if end is None else end)
+        return Decision(u, predicted, end is not None, end is not None, False)
 
     def _prior(self, z: Array, angles: tuple[float, float]) -> Prior:
-        o, p = self.options, self._before.parameters
+        o, p = self.options, self._before.gait.parameters
         unit = p.mass * p.gravity / p.rest_length
         slots = [int(slot) for slot in o.slots]
         turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
@@ -115,7 +139,7 @@ class TransitionPlanner:
         low, high = np.array(o.range).T
         lower = np.where(turns, base + low, base * low)
         upper = np.where(turns, base + high, base * high)
-        controls = self._before.controls.copy()
+        controls = self._before.decide(z).controls.copy()
         if angles[0] == angles[1]:
             controls[Slot.TOUCHDOWN_ANGLE] = angles[0]
             lower[turns] = upper[turns] = angles[0]
