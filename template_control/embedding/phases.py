@@ -76,9 +76,7 @@ _RUNNING_STANCE = PhaseControl(
 )
 
 # As in walking, but a stride that is made once has nothing to be trimmed by.
-_LEAVING_THE_GROUND = PhaseControl(
-    tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,)
-)
+_LEAVING_THE_GROUND = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,))
 
 PHASES: Phases = {
     Phase.F: PhaseControl(

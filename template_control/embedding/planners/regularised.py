@@ -138,7 +138,9 @@ def _start(derivatives: Derivatives, aim: Array, prior: Prior, tolerance: Array)
     u[prior.slots] = prior.base
     if derivatives(u)[2] is Outcome.SECTION:
         return prior.base.copy()
-    axes = [np.linspace(low, high, _GRID) for low, high in zip(prior.lower, prior.upper, strict=True)]
+    axes = [
+        np.linspace(low, high, _GRID) for low, high in zip(prior.lower, prior.upper, strict=True)
+    ]
     best, least = prior.base.copy(), np.inf
     for x in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes)):
         u[prior.slots] = x

@@ -8,6 +8,7 @@ speed; a target far from it is approached step by step.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,8 @@ class RunningOptions:
         surprise_bound: a larger surprise counts as this much: a push is no offset.
         rounds: Gauss-Newton steps.
     """
+
+    kind: ClassVar[str] = "deadbeat"
 
     tolerance: tuple[float, float] = tuned((0.02, 0.004), SPEED, LENGTH)
     change: tuple[float, float, float] = tuned((0.02, 0.15, 0.15))

@@ -24,7 +24,7 @@ from template_control.embedding.planners.regularised import (
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import PADDED, VLO
+from template_control.slip.maps.section import PADDED
 from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
@@ -114,7 +114,9 @@ class TransitionPlanner:
         u, end = solve_stride(from_section(self._map, z, prior.slots), wanted, prior, tolerance)
         return self._decision(u, end, wanted)
 
-    def land(self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]) -> Decision:
+    def land(
+        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+    ) -> Decision:
         """See :meth:`~.planner.Planner.land`."""
         o, controls = self.options, decision.controls
         stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE]
