@@ -276,7 +276,7 @@ class EmbeddingController:
             self.load.end_stride(nominal)
             self.trim.end_stride(section.padded(section.of(s.state)), nominal)
             self.lean.end_stride(nominal)
-        learnt = Learnt(self.load.factor, self.trim.acceleration)
+        learnt = Learnt(self.load.factor, self.trim.acceleration, self.lean.correction)
         node = self.planning.decide(section, s, self.time, learnt)
         self._enter(node.name)
         goal = self.reports[-1].goal

@@ -34,7 +34,7 @@ class EmbeddingOptions(QpOptions):
         replan: when a stride is planned anew.
         load: tuning of the load estimate.
         trim: tuning of the momentum trim.
-        lean: how far the trunk leans beyond ``trunk_pitch``'s strides, by speed.
+        lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
     """
 
     trunk_pitch: float = tuned(0.0)

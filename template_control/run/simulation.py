@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.apex_pose import apex_pose
 from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_route import robot_route
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.start import state_at_vlo, state_in
+from template_control.robot.start import Pose, state_at_vlo, state_in
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.record import Record
 from template_control.run.recorder import Recorder, Truth
@@ -118,11 +119,21 @@ def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array
         return state_in(robot, o.pose)
     z = route.start if o.start is None else np.array(o.start)
     if route.section == APEX:
-        return state_in(robot, apex_pose(controller, z[: APEX.dimension]))
+        return state_in(robot, _apex_pose(controller, z[: APEX.dimension]))
     # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
     swing = np.array([0.0, controller.options.swing.clearance])
     pitch = controller.options.trunk_pitch
     return state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
+
+
+def _apex_pose(controller: EmbeddingController, z: Array) -> Pose:
+    """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
+    planning, o = controller.planning, controller.options
+    planner, node = planning.begin(APEX)
+    gait = planner.gait
+    pitch = o.lean.pitch(gait.stride, float(z[0]), o.trunk_pitch)
+    swing = phase_control(o.phases, node).swing or o.swing
+    return apex_pose(controller.robot, ApexStart(z, gait, swing, pitch, planning.automaton))
 
 
 def _loop(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
@@ -35,10 +34,9 @@ class Lean:
         return float(np.interp(speed, self.speeds, self.pitches))
 
 
-# Running knees carry four times the weight.
-_LEANS = MappingProxyType(
-    {"r": Lean((2.0, 2.5, 3.0, 3.5, 4.0), (0.33, 0.34, 0.36, 0.40, 0.40), excess=0.1)}
-)
+def _leans() -> dict[str, Lean]:
+    # Running knees carry twice the weight on a leg that is far from straight.
+    return {"r": Lean((2.0, 2.5, 3.0, 3.5, 4.0), (0.33, 0.34, 0.36, 0.40, 0.40), excess=0.1)}
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class LeanOptions:
         bound: of the correction [rad].
     """
 
-    strides: Mapping[str, Lean] = field(default_factory=lambda: dict(_LEANS))
+    strides: Mapping[str, Lean] = field(default_factory=_leans)
     rate: float = tuned(0.1, RATE)
     gain: float = tuned(0.2)
     error_bound: float = tuned(0.05)

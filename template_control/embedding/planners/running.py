@@ -119,12 +119,11 @@ class RunningPlanner:
         base = near.controls[_SLOTS]
         scale = np.array([1.0, base[1], base[2]])
         top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
-        low, high = base[0] + o.angle_range[0], min(base[0] + o.angle_range[1], top)
-        low, high = min(max(low, angles[0]), high), max(min(high, angles[1]), low)
-        if angles[0] == angles[1]:
-            low = high = angles[0]
-        lower = np.array([low, o.stiffness_range[0] * base[1], o.stiffness_range[0] * base[2]])
-        upper = np.array([high, o.stiffness_range[1] * base[1], o.stiffness_range[1] * base[2]])
+        allowed = base[0] + np.array(o.angle_range)
+        low, high = np.clip(np.clip(np.minimum(allowed, top), *angles), -np.inf, top)
+        softest, stiffest = o.stiffness_range
+        lower = np.array([low, softest * base[1], softest * base[2]])
+        upper = np.array([high, stiffest * base[1], stiffest * base[2]])
         x = np.clip(base, lower, upper)
         u = near.controls.copy()
         effort = 1.0 / (np.array(o.change) * scale)

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from template_control.errors import GaitError
@@ -20,15 +19,7 @@ from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
-# By dx/dt at apex over sqrt(g l0): y at apex over l0, and k l0 / (m g). Low apexes and stiff legs
-# bend the knees least, which decides the torques; a slow run needs a softer leg to stay in the
-# air no higher than that.
-_SPEEDS = (0.383, 0.479, 0.639, 0.798, 0.958, 1.117, 1.277, 1.5965)
-_HEIGHTS = (0.98, 0.98, 0.977, 0.972, 0.97, 0.97, 0.97, 0.97)
-_STIFFNESSES = (17.8, 21.7, 28.0, 31.9, 34.4, 38.2, 40.8, 43.3)
-_height = PchipInterpolator(_SPEEDS, _HEIGHTS)
-_stiffness = PchipInterpolator(_SPEEDS, _STIFFNESSES)
-
+_SLOWEST, _FASTEST = 0.383, 1.597  # dx/dt at apex over sqrt(g l0): 1.2 to 5 m/s where l0 is 1 m
 _SCAN = 60
 _FLATTEST = np.radians(50.0)  # a leg that lands flatter would need a friction coefficient near 1
 _SAME = 1e-9  # of sqrt(g l0): speeds that are one
@@ -78,9 +69,27 @@ class RunningGait:
 
 
 def running_speeds(parameters: SlipParameters) -> tuple[float, float]:
-    """Slowest and fastest dx/dt at apex that :func:`running_gait` has a table for [m/s]."""
+    """Slowest and fastest dx/dt at apex of the family [m/s]."""
     unit = np.sqrt(parameters.gravity * parameters.rest_length)
-    return float(_SPEEDS[0] * unit), float(_SPEEDS[-1] * unit)
+    return float(_SLOWEST * unit), float(_FASTEST * unit)
+
+
+def suited_height(relative_speed: float) -> float:
+    """Height of the apex over l0 that suits dx/dt over sqrt(g l0).
+
+    The lower the apex, the less the knees bend and the smaller their torques. A slow run needs a
+    higher one to leave the ground.
+    """
+    return float(0.97 + 0.01 / (1.0 + np.exp((relative_speed - 0.69) / 0.06)))
+
+
+def suited_stiffness(relative_speed: float) -> float:
+    """k l0 / (m g) that suits dx/dt over sqrt(g l0).
+
+    The stiffer the leg, the less the knee bends; a leg that is too stiff for a slow run leaves it
+    no flight, and its apexes alternate.
+    """
+    return float(1.65 + (48.8 - 14.3 * relative_speed) * relative_speed)
 
 
 def running_gait(
@@ -95,13 +104,14 @@ def running_gait(
     Args:
         parameters: the template; its k0 is not used.
         speed: dx/dt at apex [m/s].
-        apex_height: y at apex [m]; by default one that suits the speed.
-        leg_stiffness: before and after the bottom [N/m]; by default one that suits the speed.
+        apex_height: y at apex [m]; by default :func:`suited_height`'s.
+        leg_stiffness: before and after the bottom [N/m]; by default
+            :func:`suited_stiffness`'s.
         name: of the gait.
 
     Raises:
-        GaitError: if the speed is beyond those that heights and stiffnesses are known for, or the
-            template has no such gait.
+        GaitError: naming the range, if the speed is out of it; and if the template has no such
+            gait.
     """
     p = parameters
     unit = np.sqrt(p.gravity * p.rest_length)
@@ -111,17 +121,17 @@ def running_gait(
             f"no running gait has {speed:g} m/s at its apex: give a speed from {low:.3g} to"
             f" {high:.3g} m/s"
         )
-    relative = float(np.clip(speed / unit, _SPEEDS[0], _SPEEDS[-1]))
+    relative = float(speed / unit)
     if apex_height is None:
-        apex_height = float(_height(relative)) * p.rest_length
+        apex_height = suited_height(relative) * p.rest_length
     if leg_stiffness is None:
-        leg_stiffness = float(_stiffness(relative)) * p.mass * p.gravity / p.rest_length
+        leg_stiffness = suited_stiffness(relative) * p.mass * p.gravity / p.rest_length
     z = np.array([speed, apex_height])
     angle = _symmetric_angle(p, z, leg_stiffness)
     if angle is None:
         raise GaitError(
             f"no running gait has {speed:g} m/s and {apex_height:g} m at its apex with legs of"
-            f" {leg_stiffness:g} N/m: leave height and stiffness to the table, or give other ones"
+            f" {leg_stiffness:g} N/m: give others, or neither"
         )
     u = controls(angle, leg_stiffness, leg_stiffness)
     stride = simulate_stride(p, STRIDE_START["r"], APEX.state(z), u)

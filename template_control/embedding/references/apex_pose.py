@@ -6,19 +6,21 @@ velocities that do not fit the gait cost a start far more torque than the gait i
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.phases import phase_control
-from template_control.embedding.references.swing_foot import SwingFoot
+from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions
 from template_control.errors import ParameterError
+from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, state_in
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Event, Reset
 from template_control.slip.dynamics.stride import StrideSimulator
+from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import APEX
 
 Array = NDArray[np.float64]
@@ -28,26 +30,44 @@ _REACH = 0.96  # of the leg: a straight knee may bend either way
 _TICK = 1e-3  # over which the references move on [s]; finer ones end in the same place
 
 
-def apex_pose(controller: EmbeddingController, z: Array) -> Pose:
-    """The pose at the apex that a run begins at, with both feet where their references are.
+@dataclass(frozen=True)
+class ApexStart:
+    """How a run begins at an apex.
+
+    Attributes:
+        state: (2,) dx/dt and y [m/s, m].
+        gait: its legs' swings are half over there.
+        swing: shape of the swings.
+        pitch: of the trunk [rad].
+        automaton: that the gait's stride is of.
+    """
+
+    state: Array
+    gait: Gait
+    swing: SwingOptions
+    pitch: float = 0.0
+    automaton: Automaton = AUTOMATON
+
+
+def apex_pose(robot: PlanarBiped, start: ApexStart) -> Pose:
+    """The pose at an apex, with both feet where the references of their swings are.
 
     A foot that stood in one stride swings through the next and lands in the one after that. So
     one swing passes two apexes: at the first it is the foot that has just stood, at the second the
     foot that is about to land.
 
     Args:
-        controller: with its planners and its options; its robot's last update is overwritten.
-        z: (2,) dx/dt and y at the apex [m/s, m].
+        robot: the model; its last update is overwritten.
+        start: what is wanted, scaled to the robot.
 
     Raises:
         RobotError: if the legs do not reach the pose.
         ParameterError: if the gait's legs do not take turns in the air.
     """
-    robot, o, planning = controller.robot, controller.options, controller.planning
-    planner, node = planning.begin(APEX)
-    gait, swing = planner.gait, phase_control(o.phases, node).swing or o.swing
-    simulator = StrideSimulator(gait.parameters, planning.automaton)
-    stride = simulator.run(node.name, APEX.state(gait.state), gait.controls)
+    gait, z = start.gait, start.state
+    simulator = StrideSimulator(gait.parameters, start.automaton)
+    node = start.automaton.start(gait.stride).name
+    stride = simulator.run(node, APEX.state(gait.state), gait.controls)
     if not any(event.reset is Reset.SWAP for event in stride.events):
         raise ParameterError(
             f"the legs of gait {gait.name!r} do not take turns: give SimulationOptions a pose"
@@ -55,7 +75,7 @@ def apex_pose(controller: EmbeddingController, z: Array) -> Pose:
     landing, liftoff = stride.time_of(Event.TOUCHDOWN), stride.time_of(Event.REAR_LIFTOFF)
     # The liftoff's exchange of roles has made the stance toe the front leg's.
     toe, period = float(stride.toes[1]), stride.duration
-    foot = SwingFoot(swing)
+    foot = SwingFoot(start.swing)
     foot.start(np.array([toe, 0.0]), np.zeros(2))
     feet, velocities = [], []
     now, due = liftoff, 2.0 * period + landing
@@ -72,7 +92,7 @@ def apex_pose(controller: EmbeddingController, z: Array) -> Pose:
         com_velocity=np.array([z[0], 0.0]),
         feet=np.array(feet[::-1]),
         feet_velocity=np.array(velocities[::-1]),
-        pitch=o.lean.pitch(gait.stride, float(gait.state[0]), o.trunk_pitch),
+        pitch=start.pitch,
         angular_momentum=0.0,
     )
     # Fast references run ahead of what the legs reach. Where the feet are hardly moves the hips.
