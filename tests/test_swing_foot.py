@@ -72,5 +72,5 @@ def test_a_foot_that_is_held_comes_down_late():
     np.testing.assert_allclose(heights[180:300], 0.15, atol=2e-3)
     assert heights[80] == pytest.approx(0.075, abs=5e-3), "half of the rise"
     assert heights[380] > 0.01
-    assert heights[-1] == pytest.approx(0.0, abs=2e-3)
+    assert 0.0 < heights[-1] < 0.01, "it coasts for the last moment"
     assert swing.y[1] == pytest.approx(-options.landing_speed, abs=1e-6)

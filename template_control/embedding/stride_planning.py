@@ -389,7 +389,7 @@ class StridePlanning:
         return report.section.mirror(report.section.of(past.state))
 
     def _landing_angle(self, node: Node, sensed: Sensed) -> float:
-        """The touchdown angle with which the template would have landed where the robot has [rad]."""
+        """The angle with which the template would have landed where the robot has [rad]."""
         if len(node.stance) == 1:
             return _flown_angle(sensed, self.parameters)
         # With a leg on the ground already, the guard compares heights: l0 sin(alpha) = y.

@@ -32,7 +32,7 @@ from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.flight import flight_share
-from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.scenario import Scenario
@@ -44,17 +44,17 @@ _LOG = logging.getLogger(__name__)
 _STEPS = 50  # of a run on a route that does not end, where the options do not say
 
 
-def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:
-    """The gait's VLO state with up to 5 % more or less speed and 2 % of l0 in height, drawn.
+def perturbed_start(gait: Gait, seed: int) -> tuple[float, float, float]:
+    """The gait's state at its section, changed by up to 5 % in speed and 2 % of l0 in height.
 
     Args:
-        gait: whose VLO state is changed.
+        gait: whose state is changed.
         seed: of the draws.
 
     Returns:
         dx/dt, y, dy/dt [m/s, m, m/s].
     """
-    z, length = gait.vlo, gait.parameters.rest_length
+    z, length = [*gait.state, 0.0][:3], gait.parameters.rest_length
     draw = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
     height = z[1] + 0.02 * draw[1] * length
     return float(z[0] * (1.0 + 0.05 * draw[0])), float(height), float(z[2])
