@@ -280,6 +280,7 @@ def _metadata(
         "plant": plant_name(o.plant),
         "options": _told(o),
         "fall_reason": reason,
+        "arrived": controller.planning.arrived,
         "wall_seconds": seconds,
         "duration": recorder.ticks * o.plant.time_step,
         "ticks": recorder.ticks,
