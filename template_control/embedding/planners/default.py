@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
+
+import numpy as np
 
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planners
-from template_control.embedding.planners.running import RunningPlanner
+from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.planners.transition import (
     RUN_TO_WALK,
     WALK_TO_RUN,
@@ -15,7 +18,22 @@ from template_control.embedding.planners.transition import (
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.section import APEX
-from template_control.slip.scenario.route import Route
+from template_control.slip.scenario.route import Route, ScenarioRoute
+from template_control.slip.similarity import Scale
+
+_STRIDE = 0.95  # duration of a running stride over sqrt(l0 / g)
+
+
+def _keeping_up(route: Route, gait: RunningGait) -> RunningOptions:
+    """Options with a pace that keeps up with the accelerations of a scenario."""
+    options = RunningOptions()
+    if not isinstance(route, ScenarioRoute):
+        return options
+    segments = route.scenario.segments
+    fastest = max((abs(s.acceleration) for s in segments if s.gait == "run"), default=0.0)
+    p = gait.parameters
+    needed = _STRIDE * fastest * np.sqrt(p.rest_length / p.gravity) / Scale.of(p).speed
+    return replace(options, pace=max(options.pace, float(needed)))
 
 
 def default_planners(route: Route) -> Planners:
@@ -38,7 +56,8 @@ def default_planners(route: Route) -> Planners:
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
     walk = LqrPlanner(walking_gait(p, speed))
-    run = RunningPlanner(runs(slowest))
+    first = runs(slowest)
+    run = RunningPlanner(first, _keeping_up(route, first))
     return {
         "w": walk,
         "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),

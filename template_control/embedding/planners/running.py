@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.embedding.planners.regularised import Prior, from_section, solve_stride
+from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, PADDED
@@ -23,7 +24,6 @@ from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
 Array = NDArray[np.float64]
 
 _SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]
-_COLUMNS = np.array(_SLOTS) + PADDED
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class RunningOptions:
     offset_gain: float = tuned(0.2)
     offset_bound: tuple[float, float] = tuned((0.3, 0.03), SPEED, LENGTH)
     surprise_bound: tuple[float, float] = tuned((0.06, 0.008), SPEED, LENGTH)
-    rounds: int = tuned(3)
+    rounds: int = tuned(4)
 
 
 class RunningPlanner:
@@ -102,9 +102,11 @@ class RunningPlanner:
                 np.clip(wanted[1], z[1] - o.climb, z[1] + o.climb),
             ]
         )
-        u, end, outcome = self._search(z, aim, near, angles)
-        completed = outcome is Outcome.SECTION
-        predicted = APEX.padded(end) + self.offset
+        prior = self._prior(z, near, angles)
+        derivatives = from_section(self._map, z, prior.slots)
+        u, end = solve_stride(derivatives, aim - self.offset[:2], prior, np.array(o.tolerance))
+        completed = end is not None
+        predicted = APEX.padded(z if end is None else end) + self.offset
         at_target = bool(np.all(np.abs(wanted - aim) < 1e-9))
         return Decision(u, predicted, completed, completed, completed and at_target)
 
@@ -114,40 +116,19 @@ class RunningPlanner:
             return self._family.at(float(wanted[0]))
         return self._family.at(self._grid * round(float(z[0]) / self._grid))
 
-    def _search(
-        self, z: Array, aim: Array, near: RunningGait, angles: tuple[float, float]
-    ) -> tuple[Array, Array, Outcome]:
-        """Controls, the apex they lead to on the template, and how the stride ends."""
+    def _prior(self, z: Array, near: RunningGait, angles: tuple[float, float]) -> Prior:
+        """Controls of the near gait, and how far from them the stride's may be."""
         o, p = self.options, self.gait.parameters
         base = near.controls[_SLOTS]
-        scale = np.array([1.0, base[1], base[2]])
         top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
         allowed = base[0] + np.array(o.angle_range)
         low, high = np.clip(np.clip(np.minimum(allowed, top), *angles), -np.inf, top)
         softest, stiffest = o.stiffness_range
         lower = np.array([low, softest * base[1], softest * base[2]])
         upper = np.array([high, stiffest * base[1], stiffest * base[2]])
-        x = np.clip(base, lower, upper)
-        u = near.controls.copy()
-        effort = 1.0 / (np.array(o.change) * scale)
-        tolerance = np.array(o.tolerance)
-        for _ in range(o.rounds):
-            u[_SLOTS] = x
-            result, jacobian, outcome = self._map.derivatives(z, u, _COLUMNS)
-            if outcome is not Outcome.SECTION:
-                break
-            errors = (result[:2] + self.offset[:2] - aim) / tolerance
-            rows = np.vstack((jacobian[:2] / tolerance[:, None], np.diag(effort)))
-            residual = np.concatenate((errors, (x - base) * effort))
-            x = _bounded_step(rows, residual, x, lower, upper)
-        u[_SLOTS] = x
-        end, outcome = self._map.step(z, u)
-        if outcome is not Outcome.SECTION:
-            u[_SLOTS] = np.clip(base, lower, upper)
-            end, outcome = self._map.step(z, u)
-        if outcome is not Outcome.SECTION:
-            end = z
-        return u, end, outcome
+        change = np.array(o.change) * [1.0, base[1], base[2]]
+        start = np.clip(base, lower, upper)
+        return Prior(near.controls, _SLOTS, start, change, lower, upper, o.rounds)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal strides teach."""
@@ -157,21 +138,3 @@ class RunningPlanner:
         limit, bound = np.array(o.surprise_bound), np.array(o.offset_bound)
         surprise = np.clip(z - decision.predicted[:2], -limit, limit)
         self.offset[:2] = np.clip(self.offset[:2] + o.offset_gain * surprise, -bound, bound)
-
-
-def _bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Array) -> Array:
-    """x + dx with the least |rows dx + residual| between the bounds.
-
-    A variable that would leave its bounds is held there, and the others are solved for again.
-    """
-    free = upper > lower
-    step = np.clip(x, lower, upper) - x
-    for _ in range(len(x)):
-        left = residual + rows @ np.where(free, 0.0, step)
-        step[free] = -np.linalg.lstsq(rows[:, free], left, rcond=None)[0]
-        beyond = free & ((x + step < lower) | (x + step > upper))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(x + step, lower, upper)[beyond] - x[beyond]
-        free &= ~beyond
-    return np.clip(x + step, lower, upper)

@@ -6,7 +6,7 @@ controller ask the same question at each section they come to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -233,10 +233,14 @@ class ScenarioRoute:
 
     Args:
         scenario: the profile.
+        apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(
+        self, scenario: Scenario, apex_height: Callable[[float], float] | None = None
+    ) -> None:
         self.scenario = scenario
+        self._apex_height = apex_height or (lambda speed: scenario.apex_height)
         self.parameters = scenario.parameters
         self.section = VLO
         self.start = np.array(scenario.start, dtype=float)
@@ -280,7 +284,8 @@ class ScenarioRoute:
         # A transition aims at where the profile begins, the others at where they will end.
         ahead = 0.0 if kind in _TRANSITIONS else here.duration.get(kind, self._guess)
         speed = here.wanted(segment, now + ahead)
-        target = (speed, s.apex_height) if segment.gait == "run" else (speed, *s.vlo)
+        runs = segment.gait == "run"
+        target = (speed, self._apex_height(speed)) if runs else (speed, *s.vlo)
         goal = StrideGoal(kind, np.array(target), speed, here.index, self._then(kind, here.index))
         return replace(here, last=(kind, now)), goal
 
