@@ -14,6 +14,7 @@ from .embedding.options import EmbeddingOptions as EmbeddingOptions
 from .embedding.planners.lqr import LqrOptions as LqrOptions
 from .embedding.planners.lqr import LqrPlanner as LqrPlanner
 from .embedding.planners.modified import ModifiedPlanner as ModifiedPlanner
+from .embedding.planners.running import RunningPlanner as RunningPlanner
 from .embedding.robot_template import default_gait as default_gait
 from .embedding.robot_template import template_for as template_for
 from .errors import TemplateControlError as TemplateControlError
@@ -37,6 +38,7 @@ from .slip.dynamics.stride import simulate_stride as simulate_stride
 from .slip.gaits.gait import gait_at as gait_at
 from .slip.gaits.gait import gait_for_speed as gait_for_speed
 from .slip.gaits.gait import gait_from_energy as gait_from_energy
+from .slip.gaits.running_gait import running_gait as running_gait
 from .slip.maps.return_map import ReturnMap as ReturnMap
 from .slip.parameters import SlipParameters as SlipParameters
 from .slip.scenario.route import ScenarioRoute as ScenarioRoute

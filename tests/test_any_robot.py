@@ -145,6 +145,18 @@ def test_human_has_the_masses_and_lengths_of_the_issue():
     assert robot.leg_length == pytest.approx(0.441 + 0.513)
 
 
+def test_runner_is_built_as_five_link_is():
+    robot, model = load_robot("runner"), load_robot("five-link").model
+    assert robot.mass == pytest.approx(65.0)
+    for own, other in zip(robot.model.inertias, model.inertias, strict=True):
+        assert own.mass == pytest.approx(65.0 / 80.0 * other.mass)
+        np.testing.assert_allclose(own.lever, other.lever)
+        assert own.inertia[1, 1] == pytest.approx(65.0 / 80.0 * other.inertia[1, 1], rel=1e-4)
+    assert robot.leg_length == pytest.approx(0.9)
+    np.testing.assert_array_equal(robot.torque_limit, 400.0)
+    np.testing.assert_array_equal(robot.velocity_limit, 23.0)
+
+
 def test_rabbit_has_its_published_mass():
     robot = load_robot("rabbit")
     assert robot.mass == pytest.approx(32.0)

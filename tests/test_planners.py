@@ -107,7 +107,7 @@ def test_unreachable_state_is_said(planner, gait):
     assert not decision.nominal
 
 
-NOTHING = Learnt(load=1.0, trim=0.0)
+NOTHING = Learnt(load=1.0, trim=0.0, lean=0.0)
 
 
 def planned(gait, options=None):

@@ -9,7 +9,7 @@ from matplotlib.image import imread
 import template_control as tc
 from template_control.cli.main import main
 from template_control.slip.maps.section import VLO
-from template_control.view.figures import FIGURES
+from template_control.view.figures import figures_of
 from template_control.view.state_figures import phase_portrait, section_states, template_energies
 
 
@@ -52,7 +52,7 @@ def test_every_run_has_every_figure(record, gait, kind, tmp_path):
         record = cut(record, 2 if kind == "two samples" else 150)
         assert record.steps == 0
     paths = tc.save_figures(record, tmp_path)
-    assert [path.stem for path in paths] == list(FIGURES)
+    assert [path.stem for path in paths] == list(figures_of(record))
     for path in paths:
         picture = imread(path)[..., :3]
         assert np.mean(picture.min(axis=2) < 0.8) > 0.005, f"{path} is empty"
@@ -61,7 +61,7 @@ def test_every_run_has_every_figure(record, gait, kind, tmp_path):
 def test_the_command_draws_beside_the_run(record, tmp_path, capfd):
     run = record.save(tmp_path / "run.npz")
     assert main(["plots", str(run)]) == 0
-    beside = [tmp_path / f"{name}.png" for name in FIGURES]
+    beside = [tmp_path / f"{name}.png" for name in figures_of(record)]
     assert capfd.readouterr().out.split() == [str(path) for path in beside]
     assert all(path.is_file() for path in beside)
 
@@ -70,7 +70,7 @@ def test_the_command_draws_beside_the_run(record, tmp_path, capfd):
 def test_the_command_draws_elsewhere(record, tmp_path):
     run = record.save(tmp_path / "run.npz")
     assert main(["plots", str(run), "--output", str(tmp_path / "new" / "folder")]) == 0
-    assert len(list((tmp_path / "new" / "folder").glob("*.png"))) == len(FIGURES)
+    assert len(list((tmp_path / "new" / "folder").glob("*.png"))) == len(figures_of(record))
 
 
 @pytest.mark.parametrize(

@@ -59,3 +59,18 @@ def test_swing_falls_to_ground_that_comes_late():
     assert swing.y[0] == pytest.approx(-0.2 * 0.05 - 0.5 * options.drop_acceleration * 0.05**2)
     assert swing.x[0] == 0.6
     assert swing.x[1] == 0.0
+
+
+def test_a_foot_that_is_held_comes_down_late():
+    options = SwingOptions(clearance=0.15, rise=0.4, descent=0.1, landing_speed=0.6)
+    swing = SwingFoot(options)
+    swing.start(np.array([-0.6, 0.0]), np.zeros(2))
+    heights = []
+    for i in range(400):
+        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
+        heights.append(swing.y[0])
+    np.testing.assert_allclose(heights[180:300], 0.15, atol=2e-3)
+    assert heights[80] == pytest.approx(0.075, abs=5e-3), "half of the rise"
+    assert heights[380] > 0.01
+    assert 0.0 < heights[-1] < 0.01, "it coasts for the last moment"
+    assert swing.y[1] == pytest.approx(-options.landing_speed, abs=1e-6)

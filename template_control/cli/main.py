@@ -36,6 +36,14 @@ _COMMANDS = {
         "template_control.cli.walk",
         "walk a robot that follows the SLIP template, headless, and report",
     ),
+    "run": _Command(
+        "template_control.cli.run",
+        "run a robot that follows the SLIP template, headless, and report",
+    ),
+    "go": _Command(
+        "template_control.cli.go",
+        "take a robot through a scenario of gaits and speeds, the template beside it",
+    ),
     "robots": _Command(
         "template_control.cli.robots",
         "list the shipped robots, with the template scaled to each",

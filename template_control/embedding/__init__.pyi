@@ -1,5 +1,7 @@
 from .controller import EmbeddingController as EmbeddingController
 from .guards import GuardOptions as GuardOptions
+from .learners.lean import Lean as Lean
+from .learners.lean import LeanOptions as LeanOptions
 from .learners.load import LoadOptions as LoadOptions
 from .learners.momentum_trim import TrimOptions as TrimOptions
 from .options import EmbeddingOptions as EmbeddingOptions
@@ -13,6 +15,10 @@ from .planners.modified import ModifiedOptions as ModifiedOptions
 from .planners.modified import ModifiedPlanner as ModifiedPlanner
 from .planners.planner import Decision as Decision
 from .planners.planner import Planner as Planner
+from .planners.running import RunningOptions as RunningOptions
+from .planners.running import RunningPlanner as RunningPlanner
+from .references.apex_pose import ApexStart as ApexStart
+from .references.apex_pose import apex_pose as apex_pose
 from .references.leg_forces import UnloadOptions as UnloadOptions
 from .references.swing_foot import SwingOptions as SwingOptions
 from .references.template_path import PathOptions as PathOptions

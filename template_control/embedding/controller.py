@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.guards import PLACED, RobotGuards
+from template_control.embedding.learners.lean import TrunkLean
 from template_control.embedding.learners.load import LoadEstimate
 from template_control.embedding.learners.momentum_trim import MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
@@ -95,6 +96,7 @@ class EmbeddingController:
         self.qp = WholeBodyQp(robot, o)
         self.load = LoadEstimate(o.load, robot.gravity)
         self.trim = MomentumTrim(self.parameters, o.trim)
+        self.lean = TrunkLean(o.lean, o.trunk_pitch)
         self.wanted = Wanted(pitch=o.trunk_pitch)
         self.feet = Feet(o.swing, self.wanted.foot)
         self.reference = self.wanted.com
@@ -106,7 +108,7 @@ class EmbeddingController:
         self._rear_shift = 0.0
         self._sensed = Sensed(swing_time=self.feet.swing_time)
         self._guards = RobotGuards(self.parameters, o.guards)
-        self._stations = stations(automaton, robot.nv, o.phases)
+        self._stations = stations(automaton, robot.nv, o.phases, o.swing)
         self.station = next(iter(self._stations.values()))
 
     @property
@@ -135,6 +137,11 @@ class EmbeddingController:
         """Where the template's rear toe is in the world: at the foot, if that stands [m]."""
         return float(self._sensed.toes[0]) if self.station.stance else self.planning.toe
 
+    def first_pitch(self) -> float:
+        """Of the trunk where the route begins [rad]."""
+        goal = self.planning.first_goal()
+        return self.options.lean.pitch(goal, self.options.trunk_pitch)
+
     def start(self, rear: int = 0) -> None:
         """Begin where the route begins; the robot's model must be up to date.
 
@@ -148,7 +155,8 @@ class EmbeddingController:
         """
         section = self.planning.route.section
         planner, node = self.planning.begin(section)
-        self.station = self._stations[node.name]
+        self.lean.reset()
+        self._enter(node.name)
         self.feet.begin(rear)
         self._sensed.feet = self.feet.of
         for leg in self.station.control.swings:
@@ -215,7 +223,7 @@ class EmbeddingController:
         """Go along an edge: roles and swings of the feet, plan, node."""
         before, stood = self.station, self._standing()
         self.planning.pass_event(edge.event)
-        self.station = self._stations[str(edge.target)]
+        self._enter(str(edge.target))
         self.feet.apply(edge.reset)
         self._sensed.feet = self.feet.of
         lifted = stood - self._standing()
@@ -229,11 +237,20 @@ class EmbeddingController:
             self.planning.stand_on(rear)
         if self.station.control.momentum_speed is not before.control.momentum_speed:
             self._sense_speed()
+        if lifted and not self.station.stance:
+            # No force moves the CoM now: its path, and all footholds on it, are certain.
+            self.planning.follow(self.node, s, self.time)
+            self._on_new_path()
         placed = PLACED.get(edge.reset)
         if placed is not None:
             self._land(placed)
         if edge.section:
             self._decide(section_of(edge.event))
+
+    def _enter(self, node: str) -> None:
+        self.station = self._stations[node]
+        for swing in self.feet.swing:
+            swing.options = self.station.swing
 
     def _standing(self) -> set[int]:
         return {self.feet.of[leg] for leg in self.station.stance}
@@ -254,7 +271,10 @@ class EmbeddingController:
             self._rear_shift = float(back - moved)
             s.toes[Leg.REAR] += self._rear_shift
         self.ground, s.state[1] = ground, height
-        self.planning.follow(self.node, s, self.time)
+        if self.station.control.lands:
+            self.planning.land(self.node, s, self.time)
+        else:
+            self.planning.follow(self.node, s, self.time)
         self._on_new_path()
 
     def _decide(self, section: Section) -> None:
@@ -263,9 +283,11 @@ class EmbeddingController:
             nominal = self.reports[-1].decision.nominal
             self.load.end_stride(nominal)
             self.trim.end_stride(section.padded(section.of(s.state)), nominal)
-        learnt = Learnt(self.load.factor, self.trim.acceleration)
+            self.lean.end_stride(nominal)
+        learnt = Learnt(self.load.factor, self.trim.acceleration, self.lean.correction)
         node = self.planning.decide(section, s, self.time, learnt)
-        self.station = self._stations[node.name]
+        self._enter(node.name)
+        self.lean.aim(self.reports[-1].goal)
         self.trim.expect(self.planning.path if self.station.trimmed else None, self.planner.gait)
         self._on_new_path()
 
@@ -334,6 +356,7 @@ class EmbeddingController:
         wanted.com_now[0] -= s.toes[0]
         wanted.com_push = self.trim.acceleration if station.control.trims else 0.0
         wanted.pitch_now[0], wanted.pitch_now[1] = q[_PITCH], v[_PITCH]
+        wanted.pitch = self.lean.advance(q[_PITCH], dt)
         wanted.feet = self.feet.of
         station.tasks.write(self.robot, wanted)
         if station.control.weighs and station.com is not None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from template_control.embedding.guards import GuardOptions
+from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.learners.load import LoadOptions
 from template_control.embedding.learners.momentum_trim import TrimOptions
 from template_control.embedding.phases import PHASES, PhaseControl
@@ -33,6 +34,7 @@ class EmbeddingOptions(QpOptions):
         replan: when a stride is planned anew.
         load: tuning of the load estimate.
         trim: tuning of the momentum trim.
+        lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
     """
 
     trunk_pitch: float = tuned(0.0)
@@ -43,3 +45,4 @@ class EmbeddingOptions(QpOptions):
     replan: ReplanOptions = field(default_factory=ReplanOptions)
     load: LoadOptions = field(default_factory=LoadOptions)
     trim: TrimOptions = field(default_factory=TrimOptions)
+    lean: LeanOptions = field(default_factory=LeanOptions)

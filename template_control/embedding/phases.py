@@ -7,14 +7,16 @@ gait brings entries of its own where the ones below do not serve it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.foot_task import FootTask
+from template_control.whole_body.momentum_task import MomentumTask
 from template_control.whole_body.posture_task import PostureTask
 from template_control.whole_body.task import Task
 
@@ -42,6 +44,9 @@ class PhaseControl:
             left to lift off with.
         weighs: whether the load estimate observes this phase.
         trims: whether the momentum trim acts in this phase.
+        swing: shape of the swings in this phase; None: that of the controller's options.
+        lands: whether the stiffnesses that are still free are chosen again as the phase begins,
+            from where the foot has landed.
     """
 
     tasks: tuple[Task, ...]
@@ -51,10 +56,27 @@ class PhaseControl:
     unloads: tuple[Leg, ...] = ()
     weighs: bool = True
     trims: bool = False
+    swing: SwingOptions | None = None
+    lands: bool = False
 
 
 Phases = Mapping[Phase | str, PhaseControl]
 """What each phase needs. A key is a phase or a node's name; the node's entry comes first."""
+
+# A running leg folds high and comes down late: a foot that sinks all the way touches early, while
+# the CoM still rises, and straightens the knee into its stop.
+_RUNNING_SWING = SwingOptions(
+    clearance=0.15, rise=0.4, descent=0.14, landing_speed=0.6, leg_share=0.975
+)
+# Ground forces are several times the weight: the trunk is turned by angular momentum.
+_RUNNING_STANCE = PhaseControl(
+    tasks=(ComTask((0.01, 10.0)), MomentumTask(130.0, 20.0, 0.26), FootTask(Leg.FRONT)),
+    swings=(Leg.FRONT,),
+    swing=_RUNNING_SWING,
+)
+
+# As in walking, but a stride that is made once has nothing to be trimmed by.
+_LEAVING_THE_GROUND = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,))
 
 PHASES: Phases = {
     Phase.F: PhaseControl(
@@ -64,7 +86,10 @@ PHASES: Phases = {
         clock=Clock.TIME,
         momentum_speed=False,
         weighs=False,
+        swing=_RUNNING_SWING,
     ),
+    "SS_sc^r": replace(_RUNNING_STANCE, lands=True),
+    "SS_sd^r": _RUNNING_STANCE,
     Phase.SS: PhaseControl(
         # Height before the swing foot: near VLO its pull on the ground would need more normal
         # force than the template has there. A point foot cannot change the momentum about
@@ -75,8 +100,14 @@ PHASES: Phases = {
     Phase.DS: PhaseControl(
         tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,), trims=True
     ),
+    "DS_sc^wr": replace(_LEAVING_THE_GROUND, lands=True),
+    "DS_sd^wr": _LEAVING_THE_GROUND,
+    "SS_sc^wr": _RUNNING_STANCE,
+    "SS_sd^wr": _RUNNING_STANCE,
+    "SS_sc^rw": replace(_RUNNING_STANCE, lands=True),
+    "SS_sd^rw": _RUNNING_STANCE,
 }
-"""What walking needs in each phase; running and transitions may start from it."""
+"""What walking and running need in each phase; transitions may start from it."""
 
 
 def phase_control(phases: Phases, node: Node) -> PhaseControl:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.gaits.walking_family import speed_range
 from template_control.slip.scenario.route import ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
+
+_RANGES = {"walk": speed_range, "run": running_speeds}
+_WHERE = {"walk": "at VLO", "run": "at apex"}
 
 
 def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
@@ -21,25 +27,24 @@ def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
         ScenarioError: if a segment runs, or wants a speed at VLO that no walking gait has.
     """
     own = scenario.on(template_for(robot))
-    slowest, fastest = speed_range(own.parameters)
     for number, segment in enumerate(own.segments, 1):
-        if segment.gait != "walk":
-            raise ScenarioError(
-                f"segment {number} is to {segment.gait}, and robots only walk so far: leave it"
-                " out, or run the scenario on the template with template-control slip"
-            )
+        slowest, fastest = _RANGES[segment.gait](own.parameters)
         for speed in _speeds(segment):
             if not slowest <= speed <= fastest:
                 raise ScenarioError(
-                    f"segment {number} wants {speed:g} m/s at VLO: {robot.name} walks from"
-                    f" {slowest:.3g} to {fastest:.3g} m/s"
+                    f"segment {number} wants to {segment.gait} at {speed:g} m/s:"
+                    f" {robot.name} can {segment.gait} from {slowest:.3g} to {fastest:.3g} m/s"
+                    f" {_WHERE[segment.gait]}"
                 )
+    slowest, fastest = speed_range(own.parameters)
     if not slowest <= own.start[0] <= fastest:
         raise ScenarioError(
             f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from {slowest:.3g} to"
             f" {fastest:.3g} m/s"
         )
-    return ScenarioRoute(own)
+    p = own.parameters
+    unit = float(np.sqrt(p.gravity * p.rest_length))
+    return ScenarioRoute(own, lambda speed: suited_height(speed / unit) * p.rest_length)
 
 
 def _speeds(segment: Segment) -> list[float]:

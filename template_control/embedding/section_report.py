@@ -21,10 +21,12 @@ class Learnt:
     Attributes:
         load: the load factor.
         trim: the momentum trim [m/s^2].
+        lean: what the trunk's reference adds to the wanted mean pitch [rad].
     """
 
     load: float
     trim: float
+    lean: float
 
 
 @dataclass(frozen=True)

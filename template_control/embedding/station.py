@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from template_control.embedding.guards import PLACED
 from template_control.embedding.phases import PhaseControl, Phases, phase_control
+from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.embedding.references.template_path import LOCATE, Locate
 from template_control.errors import ParameterError
+from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Leg, Phase
 from template_control.whole_body.com_task import ComTask
@@ -31,6 +33,7 @@ class Station:
         ways: edges to other nodes, in order.
         stance: legs that carry.
         swings: legs in the air that have a foothold to go to.
+        swing: shape of their swings.
         locate: finds the robot's place on the path.
         cap: (len(stance),) largest normal force of each stance foot, inf without [N]; the
             controller overwrites those of the legs that unload.
@@ -45,24 +48,30 @@ class Station:
     ways: tuple[Edge, ...]
     stance: tuple[int, ...]
     swings: tuple[int, ...]
+    swing: SwingOptions
     locate: Locate
     cap: Array
     awaited: Leg | None
     trimmed: bool
 
 
-def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station]:
+def stations(
+    automaton: Automaton, nv: int, phases: Phases, swing: SwingOptions
+) -> dict[str, Station]:
     """Make a station for each node, by its name.
 
     Args:
         automaton: whose nodes.
         nv: degrees of freedom of the robot.
-        phases: what the controller does in each phase.
+        phases: what the controller does in each phase. Entries for nodes of the library's
+            automaton may stand in it, whatever ``automaton`` is.
+        swing: shape of the swings where an entry has none of its own.
 
     Raises:
         ParameterError: if a node has no entry, or an entry is for no node.
     """
-    strangers = [key for key in phases if key not in automaton.index and key not in list(Phase)]
+    known = {*automaton.index, *AUTOMATON.index}
+    strangers = [key for key in phases if key not in known and key not in list(Phase)]
     if strangers:
         raise ParameterError(
             f"the phases have an entry for {strangers[0]!r}, which is no node and no Phase: nodes"
@@ -87,6 +96,7 @@ def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station
             # Plain numbers: an enumeration's members are slow to index with.
             stance=tuple(int(leg) for leg in node.stance),
             swings=tuple(int(leg) for leg in control.swings),
+            swing=control.swing or swing,
             locate=LOCATE[control.clock],
             cap=np.full(len(node.stance), np.inf),
             awaited=PLACED[touchdown.reset] if touchdown is not None else None,

@@ -24,7 +24,7 @@ from template_control.embedding.sensing import Sensed
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
-from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot
+from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
@@ -34,6 +34,7 @@ from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 Array = NDArray[np.float64]
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
+_NEWTON = 4
 
 
 @dataclass(frozen=True)
@@ -117,10 +118,19 @@ class StridePlanning:
             planner.reset()
         self.reports.clear()
         self.arrived = False
-        goal = self.route.ahead(section, self.route.start, 0.0)
+        goal = self.first_goal()
+        return self.planner_of(goal), self.automaton.start(goal.stride)
+
+    def first_goal(self) -> StrideGoal:
+        """The stride that the route begins with.
+
+        Raises:
+            ParameterError: if the route is empty.
+        """
+        goal = self.route.ahead(self.route.section, self.route.start, 0.0)
         if goal is None:
             raise ParameterError("the route ends where it begins: give one with a stride")
-        return self.planner_of(goal), self.automaton.start(goal.stride)
+        return goal
 
     @property
     def planner(self) -> Planner:
@@ -221,21 +231,64 @@ class StridePlanning:
         u = report.decision.controls.copy()
         u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
         self.reaching = angle_drop > 0.0
-        first = self._simulator.run(node.name, state, u, toes)
+        start = node.name
+        first = self._simulator.run(start, state, u, toes)
         strides = [first]
-        if first.completed:
-            # The next foothold must be known when the swing begins, before the next section.
-            section = section_of(self.automaton.sections(node.name)[1])
-            z = section.of(first.state)
-            goal = self.route.ahead(section, z, now + first.duration) or report.goal
+        # The next foothold must be known when the swing begins, before the next section. Where
+        # no foot stands, the second one's is still further.
+        more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
+        at = now
+        while more and strides[-1].completed:
+            last = strides[-1]
+            at += last.duration
+            section = section_of(self.automaton.sections(start)[1])
+            z = section.of(last.state)
+            goal = self.route.ahead(section, z, at) or report.goal
             ahead = self.planner_of(goal).decide(z, goal.target)
             start = self.automaton.start(goal.stride).name
-            toes = (float(first.toes[0]), float(first.toes[1]))
-            strides.append(self._simulator.run(start, first.state, ahead.controls, toes))
+            toes = (float(last.toes[0]), float(last.toes[1]))
+            strides.append(self._simulator.run(start, last.state, ahead.controls, toes))
+            more -= 1
         self.path = join(strides, self.options.path)
         self._feet = sensed.feet
         self._planned_at = now
         self._look_ahead(0)
+
+    def land(self, node: Node, sensed: Sensed, now: float) -> None:
+        """A foot has landed: choose again what is still free, from where it did.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            now: time [s].
+        """
+        report = self.reports[-1]
+        if hasattr(self.planner, "land"):
+            toes = (float(sensed.toes[0]), float(sensed.toes[1]))
+            state = sensed.state.copy()
+            end = section_of(self.automaton.sections(node.name)[1])
+
+            def ahead(u: Array) -> tuple[Array, Outcome]:
+                stride = self._simulator.run(node.name, state, u, toes)
+                return end.of(stride.state), stride.outcome
+
+            free = sorted(
+                {
+                    int(slot)
+                    for later in self.automaton.stride(node.name)
+                    for slot in (later.rear, later.front)
+                    if slot is not None
+                }
+            )
+            decision = self.planner.land(ahead, report.decision, report.goal.target, free)
+            self.reports[-1] = replace(report, decision=decision)
+        else:
+            z = self._back_to_section(self.automaton.start(report.goal.stride), report, sensed)
+            if z is not None:
+                angle = self._landing_angle(node, sensed)
+                decision = self.planner.decide(z, report.goal.target, (angle, angle))
+                self.reports[-1] = replace(report, decision=decision)
+        self.follow(node, sensed, now)
 
     def due(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
@@ -334,3 +387,28 @@ class StridePlanning:
         if not past.completed:
             return None
         return report.section.mirror(report.section.of(past.state))
+
+    def _landing_angle(self, node: Node, sensed: Sensed) -> float:
+        """The angle with which the template would have landed where the robot has [rad]."""
+        if len(node.stance) == 1:
+            return _flown_angle(sensed, self.parameters)
+        # With a leg on the ground already, the guard compares heights: l0 sin(alpha) = y.
+        return float(np.arcsin(min(sensed.state[1] / self.parameters.rest_length, 1.0)))
+
+
+def _flown_angle(sensed: Sensed, parameters: SlipParameters) -> float:
+    """Angle of the template's leg as it comes to l0 on the ballistic path through the robot [rad].
+
+    The robot's foot meets the ground a little before or after.
+    """
+    x, y, dx, dy = sensed.state.tolist()
+    x -= float(sensed.toes[0])
+    time = 0.0
+    for _ in range(_NEWTON):
+        px, py, speed = x + dx * time, y + dy * time - 0.5 * parameters.gravity * time**2, dy
+        speed -= parameters.gravity * time
+        slope = 2.0 * (px * dx + py * speed)
+        if slope >= 0.0:
+            break
+        time -= (px**2 + py**2 - parameters.rest_length**2) / slope
+    return float(np.arctan2(py, -px))

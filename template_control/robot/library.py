@@ -36,6 +36,7 @@ class _Entry:
 
 _ENTRIES = {
     "five-link": _Entry("five_link.urdf", "light legs, as robots built for the SLIP have them"),
+    "runner": _Entry("runner.urdf", "five-link of 65 kg with actuators for 5 m/s"),
     "human": _Entry(
         "human.urdf", "Winter's fractions of 80 kg and 1.80 m", walk=(np.radians(66.0), 0.303)
     ),

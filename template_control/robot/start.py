@@ -13,6 +13,7 @@ from template_control.robot.requirements import BASE_DOF
 
 Array = NDArray[np.float64]
 
+_SHORT = 0.15  # of a step of Newton's method [rad]
 _OUTPUTS = 7  # CoM (2), trunk (1), both feet (4)
 
 
@@ -25,7 +26,9 @@ class Pose:
         feet: (2, 2) lowest points of rear and front foot [m].
         feet_velocity: (2, 2) [m/s].
         rear: the foot that is the rear leg's.
-        pitch: of the trunk, at rest [rad].
+        pitch: of the trunk [rad].
+        angular_momentum: about the CoM [N m s]; the trunk turns so that the robot has it. None: the
+            trunk is at rest.
         momentum_speed: dx/dt of the CoM is meant to include the angular momentum about the
             CoM: it is the momentum about the foot below, over m y.
     """
@@ -36,6 +39,7 @@ class Pose:
     feet_velocity: Array
     rear: int = 0
     pitch: float = 0.0
+    angular_momentum: float | None = None
     momentum_speed: bool = False
 
 
@@ -51,6 +55,29 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
 
     Raises:
         RobotError: if the legs do not reach, or joints would be beyond their limits.
+    """
+    height = pose.com[1]
+    # From far away Newton's full step may bend a knee the wrong way; short ones do not.
+    for longest in (np.inf, _SHORT):
+        q = _configuration(robot, pose, longest)
+        limits = robot.model
+        within = np.all((q >= limits.lowerPositionLimit) & (q <= limits.upperPositionLimit))
+        if within:
+            break
+    if not np.all(np.isfinite(q)):
+        raise RobotError(f"{robot.name}: the legs do not reach a CoM height of {height:g} m")
+    if not within:
+        raise RobotError(f"{robot.name}: a start at height {height:g} m needs joints beyond limits")
+    return q, _velocity(robot, pose, q)
+
+
+def _configuration(robot: PlanarBiped, pose: Pose, longest: float) -> Array:
+    """(nv,) q of a pose, NaN where it is not found.
+
+    Args:
+        robot: the model; its last update is overwritten.
+        pose: what is wanted.
+        longest: step of Newton's method, the largest change of any joint [rad].
     """
     stance, swing = pose.rear, 1 - pose.rear
     height = pose.com[1]
@@ -97,25 +124,29 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
         robot.update(q, zero)
         error = residual()
         if np.max(np.abs(error)) < 1e-12:
-            break
-        q -= np.linalg.solve(jacobian(), error)
-    else:
-        raise RobotError(f"{robot.name}: the legs do not reach a CoM height of {height:g} m")
-    limits = robot.model
-    if np.any(q < limits.lowerPositionLimit) or np.any(q > limits.upperPositionLimit):
-        raise RobotError(f"{robot.name}: a start at height {height:g} m needs joints beyond limits")
+            return q
+        step = np.linalg.solve(jacobian(), error)
+        q -= step * min(1.0, longest / np.max(np.abs(step)))
+    return np.full(robot.nv, np.nan)
 
+
+def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:
+    """(nv,) v of a pose at its configuration ``q``; the robot is updated to both."""
+    stance, swing = pose.rear, 1 - pose.rear
     rows = np.zeros((_OUTPUTS, robot.nv))
     rows[0:2] = robot.com_jacobian
     if pose.momentum_speed:
-        rows[0] += _angular_momentum_row(robot, q) / (robot.mass * height)
-    rows[2, 2] = 1.0
+        rows[0] += _angular_momentum_row(robot, q) / (robot.mass * pose.com[1])
+    if pose.angular_momentum is None:
+        rows[2, 2] = 1.0
+    else:
+        rows[2] = _angular_momentum_row(robot, q)
     rows[3:5] = robot.foot_jacobian[stance]
     rows[5:7] = robot.foot_jacobian[swing]
-    wanted = [*pose.com_velocity, 0.0, *pose.feet_velocity.ravel()]
+    wanted = [*pose.com_velocity, pose.angular_momentum or 0.0, *pose.feet_velocity.ravel()]
     v = np.linalg.solve(rows, wanted)
     robot.update(q, v)
-    return q, v
+    return v
 
 
 def state_at_vlo(

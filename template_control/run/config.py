@@ -17,9 +17,11 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from template_control import settings, storage
+from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.robot_template import default_gait, paper_gait, template_for
@@ -31,9 +33,11 @@ from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
 from template_control.slip.gaits.gait import WalkingGait, gait_for_speed
+from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.gaits.walking_family import walking_gait
-from template_control.slip.scenario.route import Route
+from template_control.slip.scenario.route import ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.similarity import REFERENCE
 
 
 @dataclass(frozen=True)
@@ -76,30 +80,41 @@ class RobotChoice:
         return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
 
 
+_GAIT_NUMBERS = {
+    "walk": ("speed", "touchdown_angle"),
+    "paper": (),
+    "run": ("speed", "apex_height"),
+}
+_RUN = 3.0 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length))
+
+
 @dataclass(frozen=True)
 class GaitChoice:
     """Which gait of the robot's template.
 
     Attributes:
-        name: "walk", the robot's own; or "paper", the equilibrium of Section IV-D.
-        speed: mean forward speed instead of the walk's own [m/s].
-        touchdown_angle: from the ground to the leg, instead of the walk's own [deg].
+        name: "walk", the robot's own; "paper", the equilibrium of Section IV-D; or "run".
+        speed: of a walk the mean forward speed, instead of its own; of a run dx/dt at apex
+            [m/s]; None: 3 m/s for l0 = 1 m.
+        touchdown_angle: of a walk, from the ground to the leg, instead of its own [deg].
+        apex_height: of a run [m]; None: one that suits its speed.
 
     Raises:
-        ParameterError: if the paper's gait is given a speed or an angle.
+        ParameterError: if a gait is given what it does not have.
     """
 
-    name: Literal["walk", "paper"] = "walk"
+    name: Literal["walk", "paper", "run"] = "walk"
     speed: float | None = None
     touchdown_angle: float | None = None
+    apex_height: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("speed", "touchdown_angle"):
-            if getattr(self, name) is not None and self.name != "walk":
+        for name in ("speed", "touchdown_angle", "apex_height"):
+            if getattr(self, name) is not None and name not in _GAIT_NUMBERS[self.name]:
                 words = name.replace("_", " ")
                 raise ParameterError(f"{words} does not go with gait {self.name}: leave one out")
 
-    def of(self, robot: PlanarBiped) -> WalkingGait:
+    def of(self, robot: PlanarBiped) -> WalkingGait | RunningGait:
         """The gait on a robot's template.
 
         Args:
@@ -108,6 +123,12 @@ class GaitChoice:
         Raises:
             GaitError: if the template has no such gait.
         """
+        if self.name == "run":
+            template = template_for(robot)
+            speed = self.speed
+            if speed is None:
+                speed = _RUN * float(np.sqrt(template.gravity * template.rest_length))
+            return running_gait(template, speed, self.apex_height)
         if self.name == "paper":
             return paper_gait(template_for(robot))
         angle = None if self.touchdown_angle is None else float(np.radians(self.touchdown_angle))
@@ -129,7 +150,7 @@ class OwnPlanner:
 
     path: str
 
-    def make(self, gait: WalkingGait) -> Planner:
+    def make(self, gait: WalkingGait | RunningGait) -> Planner:
         """The planner.
 
         Args:
@@ -140,7 +161,7 @@ class OwnPlanner:
         """
         module, _, name = self.path.partition(":")
         if not (module and name):
-            raise ParameterError(f"planner {self.path!r}: give lqr, modified or module:Class")
+            raise ParameterError(f"planner {self.path!r}: give the name of one, or module:Class")
         folder = os.getcwd()
         if folder not in sys.path:
             sys.path.insert(0, folder)
@@ -171,7 +192,7 @@ class OwnPlanner:
 
 _PLANNER_MEMBERS = ("gait", "offset", "reset", "decide", "observe")
 
-PlannerChoice = LqrOptions | ModifiedOptions | OwnPlanner
+PlannerChoice = LqrOptions | ModifiedOptions | RunningOptions | OwnPlanner
 """Which planner, with its tuning."""
 
 
@@ -180,14 +201,14 @@ class Ready(NamedTuple):
 
     Attributes:
         robot: the model.
-        gait: that the robot walks, or begins with.
+        gait: that the robot keeps, or begins with.
         route: the scenario on the robot; None: the gait is kept.
         planners: one for each kind of stride.
     """
 
     robot: PlanarBiped
-    gait: WalkingGait
-    route: Route | None
+    gait: WalkingGait | RunningGait
+    route: ScenarioRoute | None
     planners: Planners
 
     def run(
@@ -202,9 +223,9 @@ class Ready(NamedTuple):
         Raises:
             TemplateControlError: if the robot cannot start so.
         """
-        (planner,) = self.planners.values()
-        planners = None if self.route is None else self.planners
-        return simulate(self.robot, self.route or planner, options, progress, planners)
+        if self.route is None:
+            return simulate(self.robot, self.planners[self.gait.stride], options, progress)
+        return simulate(self.robot, self.route, options, progress, self.planners)
 
 
 @dataclass(frozen=True)
@@ -243,19 +264,27 @@ class RunConfig:
         """
         robot = self.robot.load()
         ready(WALK)  # before the gait is looked for, which would compile a part of it alone
-        route: Route | None = None
         if self.scenario is None:
             gait = self.gait.of(robot)
-        else:
-            route = robot_route(robot, self.scenario)
-            gait = walking_gait(route.parameters, float(route.start[0]))
-        return Ready(robot, gait, route, {gait.stride: self._planner(gait)})
+            return Ready(robot, gait, None, {gait.stride: self._planner(gait)})
+        route = robot_route(robot, self.scenario)
+        walk = walking_gait(route.parameters, float(route.start[0]))
+        planners = default_planners(route)
+        return Ready(robot, walk, route, {**planners, walk.stride: self._planner(walk)})
 
-    def _planner(self, gait: WalkingGait) -> Planner:
+    def _planner(self, gait: WalkingGait | RunningGait) -> Planner:
         if isinstance(self.planner, OwnPlanner):
             return self.planner.make(gait)
+        if isinstance(gait, RunningGait) != isinstance(self.planner, RunningOptions):
+            raise ParameterError(
+                f"planner {self.planner.kind} does not plan gait {gait.name}: leave one out"
+            )
+        if isinstance(gait, RunningGait):
+            assert isinstance(self.planner, RunningOptions)
+            return RunningPlanner(gait, self.planner)
         if isinstance(self.planner, ModifiedOptions):
             return ModifiedPlanner(gait, self.planner)
+        assert isinstance(self.planner, LqrOptions)
         return LqrPlanner(gait, self.planner)
 
     def save(self, path: str | Path) -> Path:
@@ -278,4 +307,4 @@ class RunConfig:
         return settings.read(cls, path)
 
 
-_HEAD = "# template-control walk --config FILE repeats this run.\n"
+_HEAD = "# template-control walk --config FILE repeats this run; so does run, for a run.\n"

@@ -64,9 +64,10 @@ class SimulationOptions:
         plant: the world; the type of its options says which. Or a plant of one's own: the run
             resets it, and leaves it open.
         embedding: the controller's tuning.
-        start: (3,) VLO state to start in [m/s, m, m/s]; None for the route's.
-        pose: CoM and feet to start with; None: over the stance foot at VLO. A route that
-            begins at another section needs it.
+        start: (3,) dx/dt, y, dy/dt to start in [m/s, m, m/s], dy/dt 0 at apex; None for the
+            route's.
+        pose: CoM and feet to start with; None: over the stance foot at VLO, and at apex with the
+            feet where the gait has them. A stride in which one leg lands again and again needs it.
         pushes: disturbances.
         sensors: noise on the state the controller gets; the plant and the record have the
             true one.

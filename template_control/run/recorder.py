@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +34,30 @@ class Truth(NamedTuple):
     v: Array
     contact_force: Array
     push: float
+
+
+class _Errors:
+    """Template less robot, over the ticks of one sort [m]."""
+
+    def __init__(self) -> None:
+        self.ticks = 0
+        self._squares = [0.0, 0.0]
+        self._most = [0.0, 0.0]
+
+    def add(self, x: float, y: float) -> None:
+        self.ticks += 1
+        for axis, error in enumerate((x, y)):
+            self._squares[axis] += error * error
+            self._most[axis] = max(self._most[axis], abs(error))
+
+    @property
+    def rms(self) -> dict[str, float]:
+        x, y = (sqrt(square / max(self.ticks, 1)) for square in self._squares)
+        return {"x": x, "y": y}
+
+    @property
+    def most(self) -> dict[str, float]:
+        return {"x": float(self._most[0]), "y": float(self._most[1])}
 
 
 class Recorder:
@@ -84,9 +108,11 @@ class Recorder:
         self.rows = 0
         self.ticks = 0
         self.peak_torque = np.zeros(nu)
+        self.peak_speed = np.zeros(nu)
+        self._work = 0.0
+        self._before = 0.0
         self._torque_square = np.zeros(nu)
-        self._error_square = [0.0, 0.0]
-        self.error_max = [0.0, 0.0]
+        self._errors = {"stance": _Errors(), "flight": _Errors()}
         self._nearly = 0.999 * controller.qp.torque_limit
         self.saturated = 0
         self.failures = 0
@@ -105,13 +131,15 @@ class Recorder:
         size = np.abs(torque)
         np.maximum(self.peak_torque, size, out=self.peak_torque)
         self._torque_square += torque * torque
+        speed = v[BASE_DOF:]
+        np.maximum(self.peak_speed, np.abs(speed), out=self.peak_speed)
+        self._work += float(np.abs(torque * speed).sum()) * (time - self._before)
+        self._before = time
         self.saturated += bool((size >= self._nearly).any())
         self.failures += not solution.solved
         template_x, template_y = c.template_com
         x, y = r.com.tolist()
-        for axis, error in enumerate((template_x - x, template_y - y)):
-            self._error_square[axis] += error * error
-            self.error_max[axis] = max(self.error_max[axis], abs(error))
+        self._errors["stance" if c.station.stance else "flight"].add(template_x - x, template_y - y)
         if self.ticks == len(self._times):
             self._times = np.concatenate((self._times, np.empty_like(self._times)))
         self._times[self.ticks] = seconds, solution.solve_seconds
@@ -142,24 +170,29 @@ class Recorder:
             self.rows += 1
         self.ticks += 1
 
-    def _rms(self, squares: Sequence[float] | Array) -> list[float]:
-        return [float(x) for x in np.sqrt(np.asarray(squares) / max(self.ticks, 1))]
-
     def summary(self) -> dict[str, Any]:
         """Statistics over all ticks, sampled or not."""
         names = self.controller.robot.joint_names
-        rms = self._rms(self._torque_square)
+        rms = np.sqrt(self._torque_square / max(self.ticks, 1)).tolist()
         limit = self.controller.qp.torque_limit
-        error_rms = self._rms(self._error_square)
+        stance, flight = self._errors["stance"], self._errors["flight"]
         return {
             "joint_torque": {
                 name: {"peak": float(p), "rms": t, "limit": float(lim)}
                 for name, p, t, lim in zip(names, self.peak_torque, rms, limit, strict=True)
             },
+            "joint_speed": {
+                name: {"peak": float(p), "limit": float(lim)}
+                for name, p, lim in zip(
+                    names, self.peak_speed, self.controller.robot.velocity_limit, strict=True
+                )
+            },
+            "joint_work": self._work,
             "saturated_share": self.saturated / max(self.ticks, 1),
             "qp_failures": self.failures,
-            "com_error_rms": {"x": error_rms[0], "y": error_rms[1]},
-            "com_error_max": {"x": float(self.error_max[0]), "y": float(self.error_max[1])},
+            "com_error_rms": stance.rms,
+            "com_error_max": stance.most,
+            "com_error_flight_rms": flight.rms if flight.ticks else None,
         }
 
     def record(self, metadata: dict[str, Any]) -> Record:

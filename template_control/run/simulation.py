@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.section_report import SectionReport
 from template_control.errors import ParameterError
@@ -22,15 +24,16 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.start import state_at_vlo, state_in
+from template_control.robot.start import Pose, state_at_vlo, state_in
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.record import Record, RunInterrupted
 from template_control.run.recorder import Recorder, Truth
 from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.gaits.gait import WalkingGait
-from template_control.slip.maps.section import VLO
+from template_control.slip.gaits.flight import flight_share
+from template_control.slip.gaits.gait import Gait
+from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.scenario import Scenario
 
@@ -41,17 +44,17 @@ _LOG = logging.getLogger(__name__)
 _STEPS = 50  # of a run on a route that does not end, where the options do not say
 
 
-def perturbed_start(gait: WalkingGait, seed: int) -> tuple[float, float, float]:
-    """The gait's VLO state with up to 5 % more or less speed and 2 % of l0 in height, drawn.
+def perturbed_start(gait: Gait, seed: int) -> tuple[float, float, float]:
+    """The gait's state at its section, changed by up to 5 % in speed and 2 % of l0 in height.
 
     Args:
-        gait: whose VLO state is changed.
+        gait: whose state is changed.
         seed: of the draws.
 
     Returns:
         dx/dt, y, dy/dt [m/s, m, m/s].
     """
-    z, length = gait.vlo, gait.parameters.rest_length
+    z, length = [*gait.state, 0.0][:3], gait.parameters.rest_length
     draw = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
     height = z[1] + 0.02 * draw[1] * length
     return float(z[0] * (1.0 + 0.05 * draw[0])), float(height), float(z[2])
@@ -124,21 +127,29 @@ def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array
     """(q, v) that the run begins in.
 
     Raises:
-        ParameterError: if the route does not begin at VLO and no pose is given.
+        ParameterError: if the route begins at an apex of a stride whose legs do not take turns,
+            and no pose is given.
     """
     robot, route = controller.robot, controller.planning.route
     if o.pose is not None:
         return state_in(robot, o.pose)
-    if route.section != VLO:
-        raise ParameterError(
-            f"the route begins at {route.section.name}, and only at VLO it is clear where the"
-            " feet are: give SimulationOptions a pose"
-        )
-    z = np.array(o.start) if o.start is not None else route.start
+    z = route.start if o.start is None else np.array(o.start)
+    if route.section == APEX:
+        return state_in(robot, _apex_pose(controller, z[: APEX.dimension]))
     # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
     swing = np.array([0.0, controller.options.swing.clearance])
-    pitch = controller.options.trunk_pitch
+    pitch = controller.first_pitch()
     return state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
+
+
+def _apex_pose(controller: EmbeddingController, z: Array) -> Pose:
+    """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
+    planning, o = controller.planning, controller.options
+    planner, node = planning.begin(APEX)
+    gait = planner.gait
+    pitch = controller.first_pitch()
+    swing = phase_control(o.phases, node).swing or o.swing
+    return apex_pose(controller.robot, ApexStart(z, gait, swing, pitch, planning.automaton))
 
 
 def _loop(
@@ -256,6 +267,7 @@ def _metadata(
         "mass": robot.mass,
         "joints": list(robot.joint_names),
         "torque_limit": controller.qp.torque_limit.tolist(),
+        "velocity_limit": robot.velocity_limit.tolist(),
         "feet": list(robot.feet),
         "legs": [list(leg) for leg in robot.legs],
         "trunk_com": robot.trunk_com,
@@ -266,11 +278,13 @@ def _metadata(
         "template": parameters,
         "gait_state": gait.state.tolist(),
         "gait_controls": gait.controls.tolist(),
+        "gait_flight_share": flight_share(gait, controller.planning.automaton),
         "gait_mean_speed": gait.step_length / gait.step_duration,
         "planner": type(controller.planner).__name__,
         "plant": plant_name(o.plant),
         "options": _told(o),
         "fall_reason": reason,
+        "arrived": controller.planning.arrived,
         "wall_seconds": seconds,
         "duration": recorder.ticks * o.plant.time_step,
         "ticks": recorder.ticks,

@@ -8,12 +8,55 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.run.record import Record
+from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.maps.section import section_of
 
 Array = NDArray[np.float64]
 
 
-def _state(z: Array) -> dict[str, float]:
-    return {"speed": float(z[0]), "height": float(z[1]), "vertical_speed": float(z[2])}
+_STATE = ("speed", "height", "vertical_speed")
+_LAST = 50  # strides that a gait is judged by
+
+
+def _sections(record: Record) -> dict[str, Any]:
+    """Target of the last section's kind, and the mean of the last strides that ended there."""
+    names = record.metadata["sections"]
+    last = record.section[-1]
+    kind = section_of(Event[names[last]])
+    here = record.section_state[1:][record.section[1:] == last][-_LAST:]
+    # The stride that begins at the last section has not ended.
+    targets = record.section_target[:-1][record.section[1:] == last]
+    target = targets[-1] if len(targets) else record.section_target[-1]
+
+    def state(z: Array) -> dict[str, float]:
+        return dict(zip(_STATE, z[: kind.dimension].tolist(), strict=False))
+
+    return {
+        f"{names[last].lower()}_target": state(target),
+        f"{names[last].lower()}_mean_last_{_LAST}": state(here.mean(axis=0)) if len(here) else None,
+    }
+
+
+def _flight_share(record: Record) -> dict[str, float | None]:
+    """Share of the time without a foot on the ground, of the robot and of its gait."""
+    touching = record.contact_force[:, :, 1] > 0.0
+    return {
+        "robot": float(np.mean(~touching.any(axis=1))),
+        "template": record.metadata.get("gait_flight_share"),  # earlier versions did not keep it
+    }
+
+
+def _duty_factor(record: Record) -> float:
+    """Share of the time that a foot is on the ground, mean of both."""
+    return float(np.mean(record.contact_force[:, :, 1] > 0.0))
+
+
+def _cost_of_transport(record: Record, walked: float) -> float | None:
+    """Work of the joints, positive and negative alike, over m g and distance."""
+    m = record.metadata
+    work = m["summary"].get("joint_work")  # earlier versions did not keep it
+    weight = m["mass"] * m["template"]["gravity"]
+    return work / (weight * walked) if work is not None and walked > 0.0 else None
 
 
 def _speed_error(record: Record) -> float | None:
@@ -36,11 +79,16 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
 
     Returns:
         robot, gait, steps, fell, fall_reason, duration, mean_speed, vlo_target and
-        vlo_mean_last_50 (speed, height, vertical_speed), speed_error_rms (of dx/dt where
-        strides end, against their targets), com_error_rms and com_error_max
-        (x, y), joint_torque (per joint peak, rms, limit), saturated_share, qp_failures,
-        control_tick_seconds and qp_solve_seconds (median, p99), plan_seconds (median, p99),
-        real_time_factor, steps_not_nominal (plans that left the planner's own law), record.
+        vlo_mean_last_50 (speed, height, vertical_speed), or where the run ends at an apex
+        apex_target and apex_mean_last_50 (speed, height), speed_error_rms (of dx/dt where
+        strides end, against their targets), com_error_rms and com_error_max (x, y, while a foot is
+        to stand), com_error_flight_rms (x, y; None without flight), joint_torque (per joint peak,
+        rms, limit), joint_speed (per joint peak, limit), saturated_share, qp_failures,
+        cost_of_transport (work of the joints, all counted positive, over m g and distance),
+        flight_share (robot, template: of the gait), duty_factor (share of the time that a foot is
+        on the ground), control_tick_seconds and qp_solve_seconds (median, p99), plan_seconds
+        (median, p99), real_time_factor, steps_not_nominal (plans that left the planner's own law),
+        record.
     """
     m = record.metadata
     duration = m["duration"]
@@ -53,12 +101,12 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "fall_reason": m["fall_reason"] or None,
         "duration": duration,
         "mean_speed": walked / max(float(record.time[-1]), 1e-9),
-        "vlo_target": _state(record.section_target[-1]),
-        "vlo_mean_last_50": _state(record.section_state[1:][-50:].mean(axis=0))
-        if record.steps
-        else None,
+        **_sections(record),
         "speed_error_rms": _speed_error(record),
-        **m["summary"],
+        **{name: value for name, value in m["summary"].items() if name != "joint_work"},
+        "cost_of_transport": _cost_of_transport(record, walked),
+        "flight_share": _flight_share(record),
+        "duty_factor": _duty_factor(record),
         "control_tick_seconds": _quantiles(record.tick_seconds),
         "qp_solve_seconds": _quantiles(record.solve_seconds),
         "plan_seconds": _quantiles(record.plan_seconds),

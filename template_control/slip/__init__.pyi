@@ -36,6 +36,10 @@ from .gaits.gait import gait_at as gait_at
 from .gaits.gait import gait_for_speed as gait_for_speed
 from .gaits.gait import gait_from_energy as gait_from_energy
 from .gaits.gait_branch import Family as Family
+from .gaits.running_gait import RunningFamily as RunningFamily
+from .gaits.running_gait import RunningGait as RunningGait
+from .gaits.running_gait import running_gait as running_gait
+from .gaits.running_gait import running_speeds as running_speeds
 from .gaits.stability import Kind as Kind
 from .gaits.stability import closed_loop_eigenvalues as closed_loop_eigenvalues
 from .gaits.walking_family import WalkingFamily as WalkingFamily

@@ -1,9 +1,10 @@
-"""Figures of a recorded walk: stick diagram, CoM, joint torques, ground forces, and all others."""
+"""Figures of a recorded run: stick diagram, CoM, joint torques, ground forces, and all others."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib as mpl
@@ -14,7 +15,9 @@ from numpy.typing import NDArray
 
 from template_control.errors import ParameterError, RecordError
 from template_control.run.record import Record
+from template_control.slip.automaton.vocabulary import Event
 from template_control.view.figure_file import save_figure
+from template_control.view.running_figures import apex_return, joint_speeds, turning
 from template_control.view.state_figures import (
     energies,
     phase_portrait,
@@ -179,13 +182,28 @@ FIGURES: dict[str, Callable[[Record], Figure]] = {
     "stick_diagram": stick_diagram,
     "com": com_tracking,
     "torques": joint_torques,
+    "joint_speeds": joint_speeds,
     "forces": ground_forces,
     "phase_portrait": phase_portrait,
     "tracking": tracking_errors,
     "energies": energies,
     "sections": section_states,
+    "turning": turning,
+    "apex_return": apex_return,
 }
-"""Every figure of a walk, by file name."""
+"""Every figure of a run, by file name."""
+
+
+def figures_of(record: Record) -> dict[str, Callable[[Record], Figure]]:
+    """The figures that have something to show of a run: apexes need two that follow each other.
+
+    Args:
+        record: the run.
+    """
+    names = [record.metadata["sections"][i] for i in record.section]
+    if (Event.APEX.name, Event.APEX.name) in pairwise(names):
+        return FIGURES
+    return {name: draw for name, draw in FIGURES.items() if draw is not apex_return}
 
 
 def plot(record: Record, figure: str = "stick_diagram") -> Figure:
@@ -198,14 +216,17 @@ def plot(record: Record, figure: str = "stick_diagram") -> Figure:
         figure: name of the figure.
 
     Raises:
-        ParameterError: if there is no such figure.
+        ParameterError: if there is no such figure of this run.
         RecordError: if the run has no samples.
     """
-    if figure not in FIGURES:
-        raise ParameterError(f"there is no figure {figure!r}: give one of {', '.join(FIGURES)}")
     _check_samples(record)
+    known = figures_of(record)
+    if figure not in known:
+        raise ParameterError(
+            f"there is no figure {figure!r} of this run: give one of {', '.join(known)}"
+        )
     with _style():
-        return FIGURES[figure](record)
+        return known[figure](record)
 
 
 def _style() -> AbstractContextManager[None]:
@@ -218,7 +239,7 @@ def _check_samples(record: Record) -> None:
 
 
 def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Path]:
-    """Draw all :data:`FIGURES` of a run as PNG.
+    """Draw the :data:`FIGURES` of a run as PNG, those that :func:`figures_of` names.
 
     Args:
         record: the run.
@@ -234,6 +255,6 @@ def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Pat
     _check_samples(record)
     paths = []
     with _style():
-        for name, draw in FIGURES.items():
+        for name, draw in figures_of(record).items():
             paths.append(save_figure(draw(record), Path(folder) / f"{name}.png", dpi))
     return paths

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
-from template_control.slip.maps.section import Section, section_of
+from template_control.slip.maps.section import PADDED, VLO, Section, section_of
 from template_control.slip.parameters import SlipParameters
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, shade, window
 
@@ -87,6 +87,8 @@ def phase_portrait(record: Record) -> Figure:
         )  # fmt: skip
         seen = record.section_state[:, 1 if axis else 0], record.section_state[:, 2]
         planned = seen if axis else (np.zeros(len(rows)), seen[0])
+        if not (axis or _sections(record)[-1] is VLO):
+            continue  # only at VLO it is known how far ahead of the foot the CoM is
         axes.plot(
             *planned, "o", color=RIGHT, fillstyle="none", markersize=4, zorder=4,
             label=f"{where} state of the planner",
@@ -214,20 +216,23 @@ def section_states(record: Record) -> Figure:
     target = np.vstack((record.section_target[:1], record.section_target[:-1]))
     sections = _sections(record)
     steps = np.arange(len(state))
-    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
-    panels = figure.subplots(4, 1, sharex=True)
     common: dict[str, Any] = {"linewidth": 0.9, "markersize": 3.5}
     energy = (
         _energies_at(record, sections, state),
         _energies_at(record, sections[1:], expected),
         _energies_at(record, sections, target),
     )
-    for axes, (values, predicted, wanted), least, name in (
-        (panels[0], (state[:, 0], expected[:, 0], target[:, 0]), 0.005, "dx/dt [m/s]"),
-        (panels[1], (state[:, 1], expected[:, 1], target[:, 1]), 0.001, "y [m]"),
-        (panels[2], (state[:, 2], expected[:, 2], target[:, 2]), 0.005, "dy/dt [m/s]"),
-        (panels[3], energy, 1.0, "energy [J]"),
-    ):
+    shown = [
+        ((state[:, 0], expected[:, 0], target[:, 0]), 0.005, "dx/dt [m/s]"),
+        ((state[:, 1], expected[:, 1], target[:, 1]), 0.001, "y [m]"),
+        ((state[:, 2], expected[:, 2], target[:, 2]), 0.005, "dy/dt [m/s]"),
+        (energy, 1.0, "energy [J]"),
+    ]
+    if all(section.dimension < PADDED for section in sections):
+        del shown[2]  # zero at every apex
+    figure = Figure(figsize=(9.0, 1.75 * len(shown)), layout="constrained")
+    panels = figure.subplots(len(shown), 1, sharex=True)
+    for axes, ((values, predicted, wanted), least, name) in zip(panels, shown, strict=True):
         axes.step(
             steps, wanted, where="mid", color=LEFT, linewidth=1.0, linestyle=":", label="target"
         )

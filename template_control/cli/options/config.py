@@ -27,16 +27,17 @@ def add_config(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def config_from(options: argparse.Namespace) -> RunConfig:
+def config_from(options: argparse.Namespace, default: RunConfig) -> RunConfig:
     """The run that was asked for, but for what needs its gait: see :func:`prepared`.
 
     Args:
         options: as parsed, of all groups of this folder.
+        default: what holds where neither an option nor a file says otherwise.
 
     Raises:
         TemplateControlError: naming the option or the key that is wrong.
     """
-    base = RunConfig() if options.config is None else RunConfig.load(options.config)
+    base = default if options.config is None else RunConfig.load(options.config)
     scenario = scenario_choice(options, base.scenario)
     return RunConfig(
         robot=robot_choice(options, base.robot),
@@ -47,16 +48,19 @@ def config_from(options: argparse.Namespace) -> RunConfig:
     )
 
 
-def prepared(options: argparse.Namespace) -> tuple[RunConfig, Ready]:
+def prepared(
+    options: argparse.Namespace, default: RunConfig | None = None
+) -> tuple[RunConfig, Ready]:
     """The run that was asked for, and what it is made of.
 
     Args:
         options: as parsed, of all groups of this folder.
+        default: what holds where neither an option nor a file says otherwise; None: the walk.
 
     Raises:
         TemplateControlError: naming the option or the key that is wrong.
     """
-    config = config_from(options)
+    config = config_from(options, default or RunConfig())
     if options.seed is not None and config.scenario is not None:
         raise ParameterError("--seed does not go with a scenario: leave one out")
     ready = config.prepare()

@@ -16,7 +16,7 @@ from template_control.slip.scenario.scenario import Scenario, load_scenario
 
 _PLANNERS = {options.kind: options for options in (LqrOptions, ModifiedOptions)}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)}
-_RANGES = {"speed": (0.01, 10.0), "touchdown_angle": (1.0, 89.0)}
+_RANGES = {"speed": (0.01, 10.0), "touchdown_angle": (1.0, 89.0), "apex_height": (0.01, 10.0)}
 
 
 def add_gait_options(parser: argparse.ArgumentParser) -> None:
@@ -49,6 +49,20 @@ def add_gait_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_running_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--speed`` and ``--apex`` of a run."""
+    parser.add_argument(
+        "--speed", type=float, metavar="M/S", help="at apex; 3 m/s for l0 = 1 m if not given"
+    )
+    parser.add_argument(
+        "--apex",
+        dest="apex_height",
+        type=float,
+        metavar="M",
+        help="height of the apex; one that suits the speed if not given",
+    )
+
+
 def add_planner_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--planner`` and ``--map``."""
     parser.add_argument(
@@ -76,8 +90,8 @@ def gait_choice(options: argparse.Namespace, base: GaitChoice) -> GaitChoice:
         ParameterError: if a number is out of its range, or the options do not go together.
     """
     check_ranges(options, _RANGES)
-    given = {name: getattr(options, name) for name in _RANGES}
-    given["name"] = options.gait
+    given = {name: getattr(options, name, None) for name in ("name", *_RANGES)}
+    given["name"] = getattr(options, "gait", None)
     return replace(base, **{name: value for name, value in given.items() if value is not None})
 
 
@@ -91,7 +105,8 @@ def scenario_choice(options: argparse.Namespace, base: Scenario | None) -> Scena
     Raises:
         ScenarioError: if it cannot be read.
     """
-    return base if options.scenario is None else load_scenario(options.scenario)
+    path = getattr(options, "scenario", None)
+    return base if path is None else load_scenario(path)
 
 
 def planner_choice(options: argparse.Namespace, base: PlannerChoice) -> PlannerChoice:
@@ -105,6 +120,8 @@ def planner_choice(options: argparse.Namespace, base: PlannerChoice) -> PlannerC
         ParameterError: if there is no such planner, or it takes no map.
     """
     chosen = base
+    if not hasattr(options, "planner"):
+        return chosen
     if options.planner in _PLANNERS and options.planner != base.kind:
         chosen = _PLANNERS[options.planner]()
     elif options.planner is not None and options.planner not in _PLANNERS:

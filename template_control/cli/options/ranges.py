@@ -13,7 +13,8 @@ Ranges = Mapping[str, tuple[float, float]]
 
 
 def check_ranges(options: argparse.Namespace, ranges: Ranges) -> None:
-    """Refuse numbers out of their range; options that were not given are left alone.
+    """Refuse numbers out of their range; options that were not given, or that the command
+    does not have, are left alone.
 
     Args:
         options: as parsed.
@@ -23,7 +24,7 @@ def check_ranges(options: argparse.Namespace, ranges: Ranges) -> None:
         ParameterError: naming the option and its range.
     """
     for name, (low, high) in ranges.items():
-        value = getattr(options, name)
+        value = getattr(options, name, None)
         if value is not None and not (math.isfinite(value) and low <= value <= high):
             flag = "--" + name.replace("_", "-")
             raise ParameterError(f"{flag} is {value:g}: give a number from {low:g} to {high:g}")

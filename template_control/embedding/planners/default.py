@@ -2,19 +2,65 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planners
+from template_control.embedding.planners.running import RunningOptions, RunningPlanner
+from template_control.embedding.planners.transition import (
+    RUN_TO_WALK,
+    WALK_TO_RUN,
+    TransitionPlanner,
+)
+from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_family import walking_gait
-from template_control.slip.scenario.route import Route
+from template_control.slip.maps.section import APEX
+from template_control.slip.scenario.route import Route, ScenarioRoute
+from template_control.slip.similarity import Scale
+
+_STRIDE = 0.95  # duration of a running stride over sqrt(l0 / g)
+
+
+def _keeping_up(route: Route, gait: RunningGait) -> RunningOptions:
+    """Options with a pace that keeps up with the accelerations of a scenario."""
+    options = RunningOptions()
+    if not isinstance(route, ScenarioRoute):
+        return options
+    segments = route.scenario.segments
+    fastest = max((abs(s.acceleration) for s in segments if s.gait == "run"), default=0.0)
+    p = gait.parameters
+    needed = _STRIDE * fastest * np.sqrt(p.rest_length / p.gravity) / Scale.of(p).speed
+    return replace(options, pace=max(options.pace, float(needed)))
 
 
 def default_planners(route: Route) -> Planners:
-    """A planner for every kind of stride that the library can plan on a robot: walking steps.
+    """A planner for every kind of stride that the library can plan on a robot.
+
+    That is walking steps for a route that begins at VLO, and running ones for one at an apex.
 
     Args:
         route: whose template and first target they are for.
 
     Raises:
-        GaitError: if there is no walking gait at the speed the route begins with.
+        GaitError: if there is no gait at the speed the route begins with.
     """
-    return {"w": LqrPlanner(walking_gait(route.parameters, float(route.start[0])))}
+    p, speed = route.parameters, float(route.start[0])
+    slowest, fastest = running_speeds(p)
+
+    def runs(speed: float) -> RunningGait:
+        return running_gait(p, min(max(speed, slowest), fastest))
+
+    if route.section == APEX:
+        return {"r": RunningPlanner(runs(speed))}
+    walk = LqrPlanner(walking_gait(p, speed))
+    first = runs(slowest)
+    run = RunningPlanner(first, _keeping_up(route, first))
+    return {
+        "w": walk,
+        "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
+        "r": run,
+        "rw": TransitionPlanner("rw", run, partial(walking_gait, p), RUN_TO_WALK),
+    }

@@ -26,7 +26,10 @@ class SwingOptions:
     """Shape of the swing.
 
     Attributes:
-        clearance: height of the foot at mid-swing [m].
+        clearance: height of the foot from its highest point on [m].
+        rise: share of the swing in which the foot rises to its clearance.
+        descent: the foot keeps its clearance until this long before touchdown [s]; None: it comes
+            down as soon as it is up.
         landing_speed: downward speed at touchdown [m/s]. The foot meets the ground for certain
             and not hard.
         horizon: below this time to go [s] the path is no longer re-aimed; the quintic's
@@ -39,6 +42,8 @@ class SwingOptions:
     """
 
     clearance: float = tuned(0.05, LENGTH)
+    rise: float = tuned(0.5)
+    descent: float | None = tuned(None, TIME)
     landing_speed: float = tuned(0.2, SPEED)
     horizon: float = tuned(0.02, TIME)
     early: float = tuned(0.01, TIME)
@@ -80,6 +85,7 @@ class SwingFoot:
         reference: (2, 3) where it is kept; own memory if not given.
 
     Attributes:
+        options: shape of the swing from now on.
         x, y: (3,) position, velocity, acceleration [m, m/s, m/s^2] in the world.
     """
 
@@ -114,10 +120,11 @@ class SwingFoot:
             self._coast(dt)
         else:
             quintic_step(self.x, foothold, 0.0, max(time_to_go - o.early, o.horizon), dt)
-            # Rising while less than half of the swing is over.
-            rising = 0.5 * (time_to_go - self._elapsed)
+            rising = o.rise * time_to_go - (1.0 - o.rise) * self._elapsed
             if rising > o.horizon:
                 quintic_step(self.y, ground + o.clearance, 0.0, rising, dt)
+            elif o.descent is not None and time_to_go > o.descent:
+                self._hold(ground + o.clearance, dt)
             else:
                 quintic_step(self.y, ground, -o.landing_speed, time_to_go, dt)
         self._elapsed += dt
@@ -139,6 +146,10 @@ class SwingFoot:
         height = hip[1] - self.y[0]
         reach = self.options.leg_share * leg_length
         return float(hip[0] + sqrt(max(reach**2 - height**2, 0.0)))
+
+    def _hold(self, height: float, dt: float) -> None:
+        """Up: stay there, and come to rest where the rise was cut short."""
+        quintic_step(self.y, height, 0.0, max(2.0 * self.options.horizon, dt), dt)
 
     def _coast(self, dt: float) -> None:
         """Nearly there: hold the horizontal position, keep coming down."""

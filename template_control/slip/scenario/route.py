@@ -6,7 +6,7 @@ controller ask the same question at each section they come to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -31,6 +31,12 @@ _STRIDES: dict[tuple[Section, Gait], str] = {
     (APEX, "walk"): "rw",
 }
 _TRANSITIONS = ("wr", "rw")
+_LEADS_TO: dict[str, tuple[Section, Gait]] = {
+    "w": (VLO, "walk"),
+    "wr": (APEX, "run"),
+    "r": (APEX, "run"),
+    "rw": (VLO, "walk"),
+}
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
 
 
@@ -43,12 +49,15 @@ class StrideGoal:
         target: (n,) state wanted at the section the stride ends at.
         wanted_speed: the profile's speed there [m/s].
         segment: index of the scenario's segment, from 0.
+        then: the next kind of stride that is another, as far as is known; what it needs can be
+            prepared.
     """
 
     stride: str
     target: Array
     wanted_speed: float
     segment: int = 0
+    then: str | None = None
 
 
 class Route(Protocol):
@@ -224,10 +233,14 @@ class ScenarioRoute:
 
     Args:
         scenario: the profile.
+        apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(
+        self, scenario: Scenario, apex_height: Callable[[float], float] | None = None
+    ) -> None:
         self.scenario = scenario
+        self._apex_height = apex_height or (lambda speed: scenario.apex_height)
         self.parameters = scenario.parameters
         self.section = VLO
         self.start = np.array(scenario.start, dtype=float)
@@ -271,9 +284,18 @@ class ScenarioRoute:
         # A transition aims at where the profile begins, the others at where they will end.
         ahead = 0.0 if kind in _TRANSITIONS else here.duration.get(kind, self._guess)
         speed = here.wanted(segment, now + ahead)
-        target = (speed, s.apex_height) if segment.gait == "run" else (speed, *s.vlo)
-        goal = StrideGoal(kind, np.array(target), speed, here.index)
+        runs = segment.gait == "run"
+        target = (speed, self._apex_height(speed)) if runs else (speed, *s.vlo)
+        goal = StrideGoal(kind, np.array(target), speed, here.index, self._then(kind, here.index))
         return replace(here, last=(kind, now)), goal
+
+    def _then(self, kind: str, index: int) -> str | None:
+        """The next kind of stride after those of ``kind`` in segment ``index``."""
+        section, gait = _LEADS_TO[kind]
+        if kind in _TRANSITIONS:
+            return _STRIDES[section, gait]
+        later = (segment.gait for segment in self.scenario.segments[index:])
+        return next((_STRIDES[section, other] for other in later if other != gait), None)
 
     def _segment(self, here: _Progress, speed: float, now: float) -> _Progress:
         """Enter the segment that holds at ``now``."""

@@ -1,0 +1,1 @@
+"""What commands that make a run do with it: keep it, and tell it."""

@@ -1,0 +1,84 @@
+"""A run that a command does and keeps, whatever becomes of its files."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from template_control import view
+from template_control.cli.options.output import output_folder
+from template_control.cli.output import progress_bar
+from template_control.plant.quiet import stdout_to_stderr
+from template_control.run.config import Ready, RunConfig
+from template_control.run.record import Record, RunInterrupted
+from template_control.storage import Files
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A run, and where it is.
+
+    Attributes:
+        record: the run.
+        path: of its file; None if that could not be written.
+        files: that were written, or not.
+    """
+
+    record: Record
+    path: str | None
+    files: Files
+
+    def interrupted(self) -> bool:
+        """Say what became of the files, once the table is printed; whether Ctrl-C ended the run.
+
+        Raises:
+            TemplateControlError: if a file could not be written.
+            KeyboardInterrupt: if Ctrl-C came while files were written.
+        """
+        self.files.tell()
+        if not self.record.metadata["interrupted"]:
+            return False
+        print(
+            f"template-control: interrupted: the run up to here is in {self.path}", file=sys.stderr
+        )
+        return True
+
+
+def run_and_keep(
+    options: argparse.Namespace,
+    config: RunConfig,
+    ready: Ready,
+    doing: str,
+    more: Callable[[Record, Path], Any] | None = None,
+) -> Kept:
+    """Do a run; write it, what repeats it, and its figures.
+
+    Args:
+        options: as parsed: where it is kept.
+        config: the run.
+        ready: what it is made of.
+        doing: what the progress bar says.
+        more: writes further files of the record into the folder; not after Ctrl-C.
+    """
+    folder = output_folder(options.output)
+    files = Files()
+    with stdout_to_stderr():
+        try:
+            with progress_bar(Console(stderr=True), doing, config.simulation.steps) as advance:
+                record = ready.run(config.simulation, advance)
+        except RunInterrupted as stop:
+            record = stop.record
+        path = files.write(lambda: record.save(folder / "run.npz"))
+        files.write(lambda: config.save(folder / "run.toml"))
+        if not record.metadata["interrupted"]:
+            if not options.no_figures:
+                files.write(lambda: view.save_figures(record, folder))
+            if more is not None:
+                files.write(lambda: more(record, folder))
+    return Kept(record, None if path is None else str(path), files)

@@ -1,0 +1,84 @@
+"""The table of a robot's run, as the commands that make one print it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+_MEAN = 50  # strides at most whose section states the summary averages
+
+
+def print_table(figures: dict[str, Any]) -> None:
+    """The summary as a table on standard output.
+
+    Args:
+        figures: of the run, from :func:`~template_control.run.summary.summarise`.
+    """
+    table = Table(title=f"{figures['robot']}, gait {figures['gait']}", show_header=False)
+    table.add_column()
+    table.add_column(justify="right")
+
+    def row(name: str, text: str) -> None:
+        table.add_row(name, text)
+
+    row("steps", f"{figures['steps']}")
+    row("falls", "0" if not figures["fell"] else f"1: {figures['fall_reason']}")
+    row("duration", f"{figures['duration']:.2f} s")
+    row("mean speed", f"{figures['mean_speed']:.3f} m/s")
+    for section in ("VLO", "apex"):
+        for name, key in (
+            ("target", "target"),
+            (f"last {min(figures['steps'], _MEAN)} steps", "mean_last_50"),
+        ):
+            z = figures.get(f"{section.lower()}_{key}")
+            if z is not None:
+                row(f"{section}, {name}", _state(z))
+    if figures["speed_error_rms"] is not None:
+        row("speed at the sections less the target, RMS", f"{figures['speed_error_rms']:.4f} m/s")
+    rms, worst = figures["com_error_rms"], figures["com_error_max"]
+    for axis in ("x", "y"):
+        row(
+            f"CoM error in {axis}, RMS / max",
+            f"{1e3 * rms[axis]:.2f} / {1e3 * worst[axis]:.2f} mm",
+        )
+    for joint, torque in figures["joint_torque"].items():
+        row(
+            f"{joint} torque, peak / RMS of limit",
+            f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g} N m",
+        )
+    for joint, speed in figures["joint_speed"].items():
+        row(f"{joint} speed, peak", f"{speed['peak']:.3g} of {speed['limit']:g} rad/s")
+    share = figures["flight_share"]
+    if share["template"]:
+        flight = figures["com_error_flight_rms"]
+        row(
+            "CoM error in flight, RMS x / y",
+            f"{1e3 * flight['x']:.2f} / {1e3 * flight['y']:.2f} mm",
+        )
+        row(
+            "flight, robot / template",
+            f"{share['robot']:.3f} / {share['template']:.3f} of the time",
+        )
+    row("duty factor", f"{figures['duty_factor']:.3f}")
+    if figures["cost_of_transport"] is not None:
+        row("cost of transport", f"{figures['cost_of_transport']:.3f}")
+    row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
+    row("QP failures", f"{figures['qp_failures']}")
+    row("steps off the planner's own law", f"{figures['steps_not_nominal']}")
+    for name, key in (
+        ("control tick", "control_tick_seconds"),
+        ("QP solve", "qp_solve_seconds"),
+        ("plan", "plan_seconds"),
+    ):
+        t = figures[key]
+        row(f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us")
+    row("real-time factor", f"{figures['real_time_factor']:.1f}")
+    row("record", figures["record"] or "not saved")
+    Console().print(table)
+
+
+def _state(z: dict[str, float]) -> str:
+    text = f"{z['speed']:.4f} m/s  {z['height']:.4f} m"
+    return text + (f"  {z['vertical_speed']:+.4f} m/s" if "vertical_speed" in z else "")

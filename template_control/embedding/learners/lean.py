@@ -1,0 +1,143 @@
+"""How far the trunk leans: by kind of stride and speed, and on average over a stride.
+
+A trunk that leans forward carries the CoM ahead of the hips, and moves load from the knees to the
+hips. Within a running stride the pitch oscillates, as the legs' swing takes angular momentum from
+the trunk, and its mean settles beside the reference: the mean is regulated from stride to stride.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from template_control.slip.scenario.route import StrideGoal
+from template_control.slip.similarity import RATE, SPEED, tuned
+
+
+@dataclass(frozen=True)
+class Lean:
+    """Mean pitch of the trunk by speed, linear between the entries.
+
+    Attributes:
+        speeds: at the section, rising [m/s].
+        pitches: at these speeds [rad], forward positive.
+        excess: by which the reference is to exceed the mean at first [rad].
+    """
+
+    speeds: tuple[float, ...] = tuned((), SPEED)
+    pitches: tuple[float, ...] = tuned(())
+    excess: float = tuned(0.0)
+
+    def at(self, speed: float) -> float:
+        """The mean pitch [rad] at a speed [m/s]."""
+        return float(np.interp(speed, self.speeds, self.pitches))
+
+
+def _leans() -> dict[str, Lean]:
+    # Running knees carry twice the weight on a leg that is far from straight.
+    return {
+        "wr": Lean((1.2,), (0.33,)),
+        "r": Lean((2.0, 2.5, 3.0, 3.5, 4.0), (0.33, 0.34, 0.36, 0.40, 0.40), excess=0.1),
+        "rw": Lean((1.2,), (0.33,), excess=0.1),
+    }
+
+
+@dataclass(frozen=True)
+class LeanOptions:
+    """How the trunk's lean is chosen and regulated.
+
+    Attributes:
+        strides: the lean of each kind of stride; a kind that is missing keeps the controller's
+            ``trunk_pitch``, and its mean pitch is not regulated.
+        rate: at which the lean changes at most [rad/s].
+        gain: share of a stride's mean error that changes the reference.
+        error_bound: a larger mean error counts as this much [rad]: a push is no drift.
+        bound: of the correction [rad].
+    """
+
+    strides: Mapping[str, Lean] = field(default_factory=_leans)
+    rate: float = tuned(0.1, RATE)
+    gain: float = tuned(0.2)
+    error_bound: float = tuned(0.05)
+    bound: float = tuned(0.25)
+
+    def of(self, goal: StrideGoal) -> Lean | None:
+        """The lean of a stride; one without a lean of its own prepares that of the next kind."""
+        return self.strides.get(goal.stride) or self.strides.get(goal.then or "")
+
+    def pitch(self, goal: StrideGoal, upright: float) -> float:
+        """The mean pitch of a stride [rad].
+
+        Args:
+            goal: the stride, and where it leads.
+            upright: pitch where no lean is known [rad].
+        """
+        lean = self.of(goal)
+        return upright if lean is None else lean.at(goal.wanted_speed)
+
+
+class TrunkLean:
+    """The trunk's reference; it persists from stride to stride.
+
+    Args:
+        options: by kind of stride and speed.
+        upright: reference of the strides without a lean of their own [rad].
+
+    Attributes:
+        mean: the mean pitch that is wanted now [rad].
+        correction: what the reference adds to it [rad].
+    """
+
+    def __init__(self, options: LeanOptions, upright: float) -> None:
+        self.options = options
+        self._upright = upright
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was learnt, and where the trunk was to be."""
+        self.mean = self._goal = self._upright
+        self.correction = 0.0
+        self._lean: Lean | None = None
+        self._begun = False
+        self._sum = self._time = 0.0
+
+    def aim(self, goal: StrideGoal) -> None:
+        """A stride begins.
+
+        Args:
+            goal: the stride, and where it leads.
+        """
+        lean = self.options.of(goal)
+        self._goal = self.options.pitch(goal, self._upright)
+        if lean is not self._lean:
+            self.correction = 0.0 if lean is None else lean.excess
+            self._lean = lean
+        if not self._begun:
+            self.mean, self._begun = self._goal, True
+
+    def advance(self, pitch: float, dt: float) -> float:
+        """The reference of the pitch at this tick [rad].
+
+        Args:
+            pitch: of the trunk [rad].
+            dt: duration of the tick [s].
+        """
+        most = self.options.rate * dt
+        self.mean += min(max(self._goal - self.mean, -most), most)
+        self._sum += (self.mean - pitch) * dt
+        self._time += dt
+        return self.mean + self.correction
+
+    def end_stride(self, nominal: bool) -> None:
+        """Learn from the stride that has just ended.
+
+        Args:
+            nominal: whether the stride went near the gait. Another one teaches nothing.
+        """
+        if nominal and self._lean is not None and self._time > 0.0:
+            o = self.options
+            error = min(max(self._sum / self._time, -o.error_bound), o.error_bound)
+            self.correction = min(max(self.correction + o.gain * error, -o.bound), o.bound)
+        self._sum = self._time = 0.0

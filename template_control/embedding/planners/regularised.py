@@ -1,0 +1,177 @@
+"""One stride ahead: least squares on a return map, against changes of the controls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import PADDED
+
+Array = NDArray[np.float64]
+
+_DIFFERENCE = 1e-6  # of a control
+_GRID = 6
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Controls that a stride would have, were there no target.
+
+    Attributes:
+        controls: (5,) u by Slot; those that are not free stay.
+        slots: the f free ones.
+        base: (f,) their values.
+        change: (f,) changes that count as 1.
+        lower, upper: (f,) bounds.
+        rounds: Gauss-Newton steps.
+    """
+
+    controls: Array
+    slots: list[int]
+    base: Array
+    change: Array
+    lower: Array
+    upper: Array
+    rounds: int
+
+
+class Ahead(Protocol):
+    """Where a stride ends with given controls."""
+
+    def __call__(self, u: Array) -> tuple[Array, Outcome]:
+        """(m,) state at the section where the stride ends, and how it ends, with (5,) controls."""
+
+
+Derivatives = Callable[[Array], tuple[Array, Array, Outcome]]
+"""(m,) end, (m, f) its derivatives by the free controls, and outcome, at (5,) controls."""
+
+
+def from_section(step: ReturnMap, z: Array, slots: Sequence[int]) -> Derivatives:
+    """Exact derivatives of a whole stride.
+
+    Args:
+        step: the map.
+        z: (n,) where the stride begins.
+        slots: the free controls.
+    """
+    m, columns = step.dimensions[1], np.array(slots) + PADDED
+
+    def derivatives(u: Array) -> tuple[Array, Array, Outcome]:
+        result, jacobian, outcome = step.derivatives(z, u, columns)
+        return result[:m], jacobian[:m], outcome
+
+    return derivatives
+
+
+def from_here(ahead: Ahead, slots: Sequence[int]) -> Derivatives:
+    """Differences of what is left of a stride; no map begins within one.
+
+    Args:
+        ahead: where it ends.
+        slots: the free controls.
+    """
+
+    def derivatives(u: Array) -> tuple[Array, Array, Outcome]:
+        end, outcome = ahead(u)
+        jacobian = np.zeros((len(end), len(slots)))
+        for column, slot in enumerate(slots):
+            changed = u.copy()
+            changed[slot] *= 1.0 + _DIFFERENCE
+            other, how = ahead(changed)
+            if how is not Outcome.SECTION:
+                return end, jacobian, how
+            jacobian[:, column] = (other - end) / (changed[slot] - u[slot])
+        return end, jacobian, outcome
+
+    return derivatives
+
+
+def solve_stride(
+    derivatives: Derivatives, aim: Array, prior: Prior, tolerance: Array
+) -> tuple[Array, Array | None]:
+    """min |(P(u) - aim) / tolerance|^2 + |(u - base) / change|^2 over bounded u.
+
+    Args:
+        derivatives: of P.
+        aim: (m,) where the stride should end.
+        prior: the free controls.
+        tolerance: (m,) errors that count as 1.
+
+    Returns:
+        (5,) controls; (m,) where the stride ends, None where none of those tried completes it.
+    """
+    x, u = prior.base.copy(), prior.controls.copy()
+    x = _start(derivatives, aim, prior, tolerance)
+    best: tuple[float, Array, Array] | None = None
+    for _ in range(prior.rounds + 1):
+        u[prior.slots] = x
+        end, jacobian, outcome = derivatives(u)
+        if outcome is not Outcome.SECTION:
+            if best is None:
+                break
+            x = 0.5 * (x + best[1])
+            continue
+        residual = np.concatenate(((end - aim) / tolerance, (x - prior.base) / prior.change))
+        cost = float(residual @ residual)
+        if best is not None and cost >= best[0]:
+            x = 0.5 * (x + best[1])
+            continue
+        best = (cost, x.copy(), end)
+        rows = np.vstack((jacobian / tolerance[:, None], np.diag(1.0 / prior.change)))
+        x = bounded_step(rows, residual, x, prior.lower, prior.upper)
+    if best is None:
+        u[prior.slots] = prior.base
+        return u, None
+    u[prior.slots] = best[1]
+    return u, best[2]
+
+
+def _start(derivatives: Derivatives, aim: Array, prior: Prior, tolerance: Array) -> Array:
+    """The base, or where that fails the best of a grid within the bounds."""
+    u = prior.controls.copy()
+    u[prior.slots] = prior.base
+    if derivatives(u)[2] is Outcome.SECTION:
+        return prior.base.copy()
+    axes = [
+        np.linspace(low, high, _GRID) for low, high in zip(prior.lower, prior.upper, strict=True)
+    ]
+    best, least = prior.base.copy(), np.inf
+    for x in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes)):
+        u[prior.slots] = x
+        end, _, outcome = derivatives(u)
+        if outcome is Outcome.SECTION:
+            residual = np.concatenate(((end - aim) / tolerance, (x - prior.base) / prior.change))
+            cost = float(residual @ residual)
+            if cost < least:
+                best, least = x, cost
+    return best
+
+
+def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Array) -> Array:
+    """x + dx with the least |rows dx + residual| between the bounds.
+
+    A variable that would leave its bounds is held there, and the others are solved for again.
+
+    Args:
+        rows: (r, f) Jacobian of the residual.
+        residual: (r,) at x.
+        x: (f,) within the bounds.
+        lower, upper: (f,) bounds.
+    """
+    free = upper > lower
+    step = np.clip(x, lower, upper) - x
+    for _ in range(len(x)):
+        left = residual + rows @ np.where(free, 0.0, step)
+        step[free] = -np.linalg.lstsq(rows[:, free], left, rcond=None)[0]
+        beyond = free & ((x + step < lower) | (x + step > upper))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(x + step, lower, upper)[beyond] - x[beyond]
+        free &= ~beyond
+    return np.clip(x + step, lower, upper)

@@ -1,0 +1,140 @@
+"""Running planner: the next apex is the target, as far as moderate controls reach it.
+
+One stride ahead, least squares on the exact map: errors of the apex against changes of the
+controls, the regularised form of (36). Controls change from those of a gait near the present
+speed; a target far from it is approached step by step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.planners.regularised import Prior, from_section, solve_stride
+from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import APEX, PADDED
+from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
+
+Array = NDArray[np.float64]
+
+_SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]
+
+
+@dataclass(frozen=True)
+class RunningOptions:
+    """Tuning of the running planner.
+
+    Attributes:
+        tolerance: errors of dx/dt and y at the next apex that count as 1.
+        change: changes of alpha [rad], k_sc and k_sd (shares of the gait's) that count as 1.
+        angle_range: alpha relative to the gait's [rad]. A flatter leg brakes with forces that the
+            hips cannot bear.
+        stiffness_range: k_sc and k_sd over the gait's.
+        top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the foot
+            would touch down at once.
+        pace: the speed aimed at is at most this far from the present one.
+        climb: the height aimed at is at most this far from the present one.
+        offset_gain: share of a stride's surprise that enters the offset estimate.
+        offset_bound: largest offset believed.
+        surprise_bound: a larger surprise counts as this much: a push is no offset.
+        rounds: Gauss-Newton steps.
+    """
+
+    kind: ClassVar[str] = "deadbeat"
+
+    tolerance: tuple[float, float] = tuned((0.02, 0.004), SPEED, LENGTH)
+    change: tuple[float, float, float] = tuned((0.02, 0.15, 0.15))
+    angle_range: tuple[float, float] = tuned((-0.1, 0.1))
+    stiffness_range: tuple[float, float] = tuned((0.6, 1.6))
+    top_margin: float = tuned(0.005)
+    pace: float = tuned(0.06, SPEED)
+    climb: float = tuned(0.02, LENGTH)
+    offset_gain: float = tuned(0.2)
+    offset_bound: tuple[float, float] = tuned((0.3, 0.03), SPEED, LENGTH)
+    surprise_bound: tuple[float, float] = tuned((0.06, 0.008), SPEED, LENGTH)
+    rounds: int = tuned(4)
+
+
+class RunningPlanner:
+    """min |(P(z, u) + d - z*) / tolerance|^2 + |(u - u_g) / change|^2 over bounded u.
+
+    Args:
+        gait: to settle on.
+        options: tuning.
+
+    Attributes:
+        gait: the one of the last target.
+        offset: (3,) the estimate of d.
+    """
+
+    def __init__(self, gait: RunningGait, options: RunningOptions | None = None) -> None:
+        self.gait = gait
+        self.options = scaled(options or RunningOptions(), Scale.of(gait.parameters))
+        self.offset: Array = np.zeros(PADDED)
+        self._family = RunningFamily(gait)
+        self._map = ReturnMap(gait.parameters, gait.stride)
+        self._grid = 0.5 * self.options.pace
+        # Compile now what a stride would otherwise wait for.
+        self.decide(gait.apex)
+
+    def reset(self) -> None:
+        """See :class:`~.planner.Planner`."""
+        self.offset = np.zeros(PADDED)
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :meth:`~.planner.Planner.decide`; the stride is a running step from apex to apex."""
+        o = self.options
+        if target is not None and target[0] != self.gait.apex[0]:
+            self.gait = self._family.at(float(target[0]))
+        wanted = self.gait.apex if target is None else target
+        near = self._near(z, wanted)
+        aim = np.array(
+            [
+                np.clip(wanted[0], z[0] - o.pace, z[0] + o.pace),
+                np.clip(wanted[1], z[1] - o.climb, z[1] + o.climb),
+            ]
+        )
+        prior = self._prior(z, near, angles)
+        derivatives = from_section(self._map, z, prior.slots)
+        u, end = solve_stride(derivatives, aim - self.offset[:2], prior, np.array(o.tolerance))
+        completed = end is not None
+        predicted = APEX.padded(z if end is None else end) + self.offset
+        at_target = bool(np.all(np.abs(wanted - aim) < 1e-9))
+        return Decision(u, predicted, completed, completed, completed and at_target)
+
+    def _near(self, z: Array, wanted: Array) -> RunningGait:
+        """The gait about which the controls change, near the present speed."""
+        if abs(wanted[0] - z[0]) <= self.options.pace:
+            return self._family.at(float(wanted[0]))
+        return self._family.at(self._grid * round(float(z[0]) / self._grid))
+
+    def _prior(self, z: Array, near: RunningGait, angles: tuple[float, float]) -> Prior:
+        """Controls of the near gait, and how far from them the stride's may be."""
+        o, p = self.options, self.gait.parameters
+        base = near.controls[_SLOTS]
+        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
+        allowed = base[0] + np.array(o.angle_range)
+        low, high = np.clip(np.clip(np.minimum(allowed, top), *angles), -np.inf, top)
+        softest, stiffest = o.stiffness_range
+        lower = np.array([low, softest * base[1], softest * base[2]])
+        upper = np.array([high, stiffest * base[1], stiffest * base[2]])
+        change = np.array(o.change) * [1.0, base[1], base[2]]
+        start = np.clip(base, lower, upper)
+        return Prior(near.controls, _SLOTS, start, change, lower, upper, o.rounds)
+
+    def observe(self, decision: Decision, z: Array) -> None:
+        """See :meth:`~.planner.Planner.observe`; only feasible, nominal strides teach."""
+        if not (decision.feasible and decision.nominal):
+            return
+        o = self.options
+        limit, bound = np.array(o.surprise_bound), np.array(o.offset_bound)
+        surprise = np.clip(z - decision.predicted[:2], -limit, limit)
+        self.offset[:2] = np.clip(self.offset[:2] + o.offset_gain * surprise, -bound, bound)

@@ -1,0 +1,152 @@
+"""Planner of a stride that leads from one gait to the other, (39) to (44).
+
+Least squares on the exact map, as (41) and (44), but against moderate controls: the exact
+solutions ask for legs of up to 110 kN/m, which no knee can be. What such a stride misses of its
+target, the next gait's planner makes good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision, Planner
+from template_control.embedding.planners.regularised import (
+    Ahead,
+    Prior,
+    from_here,
+    from_section,
+    solve_stride,
+)
+from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.gaits.gait import Gait
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import PADDED
+from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TransitionOptions:
+    """Tuning of a transition's planner.
+
+    Attributes:
+        slots: the controls that are free.
+        base: what they change from: alpha [rad], and stiffnesses over m g / l0. NaN: the
+            present gait's.
+        change: changes of each that count as 1 [rad, shares of the base].
+        range: bounds of each: alpha relative to the base [rad], shares of the base.
+        tolerance: errors of dx/dt, y, dy/dt at the end that count as 1.
+        again: change of each, a share, that counts as 1 when a foot has landed.
+        rounds: Gauss-Newton steps.
+    """
+
+    slots: tuple[Slot, ...] = tuned((Slot.K_SC_WR, Slot.K_SD_WR))
+    base: tuple[float, ...] = tuned((12.2, 20.8))
+    change: tuple[float, ...] = tuned((0.3, 0.3))
+    range: tuple[tuple[float, float], ...] = tuned(((0.5, 2.0), (0.5, 2.0)))
+    tolerance: tuple[float, float, float] = tuned((0.05, 0.01, 0.1), SPEED, LENGTH, SPEED)
+    again: float = tuned(0.3)
+    rounds: int = tuned(6)
+
+
+WALK_TO_RUN = TransitionOptions()
+"""The front leg's stiffnesses; angle and rear leg are those of the walk, as in Section IV-C1."""
+
+RUN_TO_WALK = TransitionOptions(
+    slots=(Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD),
+    base=(1.34, 24.0, 20.0),
+    change=(0.05, 0.3, 0.3),
+    range=((-0.12, 0.1), (0.5, 2.0), (0.5, 2.0)),
+)
+"""Angle and both stiffnesses, as in Section IV-C2."""
+
+
+class TransitionPlanner:
+    """min |(P(z, u) - z*) / tolerance|^2 + |(u - u_0) / change|^2 over bounded u.
+
+    Args:
+        stride: kind of the stride, a key of the automaton's ``starts``.
+        before: planner of the gait that the stride begins in. Controls that are not free are those
+            of its stride from the same state.
+        after: makes the gait that it leads to, from dx/dt at its section [m/s].
+        options: tuning.
+
+    Attributes:
+        gait: the one of the last target.
+        offset: (3,) zero: a stride that is made once teaches nothing.
+    """
+
+    def __init__(
+        self,
+        stride: str,
+        before: Planner,
+        after: Callable[[float], Gait],
+        options: TransitionOptions,
+    ) -> None:
+        self._before, self._after = before, after
+        p = before.gait.parameters
+        self.options = scaled(options, Scale.of(p))
+        self.offset: Array = np.zeros(PADDED)
+        self._map = ReturnMap(p, stride)
+        self.gait = after(float(before.gait.state[0]))
+
+    def reset(self) -> None:
+        """See :class:`~.planner.Planner`."""
+
+    def observe(self, decision: Decision, z: Array) -> None:
+        """See :meth:`~.planner.Planner.observe`."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :meth:`~.planner.Planner.decide`."""
+        if target is not None and target[0] != self.gait.state[0]:
+            self.gait = self._after(float(target[0]))
+        wanted = self.gait.state if target is None else target
+        size = self._map.dimensions[1]
+        prior = self._prior(z, angles)
+        tolerance = np.array(self.options.tolerance)[:size]
+        u, end = solve_stride(from_section(self._map, z, prior.slots), wanted, prior, tolerance)
+        return self._decision(u, end, wanted)
+
+    def land(
+        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+    ) -> Decision:
+        """See :meth:`~.planner.Planner.land`."""
+        o, controls = self.options, decision.controls
+        stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE]
+        base = controls[stiff]
+        prior = Prior(
+            controls.copy(), stiff, base, o.again * base, 0.5 * base, 2.0 * base, o.rounds
+        )
+        tolerance = np.array(o.tolerance)[: len(target)]
+        u, end = solve_stride(from_here(ahead, stiff), target, prior, tolerance)
+        return self._decision(u, end, target)
+
+    def _decision(self, u: Array, end: Array | None, wanted: Array) -> Decision:
+        predicted = self._map.sections[1].padded(wanted if end is None else end)
+        return Decision(u, predicted, end is not None, end is not None, False)
+
+    def _prior(self, z: Array, angles: tuple[float, float]) -> Prior:
+        o, p = self.options, self._before.gait.parameters
+        unit = p.mass * p.gravity / p.rest_length
+        slots = [int(slot) for slot in o.slots]
+        turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
+        base = np.array(o.base) * np.where(turns, 1.0, unit)
+        low, high = np.array(o.range).T
+        lower = np.where(turns, base + low, base * low)
+        upper = np.where(turns, base + high, base * high)
+        controls = self._before.decide(z).controls.copy()
+        if angles[0] == angles[1]:
+            controls[Slot.TOUCHDOWN_ANGLE] = angles[0]
+            lower[turns] = upper[turns] = angles[0]
+        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - 0.005
+        upper[turns] = np.minimum(upper[turns], top)
+        lower[turns] = np.minimum(lower[turns], upper[turns])
+        change = np.array(o.change) * np.where(turns, 1.0, base)
+        return Prior(controls, slots, np.clip(base, lower, upper), change, lower, upper, o.rounds)

@@ -1,0 +1,108 @@
+"""Where the feet are at the apex of a gait whose legs take turns, and how they move.
+
+The trunk turns against the legs, so that the robot flies without angular momentum. Joint
+velocities that do not fit the gait cost a start far more torque than the gait itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions
+from template_control.errors import ParameterError
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.start import Pose, state_in
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import Event, Reset
+from template_control.slip.dynamics.stride import StrideSimulator
+from template_control.slip.gaits.gait import Gait
+from template_control.slip.maps.section import APEX
+
+Array = NDArray[np.float64]
+
+_NEAR = 0.9  # of l0: a distance from the CoM that any leg reaches
+_REACH = 0.96  # of the leg: a straight knee may bend either way
+_TICK = 1e-3  # over which the references move on [s]; finer ones end in the same place
+
+
+@dataclass(frozen=True)
+class ApexStart:
+    """How a run begins at an apex.
+
+    Attributes:
+        state: (2,) dx/dt and y [m/s, m].
+        gait: its legs' swings are half over there.
+        swing: shape of the swings.
+        pitch: of the trunk [rad].
+        automaton: that the gait's stride is of.
+    """
+
+    state: Array
+    gait: Gait
+    swing: SwingOptions
+    pitch: float = 0.0
+    automaton: Automaton = AUTOMATON
+
+
+def apex_pose(robot: PlanarBiped, start: ApexStart) -> Pose:
+    """The pose at an apex, with both feet where the references of their swings are.
+
+    A foot that stood in one stride swings through the next and lands in the one after that. So
+    one swing passes two apexes: at the first it is the foot that has just stood, at the second the
+    foot that is about to land.
+
+    Args:
+        robot: the model; its last update is overwritten.
+        start: what is wanted, scaled to the robot.
+
+    Raises:
+        RobotError: if the legs do not reach the pose.
+        ParameterError: if the gait's legs do not take turns in the air.
+    """
+    gait, z = start.gait, start.state
+    simulator = StrideSimulator(gait.parameters, start.automaton)
+    node = start.automaton.start(gait.stride).name
+    stride = simulator.run(node, APEX.state(gait.state), gait.controls)
+    if not any(event.reset is Reset.SWAP for event in stride.events):
+        raise ParameterError(
+            f"the legs of gait {gait.name!r} do not take turns: give SimulationOptions a pose"
+        )
+    landing, liftoff = stride.time_of(Event.TOUCHDOWN), stride.time_of(Event.REAR_LIFTOFF)
+    # The liftoff's exchange of roles has made the stance toe the front leg's.
+    toe, period = float(stride.toes[1]), stride.duration
+    foot = SwingFoot(start.swing)
+    foot.start(np.array([toe, 0.0]), np.zeros(2))
+    feet, velocities = [], []
+    now, due = liftoff, 2.0 * period + landing
+    for apex in (1, 2):
+        ticks = ceil((apex * period - now) / _TICK)
+        dt = (apex * period - now) / ticks
+        for _ in range(ticks):
+            foot.advance(toe + 2.0 * gait.step_length, due - now, dt, 0.0)
+            now += dt
+        feet.append([foot.x[0] - apex * gait.step_length, foot.y[0]])
+        velocities.append([foot.x[1], foot.y[1]])
+    pose = Pose(
+        com=np.array([0.0, z[1]]),
+        com_velocity=np.array([z[0], 0.0]),
+        feet=np.array(feet[::-1]),
+        feet_velocity=np.array(velocities[::-1]),
+        pitch=start.pitch,
+        angular_momentum=0.0,
+    )
+    # Fast references run ahead of what the legs reach. Where the feet are hardly moves the hips.
+    near = _within(pose, pose.com, _NEAR * gait.parameters.rest_length)
+    q, _ = state_in(robot, replace(pose, feet=near))
+    return replace(pose, feet=_within(pose, q[:2], _REACH * robot.leg_length))
+
+
+def _within(pose: Pose, centre: Array, reach: float) -> Array:
+    """(2, 2) the pose's feet, drawn to within ``reach`` of ``centre`` [m]."""
+    away = pose.feet - centre
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    return np.asarray(centre + away * np.minimum(reach / length, 1.0))

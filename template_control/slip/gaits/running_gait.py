@@ -1,0 +1,187 @@
+"""Running gaits: period-one fixed points of the apex map, symmetric in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from template_control.errors import GaitError
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import Event, Outcome
+from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import APEX
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+_SLOWEST, _FASTEST = 0.383, 1.597  # dx/dt at apex over sqrt(g l0): 1.2 to 5 m/s where l0 is 1 m
+_SCAN = 60
+_FLATTEST = np.radians(50.0)  # a leg that lands flatter would need a friction coefficient near 1
+_SAME = 1e-9  # of sqrt(g l0): speeds that are one
+
+
+@dataclass(frozen=True)
+class RunningGait:
+    """A passive symmetric running gait.
+
+    Attributes:
+        name: for tables and records.
+        parameters: the template.
+        apex: (2,) dx/dt and y at apex [m/s, m].
+        controls: (5,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
+        step_length: [m].
+        step_duration: from apex to apex [s].
+        flight_share: of the duration, without a foot on the ground.
+    """
+
+    name: str
+    parameters: SlipParameters
+    apex: Array
+    controls: Array
+    step_length: float
+    step_duration: float
+    flight_share: float
+
+    @property
+    def stride(self) -> str:
+        """Kind of stride: from apex to apex."""
+        return "r"
+
+    @property
+    def state(self) -> Array:
+        """(2,) :attr:`apex`."""
+        return self.apex
+
+    @property
+    def mean_speed(self) -> float:
+        """Step length over step duration [m/s]."""
+        return self.step_length / self.step_duration
+
+    @property
+    def energy(self) -> float:
+        """Mechanical energy [J]."""
+        return float(APEX.energy(self.parameters, self.apex))
+
+
+def running_speeds(parameters: SlipParameters) -> tuple[float, float]:
+    """Slowest and fastest dx/dt at apex of the family [m/s]."""
+    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    return float(_SLOWEST * unit), float(_FASTEST * unit)
+
+
+def suited_height(relative_speed: float) -> float:
+    """Height of the apex over l0 that suits dx/dt over sqrt(g l0).
+
+    The lower the apex, the less the knees bend and the smaller their torques. A slow run needs a
+    higher one to leave the ground.
+    """
+    return float(0.97 + 0.01 / (1.0 + np.exp((relative_speed - 0.69) / 0.06)))
+
+
+def suited_stiffness(relative_speed: float) -> float:
+    """k l0 / (m g) that suits dx/dt over sqrt(g l0).
+
+    The stiffer the leg, the less the knee bends; a leg that is too stiff for a slow run leaves it
+    no flight, and its apexes alternate.
+    """
+    return float(1.65 + (48.8 - 14.3 * relative_speed) * relative_speed)
+
+
+def running_gait(
+    parameters: SlipParameters,
+    speed: float,
+    apex_height: float | None = None,
+    leg_stiffness: float | None = None,
+    name: str = "run",
+) -> RunningGait:
+    """The symmetric gait with a given speed at apex.
+
+    Args:
+        parameters: the template; its k0 is not used.
+        speed: dx/dt at apex [m/s].
+        apex_height: y at apex [m]; by default :func:`suited_height`'s.
+        leg_stiffness: before and after the bottom [N/m]; by default
+            :func:`suited_stiffness`'s.
+        name: of the gait.
+
+    Raises:
+        GaitError: naming the range, if the speed is out of it; and if the template has no such
+            gait.
+    """
+    p = parameters
+    unit = np.sqrt(p.gravity * p.rest_length)
+    low, high = running_speeds(p)
+    if not low - _SAME * unit <= speed <= high + _SAME * unit:
+        raise GaitError(
+            f"no running gait has {speed:g} m/s at its apex: give a speed from {low:.3g} to"
+            f" {high:.3g} m/s"
+        )
+    relative = float(speed / unit)
+    if apex_height is None:
+        apex_height = suited_height(relative) * p.rest_length
+    if leg_stiffness is None:
+        leg_stiffness = suited_stiffness(relative) * p.mass * p.gravity / p.rest_length
+    z = np.array([speed, apex_height])
+    angle = _symmetric_angle(p, z, leg_stiffness)
+    if angle is None:
+        raise GaitError(
+            f"no running gait has {speed:g} m/s and {apex_height:g} m at its apex with legs of"
+            f" {leg_stiffness:g} N/m: give others, or neither"
+        )
+    u = controls(angle, leg_stiffness, leg_stiffness)
+    stride = simulate_stride(p, STRIDE_START["r"], APEX.state(z), u)
+    stance = stride.time_of(Event.REAR_LIFTOFF) - stride.time_of(Event.TOUCHDOWN)
+    return RunningGait(
+        name, p, z, u, float(stride.state[0]), stride.duration, 1.0 - stance / stride.duration
+    )
+
+
+def _symmetric_angle(parameters: SlipParameters, z: Array, stiffness: float) -> float | None:
+    """The touchdown angle with which the apex returns [rad], None if there is none."""
+    step = ReturnMap(parameters, "r")
+
+    def surplus(angle: float) -> float:
+        z_next, outcome = step.step(z, controls(angle, stiffness, stiffness))
+        return float(z_next[1] - z[1]) if outcome is Outcome.SECTION else np.nan
+
+    # A steeper leg lets the robot pass under the apex it came from, a flatter one throws it higher.
+    top = np.arcsin(min(z[1] / parameters.rest_length, 1.0)) - 1e-6
+    angles = np.linspace(top, _FLATTEST, _SCAN)
+    above = surplus(angles[0])
+    for steep, flat in pairwise(angles):
+        below = above
+        above = surplus(flat)
+        if below * above <= 0.0:
+            return float(brentq(surplus, flat, steep, xtol=1e-13, rtol=1e-13))
+    return None
+
+
+class RunningFamily:
+    """The gaits that a planner's targets stand for, with heights and stiffnesses by speed.
+
+    Args:
+        gait: the planner's own.
+    """
+
+    def __init__(self, gait: RunningGait) -> None:
+        self._known = [gait]
+
+    def at(self, speed: float) -> RunningGait:
+        """The gait with this speed at apex, or the nearest there is.
+
+        Args:
+            speed: dx/dt at apex [m/s].
+        """
+        p = self._known[0].parameters
+        same = _SAME * np.sqrt(p.gravity * p.rest_length)
+        for gait in self._known:
+            if abs(gait.apex[0] - speed) <= same:
+                return gait
+        gait = running_gait(p, float(np.clip(speed, *running_speeds(p))))
+        self._known.append(gait)
+        return gait

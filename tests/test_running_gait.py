@@ -1,0 +1,84 @@
+"""Running gaits: they return to their apex, they are symmetric, and speed alone chooses them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from template_control.errors import GaitError
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import Event, Slot
+from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.running_gait import RunningFamily, running_gait, running_speeds
+from template_control.slip.maps.section import APEX
+from template_control.slip.parameters import SlipParameters
+
+P = SlipParameters()
+SMALL = SlipParameters(mass=10.0, gravity=3.7, rest_length=0.4, leg_stiffness=500.0)
+
+
+@given(share=st.floats(0.0, 1.0))
+@settings(max_examples=25, deadline=None)
+def test_a_gait_returns_to_its_apex(share):
+    low, high = running_speeds(P)
+    gait = running_gait(P, low + share * (high - low))
+    stride = simulate_stride(P, STRIDE_START["r"], APEX.state(gait.apex), gait.controls)
+    assert stride.completed
+    np.testing.assert_allclose(APEX.of(stride.state), gait.apex, atol=1e-9)
+    assert stride.duration == gait.step_duration
+    assert 0.0 < gait.flight_share < 0.5
+    # Symmetric: the leg is vertical at the bottom.
+    bottom = next(event for event in stride.events if event.event is Event.BOTTOM)
+    toe = stride.toes[1]
+    assert bottom.state[0] == pytest.approx(toe, abs=1e-7)
+
+
+def test_gaits_vary_smoothly_with_speed():
+    speeds = np.linspace(*running_speeds(P), 60)
+    gaits = [running_gait(P, float(speed)) for speed in speeds]
+    for values in (
+        [gait.controls[Slot.TOUCHDOWN_ANGLE] for gait in gaits],
+        [gait.controls[Slot.K_SC] / 1e4 for gait in gaits],
+        [gait.apex[1] for gait in gaits],
+        [gait.flight_share for gait in gaits],
+    ):
+        second = np.diff(values, 2)
+        assert np.max(np.abs(second)) < 0.01
+
+
+def test_templates_of_all_sizes_run_alike():
+    unit, small = np.sqrt(P.gravity * P.rest_length), np.sqrt(SMALL.gravity * SMALL.rest_length)
+    gait, other = running_gait(P, 0.9 * unit), running_gait(SMALL, 0.9 * small)
+    angle = Slot.TOUCHDOWN_ANGLE
+    assert other.controls[angle] == pytest.approx(gait.controls[angle], abs=1e-9)
+    assert other.flight_share == pytest.approx(gait.flight_share, abs=1e-8)
+    assert other.apex[1] / SMALL.rest_length == pytest.approx(gait.apex[1] / P.rest_length)
+
+
+def test_height_and_stiffness_may_be_chosen():
+    gait = running_gait(P, 3.0, apex_height=0.98, leg_stiffness=22e3)
+    np.testing.assert_array_equal(gait.apex, [3.0, 0.98])
+    assert gait.controls[Slot.K_SC] == gait.controls[Slot.K_SD] == 22e3
+    assert np.degrees(gait.controls[Slot.TOUCHDOWN_ANGLE]) == pytest.approx(73.5, abs=0.1)
+    assert gait.flight_share == pytest.approx(0.403, abs=2e-3)
+    assert gait.mean_speed == pytest.approx(gait.step_length / gait.step_duration)
+
+
+@pytest.mark.parametrize("speed", [1.1, 5.1, np.nan, -3.0])
+def test_a_speed_beyond_the_family_is_refused(speed):
+    with pytest.raises(GaitError, match=r"give a speed from 1\.2 to 5 m/s"):
+        running_gait(P, speed)
+
+
+def test_a_gait_that_is_none_is_refused():
+    # Legs so soft that the CoM reaches the ground.
+    with pytest.raises(GaitError, match=r"no running gait has 3 m/s and 0\.98 m at its apex"):
+        running_gait(P, 3.0, apex_height=0.98, leg_stiffness=500.0)
+
+
+def test_a_family_knows_its_gait_and_the_nearest():
+    own = running_gait(P, 3.0, apex_height=0.98, leg_stiffness=22e3)
+    family = RunningFamily(own)
+    assert family.at(3.0) is own
+    assert family.at(2.5) is family.at(2.5)
+    assert family.at(9.0).apex[0] == running_speeds(P)[1]

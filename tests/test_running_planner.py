@@ -1,0 +1,122 @@
+"""The running planner: what it chooses on the template, its bounds, and what it learns."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from template_control.embedding.planners.planner import Planner
+from template_control.embedding.planners.running import RunningOptions, RunningPlanner
+from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.gaits.running_gait import running_gait
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.parameters import SlipParameters
+
+P = SlipParameters()
+OPTIONS = RunningOptions()
+
+
+@pytest.fixture(scope="module")
+def gait():
+    return running_gait(P, 3.0)
+
+
+@pytest.fixture
+def planner(gait):
+    return RunningPlanner(gait)
+
+
+def test_planner_leaves_the_gait_alone(planner, gait):
+    assert isinstance(planner, Planner)
+    decision = planner.decide(gait.apex)
+    assert decision.feasible
+    assert decision.nominal
+    np.testing.assert_allclose(decision.controls, gait.controls, rtol=1e-9)
+    np.testing.assert_allclose(decision.predicted, [*gait.apex, 0.0], atol=1e-9)
+
+
+def test_an_error_is_nearly_gone_after_one_stride(planner, gait):
+    z = gait.apex + [0.05, 0.004]
+    decision = planner.decide(z)
+    assert decision.nominal
+    end, outcome = ReturnMap(P, "r").step(z, decision.controls)
+    assert outcome is Outcome.SECTION
+    np.testing.assert_allclose(decision.predicted[:2], end, atol=1e-12)
+    assert abs(end[0] - gait.apex[0]) < 0.3 * 0.05
+    assert abs(end[1] - gait.apex[1]) < 0.3 * 0.004
+
+
+@pytest.mark.parametrize("speed", [2.0, 4.0])
+def test_a_far_target_is_approached_step_by_step(planner, speed):
+    z, target, step = np.array([3.0, 0.97]), running_gait(P, speed).apex, ReturnMap(P, "r")
+    decision = planner.decide(z, target)
+    assert decision.feasible
+    assert not decision.nominal, "nothing is learnt on the way"
+    for _ in range(60):
+        before = z
+        z, outcome = step.step(z, planner.decide(z, target).controls)
+        assert outcome is Outcome.SECTION
+        assert abs(z[0] - before[0]) < 2.0 * OPTIONS.pace
+    np.testing.assert_allclose(z, target, atol=2e-3)
+    assert planner.gait.apex[0] == speed
+
+
+@given(speed=st.floats(0.3, 7.0), height=st.floats(0.85, 1.2), target=st.floats(1.3, 4.9))
+@settings(max_examples=60, deadline=None)
+def test_planner_answers_within_its_bounds(speed, height, target):
+    planner = RunningPlanner(running_gait(P, 3.0))
+    decision = planner.decide(np.array([speed, height]), np.array([target, 0.97]))
+    u = decision.controls
+    assert np.all(np.isfinite(u))
+    assert np.all(np.isfinite(decision.predicted))
+    assert 0.9 < u[Slot.TOUCHDOWN_ANGLE] <= np.arcsin(min(height, 1.0))
+    assert 8e3 < u[Slot.K_SC] < 60e3
+    assert 8e3 < u[Slot.K_SD] < 60e3
+
+
+def test_after_touchdown_only_the_stiffnesses_are_free(planner, gait):
+    angle = gait.controls[Slot.TOUCHDOWN_ANGLE] + 0.01
+    decision = planner.decide(gait.apex, None, (angle, angle))
+    assert decision.controls[Slot.TOUCHDOWN_ANGLE] == angle
+    assert decision.controls[Slot.K_SC] != decision.controls[Slot.K_SD]
+    u = gait.controls.copy()
+    u[Slot.TOUCHDOWN_ANGLE] = angle
+    left, _ = ReturnMap(P, "r").step(gait.apex, u)
+    assert np.linalg.norm(decision.predicted[:2] - gait.apex) < 0.5 * np.linalg.norm(
+        left - gait.apex
+    )
+
+
+def test_what_every_stride_adds_is_learnt(planner, gait):
+    step, extra = ReturnMap(P, "r"), np.array([-0.03, 0.004])
+    z = gait.apex
+    for _ in range(60):
+        decision = planner.decide(z)
+        z = step.step(z, decision.controls)[0] + extra
+        planner.observe(decision, z)
+    np.testing.assert_allclose(planner.offset[:2], extra, atol=1e-4)
+    # The regularisation leaves a little of it.
+    assert abs(z[0] - gait.apex[0]) < 0.01
+    assert abs(z[1] - gait.apex[1]) < 0.001
+    planner.reset()
+    assert not planner.offset.any()
+
+
+def test_a_push_is_no_offset(planner, gait):
+    decision = planner.decide(gait.apex)
+    planner.observe(decision, gait.apex + [1.0, -0.1])
+    limit = np.array(OPTIONS.surprise_bound) * OPTIONS.offset_gain
+    np.testing.assert_allclose(planner.offset[:2], limit * [1.0, -1.0])
+
+
+def test_templates_of_all_sizes_are_planned_alike(planner, gait):
+    small = SlipParameters(mass=10.0, gravity=3.7, rest_length=0.4, leg_stiffness=500.0)
+    speed = np.sqrt(small.gravity * small.rest_length / (P.gravity * P.rest_length))
+    other = RunningPlanner(running_gait(small, 3.0 * speed))
+    z = gait.apex + [0.1, -0.005]
+    u = planner.decide(z).controls
+    v = other.decide(z * [speed, small.rest_length]).controls
+    unit = P.mass * P.gravity / P.rest_length
+    other_unit = small.mass * small.gravity / small.rest_length
+    np.testing.assert_allclose(v[0], u[0], rtol=1e-6)
+    np.testing.assert_allclose(v[1:3] / other_unit, u[1:3] / unit, rtol=1e-5)
