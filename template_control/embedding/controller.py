@@ -142,13 +142,13 @@ class EmbeddingController:
         goal = self.planning.first_goal()
         return self.options.lean.pitch(goal, self.options.trunk_pitch)
 
-    def start(self, rear: int = 0) -> None:
+    def start(self, rear: int = 0, swung: tuple[float, float] | None = None) -> None:
         """Begin where the route begins; the robot's model must be up to date.
-
-        A foot in the air is taken to be in the middle of its swing.
 
         Args:
             rear: the foot that is the rear leg's.
+            swung: time since rear and front foot left the ground [s], for those in the air; None:
+                they are in the middle of their swings.
 
         Raises:
             ParameterError: if the route begins with a stride for which there is no planner.
@@ -159,8 +159,9 @@ class EmbeddingController:
         self._enter(node.name)
         self.feet.begin(rear)
         self._sensed.feet = self.feet.of
-        for leg in self.station.control.swings:
-            self.feet.lift(self.feet.of[leg], self.robot, 0.5 * planner.gait.step_duration)
+        half = 0.5 * planner.gait.step_duration
+        for leg in self.station.swings:
+            self.feet.lift(self.feet.of[leg], self.robot, (swung or (half, half))[leg])
         self.ground = float(self.robot.foot_position[rear, 1]) if node.stance else 0.0
         self._sense(np.zeros(2, dtype=bool))
         self._decide(section)

@@ -26,6 +26,8 @@ class Pose:
         feet: (2, 2) lowest points of rear and front foot [m].
         feet_velocity: (2, 2) [m/s].
         rear: the foot that is the rear leg's.
+        swung: time since rear and front foot left the ground [s]; None: they are in the middle of
+            their swings, if they swing.
         pitch: of the trunk [rad].
         angular_momentum: about the CoM [N m s]; the trunk turns so that the robot has it. None: the
             trunk is at rest.
@@ -38,6 +40,7 @@ class Pose:
     feet: Array
     feet_velocity: Array
     rear: int = 0
+    swung: tuple[float, float] | None = None
     pitch: float = 0.0
     angular_momentum: float | None = None
     momentum_speed: bool = False

@@ -99,7 +99,6 @@ def simulate(
         controller = EmbeddingController(robot, chosen, o.embedding, route, automaton)
     recorder = Recorder(controller, o.record_every)
     q, v = _start(controller, o)
-    controller.start(0 if o.pose is None else o.pose.rear)
     _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
     begin = time.perf_counter()
     stop: KeyboardInterrupt | None = None
@@ -124,22 +123,26 @@ def simulate(
 
 
 def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
-    """(q, v) that the run begins in.
+    """Start the controller where the run begins, and tell (q, v) there.
 
     Raises:
         ParameterError: if the route begins at an apex of a stride whose legs do not take turns,
             and no pose is given.
     """
-    robot, route = controller.robot, controller.planning.route
-    if o.pose is not None:
-        return state_in(robot, o.pose)
+    robot, route, pose = controller.robot, controller.planning.route, o.pose
     z = route.start if o.start is None else np.array(o.start)
-    if route.section == APEX:
-        return state_in(robot, _apex_pose(controller, z[: APEX.dimension]))
+    if pose is None and route.section == APEX:
+        pose = _apex_pose(controller, z[: APEX.dimension])
+    if pose is not None:
+        q, v = state_in(robot, pose)
+        controller.start(pose.rear, pose.swung)
+        return q, v
     # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
     swing = np.array([0.0, controller.options.swing.clearance])
     pitch = controller.first_pitch()
-    return state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
+    q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
+    controller.start()
+    return q, v
 
 
 def _apex_pose(controller: EmbeddingController, z: Array) -> Pose:

@@ -92,6 +92,7 @@ def apex_pose(robot: PlanarBiped, start: ApexStart) -> Pose:
         com_velocity=np.array([z[0], 0.0]),
         feet=np.array(feet[::-1]),
         feet_velocity=np.array(velocities[::-1]),
+        swung=(2.0 * period - liftoff, period - liftoff),
         pitch=start.pitch,
         angular_momentum=0.0,
     )
