@@ -30,6 +30,7 @@ GUIDES = (
     "your_plant.md",
     "options.md",
     "controller.md",
+    "running.md",
     "architecture.md",
 )
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import Event, Outcome
+from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
@@ -46,6 +46,13 @@ class RunningGait:
     step_length: float
     step_duration: float
     flight_share: float
+
+    def __repr__(self) -> str:
+        angle = np.degrees(self.controls[Slot.TOUCHDOWN_ANGLE])
+        return (
+            f"<RunningGait {self.name}: {self.mean_speed:.3f} m/s, touchdown angle {angle:.2f} deg,"
+            f" at apex {self.apex[0]:.3f} m/s and {self.apex[1]:.4f} m>"
+        )
 
     @property
     def stride(self) -> str:
