@@ -1,24 +1,34 @@
 """The trunk's lean: by stride and speed, slowly changing, right on average."""
 
+import numpy as np
 import pytest
 
 from template_control.embedding.learners.lean import Lean, LeanOptions, TrunkLean
+from template_control.slip.scenario.route import StrideGoal
 
 OPTIONS = LeanOptions({"r": Lean((2.0, 4.0), (0.2, 0.4), excess=0.1)})
 DT = 1e-3
 
 
+def goal(stride, speed, then=None):
+    return StrideGoal(stride, np.array([speed, 1.0]), speed, then=then)
+
+
 def test_lean_is_that_of_the_stride_and_the_speed():
-    assert OPTIONS.pitch("r", 3.0, 0.05) == pytest.approx(0.3)
-    assert OPTIONS.pitch("r", 9.0, 0.05) == pytest.approx(0.4)
-    assert OPTIONS.pitch("w", 1.0, 0.05) == 0.05
+    assert OPTIONS.pitch(goal("r", 3.0), 0.05) == pytest.approx(0.3)
+    assert OPTIONS.pitch(goal("r", 9.0), 0.05) == pytest.approx(0.4)
+    assert OPTIONS.pitch(goal("w", 1.0), 0.05) == 0.05
+
+
+def test_a_stride_before_another_kind_prepares_its_lean():
+    assert OPTIONS.pitch(goal("w", 2.0, "r"), 0.05) == pytest.approx(0.2)
 
 
 def test_a_run_begins_with_its_lean_and_changes_it_slowly():
     lean = TrunkLean(OPTIONS, 0.0)
-    lean.aim("r", 2.0)
+    lean.aim(goal("r", 2.0))
     assert lean.advance(0.2, DT) == pytest.approx(0.3), "mean and excess"
-    lean.aim("r", 4.0)
+    lean.aim(goal("r", 4.0))
     for _ in range(1000):
         lean.advance(0.2, DT)
     assert lean.mean == pytest.approx(0.2 + OPTIONS.rate)
@@ -29,7 +39,7 @@ def test_a_run_begins_with_its_lean_and_changes_it_slowly():
 
 def test_the_mean_pitch_becomes_the_wanted_one():
     lean = TrunkLean(OPTIONS, 0.0)
-    lean.aim("r", 2.0)
+    lean.aim(goal("r", 2.0))
     for _ in range(60):
         pitch = 0.0
         for _ in range(250):
@@ -43,7 +53,7 @@ def test_the_mean_pitch_becomes_the_wanted_one():
 
 def test_a_disturbed_stride_teaches_nothing():
     lean = TrunkLean(OPTIONS, 0.0)
-    lean.aim("r", 2.0)
+    lean.aim(goal("r", 2.0))
     lean.advance(-0.5, DT)
     lean.end_stride(False)
     assert lean.correction == 0.1
@@ -54,7 +64,7 @@ def test_a_disturbed_stride_teaches_nothing():
 
 def test_a_stride_without_a_lean_keeps_the_trunk_s_pitch():
     lean = TrunkLean(OPTIONS, 0.05)
-    lean.aim("w", 1.0)
+    lean.aim(goal("w", 1.0))
     for _ in range(10):
         assert lean.advance(0.3, DT) == 0.05
     lean.end_stride(True)

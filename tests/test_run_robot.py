@@ -78,7 +78,7 @@ def test_it_flies_and_lands_on_either_foot_in_turn(record, gait):
 
 def test_the_trunk_leans_as_much_as_is_wanted_on_average(record):
     last = record.time > record.section_time[10]
-    wanted = EmbeddingOptions().lean.pitch("r", 3.0, 0.0)
+    wanted = EmbeddingOptions().lean.strides["r"].at(3.0)
     assert record.q[last, 2].mean() == pytest.approx(wanted, abs=0.03)
     assert np.ptp(record.q[last, 2]) < 0.4
 
@@ -102,7 +102,7 @@ def test_a_run_begins_with_the_feet_of_the_gait(robot, gait):
 @pytest.mark.parametrize("speed", np.linspace(1.25, 4.95, 12))
 def test_legs_reach_the_start_at_every_speed(robot, speed):
     there = running_gait(P, float(speed))
-    pitch = EmbeddingOptions().lean.pitch("r", float(speed), 0.0)
+    pitch = EmbeddingOptions().lean.strides["r"].at(float(speed))
     pose = apex_pose(robot, ApexStart(there.apex, there, SWING, pitch))
     q, _ = state_in(robot, pose)
     assert np.all(q >= robot.model.lowerPositionLimit)
