@@ -30,7 +30,8 @@ from template_control.run.record import Record
 from template_control.run.simulation import perturbed_start, simulate
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind
-from template_control.slip.gaits.gait import WalkingGait, gait_for_speed
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import writable
