@@ -68,7 +68,7 @@ def test_the_command_tells_the_same_range(capsys, tmp_path):
     assert lines == {"give one from 0.77 to 1.36 m/s\n"}
 
 
-@pytest.mark.slow(20)
+@pytest.mark.slow(seconds=60)
 @pytest.mark.parametrize(("name", "speed"), [("five-link", 1.05), ("rabbit", 0.84), ("bolt", 0.59)])
 def test_the_robot_walks_at_speeds_that_had_no_gait(name, speed):
     robot = tc.load_robot(name)

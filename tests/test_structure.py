@@ -36,10 +36,14 @@ SLIP_STAGES = (
     ("scenario",),
 )
 SHARED = (
+    "checked",
     "compiled",
     "compiling",
     "errors",
+    "fitting",
+    "ranges",
     "storage",
+    "terminal",
 )  # modules of the root that every room may import
 MOST_ROOMS = 12
 MOST_FILES = 12  # of a folder, its __init__.py included

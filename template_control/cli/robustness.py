@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-from rich.console import Console
 from rich.table import Table
 
 from template_control.cli.output import INTERRUPTED
@@ -22,6 +21,7 @@ from template_control.robustness.campaign import SETTLED, Finding, Robustness, m
 from template_control.robustness.disturbances import AFTER, DISTURBANCES
 from template_control.storage import writable
 from template_control.sweep.executor import worker_processes
+from template_control.terminal import plain_console
 from template_control.view.robustness_figure import robustness_figure
 
 _NAMES = tuple(d.name for d in DISTURBANCES)
@@ -197,6 +197,6 @@ def _print_table(found: Robustness, figure: Path) -> None:
         table.add_column(column, no_wrap=column == _COLUMNS[0])
     for finding in found.findings:
         table.add_row(*_row(finding))
-    console = Console()
+    console = plain_console()
     console.print(table)
     console.print(f"figure: {figure}", highlight=False)

@@ -8,7 +8,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from template_control import view
@@ -35,6 +34,7 @@ from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import writable
+from template_control.terminal import plain_console
 
 _STEPS = 50
 _LONG = 200  # steps beyond which samples are thinned
@@ -154,7 +154,7 @@ def run(options: argparse.Namespace) -> int:
         start=None if options.seed is None else perturbed_start(gait, options.seed),
         record_every=every,
     )
-    console = Console(stderr=True)
+    console = plain_console(stderr=True)
     with stdout_to_stderr():
         with progress_bar(console, "walking", options.steps) as advance:
             record = simulate(
@@ -264,6 +264,6 @@ def print_table(figures: dict[str, Any], record: Record) -> None:
         row(f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us")
     row("real-time factor", f"{figures['real_time_factor']:.1f}")
     row("record", figures["record"])
-    Console().print(table)
+    plain_console().print(table)
     if record.metadata["interrupted"]:
-        Console().print("interrupted: the run up to here is saved")
+        plain_console().print("interrupted: the run up to here is saved")

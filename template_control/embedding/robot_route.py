@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from template_control.checked import checked
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.planar_biped import PlanarBiped
@@ -10,6 +11,7 @@ from template_control.slip.scenario.route import ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
 
 
+@checked
 def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
     """The scenario on the robot's own template.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from template_control.checked import checked
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
@@ -17,6 +18,7 @@ _WALK = (_TOUCHDOWN, 1.1 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_leng
 _STRETCH = 0.903514524055713
 
 
+@checked
 def default_gait(robot: PlanarBiped) -> WalkingGait:
     """The robot's walk: its own if it has one, else 66 degrees and 1.1 m/s for l0 = 1 m.
 
@@ -29,6 +31,7 @@ def default_gait(robot: PlanarBiped) -> WalkingGait:
     return gait_at(parameters, angle, float(speed * unit))
 
 
+@checked
 def paper_gait(parameters: SlipParameters) -> WalkingGait:
     """The equilibrium of Section IV-D: 0.9818 m and 826 J for 80 kg and l0 = 1 m."""
     scale = Scale.of(parameters)
@@ -36,6 +39,7 @@ def paper_gait(parameters: SlipParameters) -> WalkingGait:
     return gait_from_energy(parameters, 0.9818 * scale.length, 826.0 * energy)
 
 
+@checked
 def template_for(robot: PlanarBiped) -> SlipParameters:
     """The reference template scaled to a robot's mass and legs by dynamic similarity.
 

@@ -7,12 +7,12 @@ import json
 from pathlib import Path
 
 import matplotlib as mpl
-from rich.console import Console
 from rich.table import Table
 
 from template_control.errors import ParameterError
 from template_control.paper.reproduction import REPRODUCTIONS, Reproduction
 from template_control.storage import writable
+from template_control.terminal import plain_console
 
 _DPI = 110
 
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
             f"no reproduction {options.name!r}: give one of {', '.join(REPRODUCTIONS)}"
         )
     folder = None if options.no_figures else writable(options.output)
-    with Console(stderr=True).status(f"computing {options.name}"):
+    with plain_console(stderr=True).status(f"computing {options.name}"):
         result = REPRODUCTIONS[options.name]()
     paths = _save(result, folder) if folder is not None else []
     if options.json:
@@ -62,7 +62,7 @@ def _save(result: Reproduction, folder: Path) -> list[Path]:
 
 
 def _print(result: Reproduction, paths: list[Path]) -> None:
-    console = Console()
+    console = plain_console()
     table = Table(title=result.title)
     for i, column in enumerate(result.columns):
         table.add_column(column, justify="left" if i < 1 else "right")

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checked import checked
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.robot.planar_biped import PlanarBiped
@@ -61,6 +62,7 @@ def plant_name(options: PlantOptions | IdealOptions) -> str:
     return "ideal" if isinstance(options, IdealOptions) else "pybullet"
 
 
+@checked
 def open_plant(
     robot: PlanarBiped, options: PlantOptions | IdealOptions
 ) -> AbstractContextManager[Plant]:

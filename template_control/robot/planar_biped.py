@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from template_control.checked import checked
 from template_control.errors import ParameterError, RobotError
 from template_control.robot.planarise import planarise
 from template_control.robot.requirements import BASE_DOF, check_hips, check_planar, foot_radius_of
@@ -118,6 +119,7 @@ class PlanarBiped:
         self.foot_bias = np.zeros((2, 2))
 
     @classmethod
+    @checked
     def from_urdf(
         cls,
         path: str | Path,

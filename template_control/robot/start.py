@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checked import Checked, checked
 from template_control.errors import RobotError
+from template_control.ranges import Pair, Range, Shape, Triple
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 
@@ -17,7 +20,7 @@ _OUTPUTS = 7  # CoM (2), trunk (1), both feet (4)
 
 
 @dataclass(frozen=True)
-class Pose:
+class Pose(Checked):
     """Where the CoM and the feet are, and how they move.
 
     Attributes:
@@ -30,15 +33,16 @@ class Pose:
             CoM: it is the momentum about the foot below, over m y.
     """
 
-    com: Array
-    com_velocity: Array
-    feet: Array
-    feet_velocity: Array
-    rear: int = 0
+    com: Pair
+    com_velocity: Pair
+    feet: Annotated[Array, Shape((2, 2))]
+    feet_velocity: Annotated[Array, Shape((2, 2))]
+    rear: Annotated[int, Range(0, 1)] = 0
     pitch: float = 0.0
     momentum_speed: bool = False
 
 
+@checked
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     """State of a robot whose CoM and feet are in a pose.
 
@@ -98,7 +102,7 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
         error = residual()
         if np.max(np.abs(error)) < 1e-12:
             break
-        q -= np.linalg.solve(jacobian(), error)
+        q -= _solved(robot, jacobian(), error)
     else:
         raise RobotError(f"{robot.name}: the legs do not reach a CoM height of {height:g} m")
     limits = robot.model
@@ -113,17 +117,18 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     rows[3:5] = robot.foot_jacobian[stance]
     rows[5:7] = robot.foot_jacobian[swing]
     wanted = [*pose.com_velocity, 0.0, *pose.feet_velocity.ravel()]
-    v = np.linalg.solve(rows, wanted)
+    v = _solved(robot, rows, np.array(wanted))
     robot.update(q, v)
     return q, v
 
 
+@checked
 def state_at_vlo(
     robot: PlanarBiped,
-    z: Array,
-    stance: int,
-    swing_position: Array,
-    swing_velocity: Array,
+    z: Triple,
+    stance: Annotated[int, Range(0, 1)],
+    swing_position: Pair,
+    swing_velocity: Pair,
     pitch: float = 0.0,
 ) -> tuple[Array, Array]:
     """State of a robot at VLO, with the stance foot at x = 0.
@@ -152,6 +157,13 @@ def state_at_vlo(
         momentum_speed=True,
     )
     return state_in(robot, pose)
+
+
+def _solved(robot: PlanarBiped, matrix: Array, right: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        raise RobotError(f"{robot.name}: the legs do not determine the pose; bend them") from None
 
 
 def _angular_momentum_row(robot: PlanarBiped, q: Array) -> Array:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.errors import ParameterError
+from template_control.checked import Checked
+from template_control.ranges import Index, NotNegative
 from template_control.robot.planar_biped import PlanarBiped
 
 Array = NDArray[np.float64]
@@ -17,7 +18,7 @@ _TRANSLATIONS = 2  # the base's x and y come first
 
 
 @dataclass(frozen=True)
-class SensorOptions:
+class SensorOptions(Checked):
     """White Gaussian noise on the measured state, drawn anew at every tick.
 
     Attributes:
@@ -30,15 +31,9 @@ class SensorOptions:
         ParameterError: if a number is negative or not finite.
     """
 
-    position_noise: float = 0.0
-    velocity_noise: float = 0.0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("position_noise", "velocity_noise", "seed"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                raise ParameterError(f"sensor option {name} is {value!r}: give 0 or more")
+    position_noise: NotNegative = 0.0
+    velocity_noise: NotNegative = 0.0
+    seed: Index = 0
 
 
 class Sensors:

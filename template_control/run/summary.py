@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checked import checked
 from template_control.run.record import Record
 
 Array = NDArray[np.float64]
@@ -27,6 +28,7 @@ def _quantiles(seconds: Array) -> dict[str, float]:
     return {"median": float(median), "p99": float(p99)}
 
 
+@checked
 def summarise(record: Record, path: str) -> dict[str, Any]:
     """Summary of a run in SI units.
 

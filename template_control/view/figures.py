@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from template_control.checked import checked
 from template_control.errors import RecordError
 from template_control.run.record import Record
 from template_control.view.state_figures import (
@@ -26,6 +27,7 @@ from template_control.view.style import (
     TEMPLATE,
     TRUNK,
     WINDOW,
+    as_text,
     shade,
     window,
 )
@@ -75,7 +77,8 @@ def stick_diagram(record: Record, seconds: float = WINDOW, interval: float = 0.0
     for foot, name in enumerate(("left leg", "right leg")):
         axes.plot([], [], color=_LEGS[foot], label=name)
     _ground(axes, record)
-    axes.set(xlabel="x [m]", ylabel="y [m]", title=f"{record.metadata['robot']}: stick diagram")
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.set_title(f"{as_text(record.metadata['robot'])}: stick diagram")
     axes.set_aspect("equal")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4, frameon=False)
     return figure
@@ -109,7 +112,7 @@ def com_tracking(record: Record, seconds: float = WINDOW) -> Figure:
     for axes in (upper, middle, lower):
         shade(axes, record, w)
         axes.legend(loc="upper right")
-    upper.set_title(f"{record.metadata['robot']}: centre of mass (single stance shaded)")
+    upper.set_title(f"{as_text(record.metadata['robot'])}: centre of mass (single stance shaded)")
     return figure
 
 
@@ -132,7 +135,7 @@ def joint_torques(record: Record, seconds: float = WINDOW) -> Figure:
         shade(axes, record, w)
         axes.set_ylabel("torque [N m]")
         axes.legend(loc="upper right")
-    panels[0].set_title(f"{record.metadata['robot']}: joint torques, limits dotted")
+    panels[0].set_title(f"{as_text(record.metadata['robot'])}: joint torques, limits dotted")
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -168,7 +171,7 @@ def ground_forces(record: Record, seconds: float = WINDOW) -> Figure:
         shade(axes, record, w)
         axes.set_ylabel(f"{name} force [N]")
         axes.legend(loc="upper right")
-    panels[0].set_title(f"{record.metadata['robot']}: ground reaction forces")
+    panels[0].set_title(f"{as_text(record.metadata['robot'])}: ground reaction forces")
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -186,6 +189,7 @@ FIGURES: dict[str, Callable[[Record], Figure]] = {
 """Every figure of a walk, by file name."""
 
 
+@checked
 def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Path]:
     """Draw all :data:`FIGURES` of a run as PNG.
 

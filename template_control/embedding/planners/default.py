@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from template_control.checked import checked
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planners
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.scenario.route import Route
 
 
+@checked
 def default_planners(route: Route) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot: walking steps.
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checked import Checked, checked
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.ranges import Interval, NotNegative, Positive
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
 from template_control.slip.dynamics.kernel import new_scratch
@@ -21,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class ModifiedOptions:
+class ModifiedOptions(Checked):
     """Bounds of the search.
 
     Attributes:
@@ -33,10 +35,10 @@ class ModifiedOptions:
         map_kind: the return map that steps are tried on.
     """
 
-    angle_range: tuple[float, float] = tuned((-0.14, 0.08))
-    stiffness_range: tuple[float, float] = tuned((0.5, 1.5))
-    top_margin: float = tuned(0.01)
-    tolerance: float = tuned(0.05, SPEED)
+    angle_range: Interval = tuned((-0.14, 0.08))
+    stiffness_range: Interval = tuned((0.5, 1.5))
+    top_margin: NotNegative = tuned(0.01)
+    tolerance: Positive = tuned(0.05, SPEED)
     map_kind: MapKind = MapKind.EXACT
 
 
@@ -51,6 +53,7 @@ class ModifiedPlanner:
         offset: zero; the paper's planner learns nothing.
     """
 
+    @checked
     def __init__(self, gait: WalkingGait, options: ModifiedOptions | None = None) -> None:
         self.gait = gait
         self.options = scaled(options or ModifiedOptions(), Scale.of(gait.parameters))
@@ -62,7 +65,8 @@ class ModifiedPlanner:
         self._stiffness = np.array(self.options.stiffness_range) * k0
 
     def reset(self) -> None:
-        """See :class:`~.planner.Planner`; the paper's planner learns nothing."""
+        """See :class:`~.planner.Planner`: back to the gait it was made for."""
+        self.gait = self._family.reset()
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE

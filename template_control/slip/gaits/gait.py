@@ -6,13 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from template_control.checked import Checked, checked
 from template_control.errors import GaitError
+from template_control.ranges import Positive, Shape, Triple
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.stride import controls, simulate_stride
@@ -62,7 +64,7 @@ class Gait(Protocol):
 
 
 @dataclass(frozen=True)
-class WalkingGait:
+class WalkingGait(Checked):
     """A passive symmetric walking gait.
 
     Attributes:
@@ -76,10 +78,10 @@ class WalkingGait:
 
     name: str
     parameters: SlipParameters
-    vlo: Array
-    controls: Array
+    vlo: Triple
+    controls: Annotated[Array, Shape((5,))]
     step_length: float
-    step_duration: float
+    step_duration: Positive
 
     @property
     def stride(self) -> str:
@@ -182,6 +184,7 @@ def _symmetric_roots(
     return []
 
 
+@checked
 def gait_at(
     parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
 ) -> WalkingGait:
@@ -210,6 +213,7 @@ def gait_at(
     return _gait(name, parameters, *roots[0])
 
 
+@checked
 def gait_from_energy(
     parameters: SlipParameters, height: float, energy: float, name: str = "paper"
 ) -> WalkingGait:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from template_control.checked import checked
 from template_control.errors import GaitError
 from template_control.slip.gaits.gait import WalkingGait, gait_at, root
 from template_control.slip.parameters import SlipParameters
@@ -24,6 +25,7 @@ def _nominal_angle(mean_speed: float, rest_length: float, gravity: float) -> flo
     return float(np.radians(np.interp(dimensionless, _MEAN_SPEEDS, _ANGLES)))
 
 
+@checked
 def mean_speed_range(parameters: SlipParameters) -> tuple[float, float] | None:
     """Slowest and fastest mean speed of :func:`gait_for_speed` [m/s], to a centimetre per second.
 
@@ -53,6 +55,7 @@ def _mean_speed(parameters: SlipParameters, touchdown_angle: float, vlo_speed: f
         return np.nan
 
 
+@checked
 def gait_for_speed(
     parameters: SlipParameters, mean_speed: float, name: str = "walk"
 ) -> WalkingGait:

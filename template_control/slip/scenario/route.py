@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
@@ -107,6 +108,7 @@ class SteadyRoute:
             of a wrong shape or with a number that is not finite.
     """
 
+    @checked
     def __init__(
         self,
         parameters: SlipParameters,
@@ -226,6 +228,7 @@ class ScenarioRoute:
         scenario: the profile.
     """
 
+    @checked
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.parameters = scenario.parameters
