@@ -69,7 +69,7 @@ def test_the_command_tells_the_same_range(capsys, tmp_path):
 
 
 @pytest.mark.slow(seconds=60)
-@pytest.mark.parametrize(("name", "speed"), [("five-link", 1.05), ("rabbit", 0.84), ("bolt", 0.59)])
+@pytest.mark.parametrize(("name", "speed"), [("five-link", 1.05), ("rabbit", 0.85), ("bolt", 0.59)])
 def test_the_robot_walks_at_speeds_that_had_no_gait(name, speed):
     robot = tc.load_robot(name)
     planner = tc.LqrPlanner(tc.gait_for_speed(tc.template_for(robot), speed))
