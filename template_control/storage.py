@@ -79,7 +79,7 @@ def load(
         raise
     except FileNotFoundError:
         raise RecordError(f"there is no run at {path}: give a run.npz") from None
-    except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile):
+    except (KeyError, TypeError, ValueError, OSError, EOFError, zipfile.BadZipFile):
         raise RecordError(f"{path} is no recorded run: give a run.npz of this library") from None
 
 
