@@ -10,8 +10,16 @@
 Here stand the names that most users need; each room (``tc.slip``, ``tc.embedding``, ...) has
 the rest of its own. A name is imported when it is first used, so ``import template_control``
 costs next to nothing. The public names of a room stand in its ``__init__.pyi`` and nowhere else.
+
+What is worth knowing while it works is told to the logger ``template_control``, which is silent
+until ``logging`` is told otherwise: ``logging.basicConfig(level=logging.INFO)``.
 """
 
+import logging
+
 import lazy_loader
+
+# A library leaves it to its user whether and where its messages are seen.
+logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -24,6 +24,7 @@ from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
 from .robot.library import load_robot as load_robot
 from .robot.planar_biped import PlanarBiped as PlanarBiped
+from .run.config import RunConfig as RunConfig
 from .run.options import Push as Push
 from .run.options import SimulationOptions as SimulationOptions
 from .run.record import Record as Record
@@ -41,6 +42,8 @@ from .slip.scenario.route import ScenarioRoute as ScenarioRoute
 from .slip.scenario.run import simulate_scenario as simulate_scenario
 from .slip.scenario.scenario import example_one as example_one
 from .slip.scenario.scenario import load_scenario as load_scenario
+from .version import __version__ as __version__
+from .view.figures import plot as plot
 from .view.figures import save_figures as save_figures
 from .view.replay.replay import replay as replay
 from .view.replay.replay import save_film as save_film

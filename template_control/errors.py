@@ -25,5 +25,9 @@ class RecordError(TemplateControlError):
     """A file that is not a recorded run, or a folder a run cannot be written to."""
 
 
+class MissingPackageError(TemplateControlError, ImportError):
+    """A package that the library does not depend on, and that one of its functions needs."""
+
+
 class SweepError(TemplateControlError):
     """A sweep that cannot start or go on: its items, its results file or its executor."""

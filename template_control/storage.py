@@ -83,6 +83,23 @@ def load(
         raise RecordError(f"{path} is no recorded run: give a run.npz of this library") from None
 
 
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a text file.
+
+    Args:
+        path: of the file.
+        text: all of it.
+
+    Raises:
+        RecordError: if the file cannot be written.
+    """
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RecordError(f"cannot write {path}: {error.strerror}") from None
+    return Path(path)
+
+
 def writable(folder: Path) -> Path:
     """The folder, made if need be.
 

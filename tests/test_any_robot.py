@@ -252,4 +252,4 @@ def test_walk_takes_a_3d_urdf(tmp_path, capsys):
 
 def test_options_of_a_urdf_do_not_go_with_a_shipped_robot(tmp_path, capsys):
     assert main(["walk", "--foot-radius", "0.01", "--output", str(tmp_path)]) == 2
-    assert "--foot-radius go with a URDF" in capsys.readouterr().err
+    assert "foot radius go with a URDF" in capsys.readouterr().err

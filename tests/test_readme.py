@@ -24,7 +24,14 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 PAGES = [
     pytest.param(p, id=p.name) for p in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 ]
-GUIDES = ("your_robot.md", "controller.md", "architecture.md")
+GUIDES = (
+    "your_robot.md",
+    "your_planner.md",
+    "your_plant.md",
+    "options.md",
+    "controller.md",
+    "architecture.md",
+)
 
 
 def blocks(language, text=README):

@@ -42,8 +42,10 @@ SHARED = (
     "errors",
     "fitting",
     "ranges",
+    "settings",
     "storage",
     "terminal",
+    "version",
 )  # modules of the root that every room may import
 MOST_ROOMS = 12
 MOST_FILES = 12  # of a folder, its __init__.py included

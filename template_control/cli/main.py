@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import sys
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from template_control.cli.output import INTERRUPTED
 from template_control.errors import TemplateControlError
@@ -62,16 +63,43 @@ _COMMANDS = {
 _USER_ERROR = 2
 
 
+class _Version(argparse.Action):
+    """``--version``; the metadata are looked up only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from template_control.version import __version__
+
+        print(f"{parser.prog} {__version__}")
+        parser.exit()
+
+
+class _Parser(argparse.ArgumentParser):
+    """Takes a word like ``-20@4`` for an option's value: no option begins with a digit.
+
+    argparse does so with plain negative numbers only.
+    """
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As :meth:`argparse.ArgumentParser.parse_known_args`.
+
+        Args:
+            args: the words; None: of the process.
+            namespace: to fill.
+        """
+        return super().parse_known_args(_with_values(args), namespace)
+
+
 def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     """The parser for ``arguments``.
 
     It lists every command, but has the options of the one command that ``arguments`` name:
     importing them all would take seconds, even for ``--help``.
     """
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="template-control",
         description="Bipedal SLIP templates, their control, and robots that follow them.",
     )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     # Before the command there are only options without a value.
     wanted = next((word for word in arguments if not word.startswith("-")), None)
@@ -82,6 +110,17 @@ def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
             module.add_options(sub_parser)
             sub_parser.set_defaults(run=module.run)
     return parser
+
+
+def _with_values(arguments: Sequence[str] | None) -> list[str]:
+    """The words, an option joined with a value that begins with a minus and a digit."""
+    words: list[str] = []
+    for word in sys.argv[1:] if arguments is None else arguments:
+        if words and re.match(r"-[\d.]", word) and re.fullmatch(r"--[a-z-]+", words[-1]):
+            words[-1] += f"={word}"
+        else:
+            words.append(word)
+    return words
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -13,11 +13,11 @@ import numpy as np
 from rich.table import Table
 
 from template_control import view
+from template_control.cli.options.output import output_folder
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario
-from template_control.storage import writable
 from template_control.terminal import plain_console
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario)
     if options.map is not None:
         scenario = replace(scenario, map_kind=_MAPS[options.map])
-    folder = writable(options.output)
+    folder = output_folder(options.output)
     with plain_console(stderr=True).status("simulating") as status:
         record = simulate_scenario(scenario, lambda now: status.update(f"simulating, {now:.1f} s"))
     path = record.save(folder / "run.npz")

@@ -4,40 +4,25 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
-from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
 from template_control import view
+from template_control.cli.options.config import add_config, prepared
+from template_control.cli.options.gait import add_gait_options, add_planner_options
+from template_control.cli.options.output import add_output_options, output_folder
+from template_control.cli.options.robot import add_robot_options
+from template_control.cli.options.world import (
+    add_disturbance_options,
+    add_length_options,
+    add_world_options,
+)
 from template_control.cli.output import INTERRUPTED, progress_bar
-from template_control.cli.robot_options import add_robot_options, robot_from
-from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
-from template_control.embedding.planners.planner import Planner
-from template_control.embedding.robot_route import robot_route
-from template_control.embedding.robot_template import default_gait, paper_gait, template_for
-from template_control.errors import ParameterError
-from template_control.plant.bullet import PlantOptions
-from template_control.plant.ideal import IdealOptions
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.robot.planar_biped import PlanarBiped
-from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
-from template_control.run.simulation import perturbed_start, simulate
 from template_control.run.summary import summarise
-from template_control.slip.automaton.vocabulary import MapKind
-from template_control.slip.gaits.gait import WalkingGait
-from template_control.slip.gaits.mean_speed import gait_for_speed
-from template_control.slip.gaits.walking_family import walking_gait
-from template_control.slip.scenario.scenario import load_scenario
-from template_control.storage import writable
 from template_control.terminal import plain_console
-
-_STEPS = 50
-_LONG = 200  # steps beyond which samples are thinned
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -45,122 +30,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Walk a robot in PyBullet or on an ideal plant: a planner on the SLIP template chooses"
         " each step, a whole-body QP makes the robot follow it. Ends with a table, and a folder"
-        " with the run (run.npz) and figures. Exit status: 0, 1 after a fall, 2 for bad input,"
-        " 130 after Ctrl-C (what was walked by then is saved)."
+        " with the run (run.npz), what repeats it (run.toml) and figures. Exit status: 0, 1 after"
+        " a fall, 2 for bad input, 130 after Ctrl-C (what was walked by then is saved)."
     )
-    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
+    add_config(parser)
     add_robot_options(parser)
-    parser.add_argument(
-        "--scenario",
-        type=Path,
-        metavar="TOML",
-        help="a speed profile to walk, as template-control slip takes it, instead of one gait; it"
-        " ends with the profile, or after --steps",
-    )
-    parser.add_argument(
-        "--steps",
-        type=int,
-        help=f"steps to walk, VLO to VLO; {_STEPS} where no scenario says when to stop",
-    )
-    parser.add_argument(
-        "--gait",
-        choices=("walk", "paper"),
-        default="walk",
-        help="walk: the robot's own, for most touchdown angle 66 deg and 1.1 m/s at VLO;"
-        " paper: the equilibrium of Section IV-D, 0.9818 m and 826 J; both are given for l0 = 1 m"
-        " and 80 kg and scaled to the robot",
-    )
-    parser.add_argument(
-        "--speed",
-        type=float,
-        metavar="M/S",
-        help="mean forward speed of the gait instead of the walk gait's own",
-    )
-    parser.add_argument(
-        "--planner",
-        choices=("lqr", "modified"),
-        default="lqr",
-        help="lqr: LQR on the VLO state with an offset estimate; modified: the paper's"
-        " modified walking controller, equation (38)",
-    )
-    parser.add_argument(
-        "--map",
-        choices=("paper", "improved", "exact"),
-        default="exact",
-        help="return map that the modified planner tries its steps on",
-    )
-    parser.add_argument(
-        "--plant",
-        choices=("pybullet", "ideal"),
-        default="pybullet",
-        help="ideal: rigid contacts that stick, no friction; --friction is then the"
-        " controller's cone only",
-    )
-    parser.add_argument(
-        "--friction", type=float, default=0.7, help="Coulomb friction between feet and ground"
-    )
-    parser.add_argument(
-        "--mass-scale",
-        type=float,
-        default=1.0,
-        help="masses of the simulated robot over those the controller knows",
-    )
-    parser.add_argument(
-        "--torque-scale", type=float, default=1.0, help="share of the URDF's torque limits to use"
-    )
-    parser.add_argument(
-        "--seed",
-        type=int,
-        help="perturb the initial state by up to 5 %% in speed and 2 cm in height, drawn with"
-        " this seed; without it the walk starts on the gait",
-    )
-    parser.add_argument(
-        "--output", type=Path, default=Path("runs/walk"), help="folder for run.npz and figures"
-    )
-    parser.add_argument(
-        "--record-every",
-        type=int,
-        metavar="N",
-        help=f"keep every n-th sample in run.npz; by default 1 up to {_LONG} steps, then 5",
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
-    )
-    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+    add_gait_options(parser)
+    add_planner_options(parser)
+    add_world_options(parser)
+    add_disturbance_options(parser)
+    add_length_options(parser)
+    add_output_options(parser, "runs/walk")
 
 
 def run(options: argparse.Namespace) -> int:
     """Walk as told; returns 0, 1 after a fall, 130 after Ctrl-C."""
-    _check(options)
-    folder = writable(options.output)
-    robot = robot_from(options)
-    route = None
-    if options.scenario is not None:
-        route = robot_route(robot, load_scenario(options.scenario))
-        gait = walking_gait(route.parameters, float(route.start[0]))
-    else:
-        gait = _gait(options, robot)
-        options.steps = options.steps or _STEPS
-    planner: Planner = LqrPlanner(gait)
-    if options.planner == "modified":
-        planner = ModifiedPlanner(gait, ModifiedOptions(map_kind=MapKind[options.map.upper()]))
-    every = options.record_every or (1 if (options.steps or 0) <= _LONG else 5)
-    simulation = SimulationOptions(
-        steps=options.steps,
-        plant=IdealOptions(mass_scale=options.mass_scale)
-        if options.plant == "ideal"
-        else PlantOptions(friction=options.friction, mass_scale=options.mass_scale),
-        embedding=EmbeddingOptions(friction=options.friction, torque_scale=options.torque_scale),
-        start=None if options.seed is None else perturbed_start(gait, options.seed),
-        record_every=every,
-    )
+    config, ready = prepared(options)
+    folder = output_folder(options.output)
     console = plain_console(stderr=True)
     with stdout_to_stderr():
-        with progress_bar(console, "walking", options.steps) as advance:
-            record = simulate(
-                robot, route or planner, simulation, advance, planners={gait.stride: planner}
-            )
+        with progress_bar(console, "walking", config.simulation.steps) as advance:
+            record = ready.run(config.simulation, advance)
         path = record.save(folder / "run.npz")
+        config.save(folder / "run.toml")
         if not options.no_figures:
             view.save_figures(record, folder)
     figures = summarise(record, str(path))
@@ -171,47 +63,6 @@ def run(options: argparse.Namespace) -> int:
     if record.metadata["interrupted"]:
         return INTERRUPTED
     return 1 if record.fell else 0
-
-
-def _check(options: argparse.Namespace) -> None:
-    """Ranges of the numbers a user gives.
-
-    Raises:
-        ParameterError: naming the option and its range.
-    """
-    for name, low, high in (
-        ("steps", 1, 1_000_000),
-        ("friction", 0.05, 5.0),
-        ("mass_scale", 0.5, 2.0),
-        ("torque_scale", 0.01, 10.0),
-        ("speed", 0.01, 10.0),
-        ("record_every", 1, 1_000_000),
-        ("seed", 0, 2**63),
-    ):
-        value = getattr(options, name)
-        if value is None:
-            continue
-        if not (math.isfinite(value) and low <= value <= high):
-            flag = "--" + name.replace("_", "-")
-            raise ParameterError(f"{flag} is {value:g}: give a number from {low:g} to {high:g}")
-    if options.speed is not None and options.gait != "walk":
-        raise ParameterError(f"--speed does not go with --gait {options.gait}: leave one out")
-    if options.scenario is not None:
-        for flag, given in (
-            ("--speed", options.speed is not None),
-            ("--gait", options.gait != "walk"),
-            ("--seed", options.seed is not None),
-        ):
-            if given:
-                raise ParameterError(f"{flag} does not go with --scenario: leave one out")
-
-
-def _gait(options: argparse.Namespace, robot: PlanarBiped) -> WalkingGait:
-    if options.gait == "paper":
-        return paper_gait(template_for(robot))
-    if options.speed is not None:
-        return gait_for_speed(template_for(robot), options.speed)
-    return default_gait(robot)
 
 
 def print_table(figures: dict[str, Any], record: Record) -> None:

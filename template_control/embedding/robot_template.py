@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.checked import checked
+from template_control.ranges import Angle
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
@@ -19,16 +20,22 @@ _STRETCH = 0.903514524055713
 
 
 @checked
-def default_gait(robot: PlanarBiped) -> WalkingGait:
+def default_gait(robot: PlanarBiped, touchdown_angle: Angle | None = None) -> WalkingGait:
     """The robot's walk: its own if it has one, else 66 degrees and 1.1 m/s for l0 = 1 m.
 
     Args:
         robot: its last update is overwritten.
+        touchdown_angle: another one than the walk's, at the same speed at VLO [rad].
+
+    Raises:
+        GaitError: if there is no gait with that angle.
     """
     parameters = template_for(robot)
     angle, speed = robot.walk or _WALK
     unit = np.sqrt(parameters.gravity * parameters.rest_length)
-    return gait_at(parameters, angle, float(speed * unit))
+    return gait_at(
+        parameters, angle if touchdown_angle is None else touchdown_angle, float(speed * unit)
+    )
 
 
 @checked

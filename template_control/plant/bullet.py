@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +72,8 @@ class PlantOptions(Checked):
         ParameterError: if a number is not positive and finite.
     """
 
+    kind: ClassVar[str] = "pybullet"
+
     friction: Positive = 0.7
     time_step: Positive = 1e-3
     mass_scale: Positive = 1.0
@@ -114,6 +118,7 @@ class BulletPlant:
         self._actuated = self.joints[BASE_DOF:]
         self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
         self._trunk = self.joints[BASE_DOF - 1]
+        self._contacts: Sequence[Any] | None = None
         self._configure(len(info))
 
     def _configure(self, joints: int) -> None:
@@ -147,8 +152,18 @@ class BulletPlant:
         for joint in self.joints:
             p.setJointMotorControl2(body, joint, p.VELOCITY_CONTROL, force=0.0, physicsClientId=c)
 
+    @property
+    def time_step(self) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.time_step
+
+    def ground_height(self, x: float) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.ground_height(x)
+
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
+        self._contacts = None
         for joint, position, velocity in zip(self.joints, q, v, strict=True):
             pybullet.resetJointState(
                 self.body, joint, position, velocity, physicsClientId=self.client
@@ -168,9 +183,7 @@ class BulletPlant:
         divided by that step.
         """
         out[:] = 0.0
-        # Asked for one body, PyBullet turns the normal towards it but not the friction, so
-        # ask for all. Whatever touches the robot is ground: it does not collide with itself.
-        for contact in pybullet.getContactPoints(physicsClientId=self.client):
+        for contact in self._touching():
             sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
             foot = self._feet.get(link)
             if foot is None:
@@ -186,11 +199,19 @@ class BulletPlant:
     def trunk_touches_ground(self) -> bool:
         """True where the trunk itself lies on the ground."""
         return any(
-            pybullet.getContactPoints(
-                self.body, ground, self._trunk, -1, physicsClientId=self.client
-            )
-            for ground in self._ground
+            contact[3 if contact[1] == self.body else 4] == self._trunk
+            for contact in self._touching()
         )
+
+    def _touching(self) -> Sequence[Any]:
+        """PyBullet's contact points, asked for once a step.
+
+        Asked for one body, PyBullet turns the normal towards it but not the friction, so ask for
+        all. Whatever touches the robot is ground: it does not collide with itself.
+        """
+        if self._contacts is None:
+            self._contacts = pybullet.getContactPoints(physicsClientId=self.client)
+        return self._contacts
 
     def step(self, torque: Array, push: float = 0.0) -> None:
         """Advance one physics step.
@@ -200,6 +221,7 @@ class BulletPlant:
             push: horizontal disturbance on the trunk's centre of mass [N].
         """
         p, c = pybullet, self.client
+        self._contacts = None
         p.setJointMotorControlArray(
             self.body, self._actuated, p.TORQUE_CONTROL, forces=torque, physicsClientId=c
         )

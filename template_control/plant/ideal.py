@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -44,6 +45,8 @@ class IdealOptions(Checked):
     Raises:
         ParameterError: if a number is not positive and finite.
     """
+
+    kind: ClassVar[str] = "ideal"
 
     time_step: Positive = 1e-3
     mass_scale: Positive = 1.0
@@ -92,6 +95,15 @@ class IdealPlant:
         self._anchor = np.zeros(2)
         self._impulse = np.zeros((2, 2))
         self._trunk_corners = _trunk_corners(self.robot)
+
+    @property
+    def time_step(self) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.time_step
+
+    def ground_height(self, x: float) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.ground_height(x)
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
-from typing import Protocol
+from contextlib import AbstractContextManager, nullcontext
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checked import checked
+from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.robot.planar_biped import PlanarBiped
@@ -16,8 +17,19 @@ from template_control.robot.planar_biped import PlanarBiped
 Array = NDArray[np.float64]
 
 
+@runtime_checkable
 class Plant(Protocol):
-    """A robot in a world, driven by joint torques and a push on its trunk, nothing else."""
+    """A robot in a world, driven by joint torques and a push on its trunk, nothing else.
+
+    ``simulate`` takes any object with these members, see docs/your_plant.md.
+    """
+
+    @property
+    def time_step(self) -> float:
+        """How long a :meth:`step` is [s]."""
+
+    def ground_height(self, x: float) -> float:
+        """Height of the ground at ``x`` [m]; only to tell a fall."""
 
     def reset(self, q: Array, v: Array) -> None:
         """Place the robot in a state; only for the start of a run.
@@ -57,21 +69,63 @@ class Plant(Protocol):
         """Give back what the plant holds."""
 
 
-def plant_name(options: PlantOptions | IdealOptions) -> str:
-    """Name of the plant that ``options`` describe: ``ideal`` or ``pybullet``."""
-    return "ideal" if isinstance(options, IdealOptions) else "pybullet"
+World = PlantOptions | IdealOptions | Plant
+"""A plant, or the options of one of the library's."""
+
+_MEMBERS = (
+    "time_step",
+    "ground_height",
+    "reset",
+    "read",
+    "contact_forces",
+    "trunk_touches_ground",
+    "step",
+    "close",
+)
+
+
+def check_world(world: World) -> None:
+    """Refuse what is no plant.
+
+    Args:
+        world: a plant, or options; those have checked themselves.
+
+    Raises:
+        ParameterError: naming what it lacks, or its time step if that is no positive number.
+    """
+    if isinstance(world, PlantOptions | IdealOptions):
+        return
+    lacking = [name for name in _MEMBERS if not hasattr(world, name)]
+    if lacking:
+        raise ParameterError(
+            f"plant is a {type(world).__name__}, which lacks {', '.join(lacking)}: give"
+            " PlantOptions, IdealOptions or an object with the members of Plant"
+        )
+    step = world.time_step
+    if not (isinstance(step, int | float) and np.isfinite(step) and step > 0.0):
+        raise ParameterError(
+            f"{type(world).__name__}: time_step is {step!r}: give a positive number of seconds"
+        )
+
+
+def plant_name(world: World) -> str:
+    """Name of a plant: ``ideal``, ``pybullet``, or the name of the class of another one."""
+    if isinstance(world, PlantOptions | IdealOptions):
+        return world.kind
+    return type(world).__name__
 
 
 @checked
-def open_plant(
-    robot: PlanarBiped, options: PlantOptions | IdealOptions
-) -> AbstractContextManager[Plant]:
-    """Make the plant that ``options`` describe, to be used as a context manager.
+def open_plant(robot: PlanarBiped, world: World) -> AbstractContextManager[Plant]:
+    """Make the plant that options describe, to be used as a context manager.
 
     Args:
         robot: the controller's model; the plant makes its own robot from it.
-        options: the world; their type chooses the plant.
+        world: options, whose type chooses the plant; or a plant, which is used as it is and is
+            left open.
     """
-    if isinstance(options, IdealOptions):
-        return IdealPlant(robot, options)
-    return BulletPlant(robot, options)
+    if isinstance(world, IdealOptions):
+        return IdealPlant(robot, world)
+    if isinstance(world, PlantOptions):
+        return BulletPlant(robot, world)
+    return nullcontext(world)

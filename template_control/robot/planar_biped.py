@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from template_control.checked import checked
 from template_control.errors import ParameterError, RobotError
+from template_control.robot.planar_terms import PlanarTerms, gather, sources
 from template_control.robot.planarise import planarise
 from template_control.robot.requirements import BASE_DOF, check_hips, check_planar, foot_radius_of
 
@@ -105,18 +106,25 @@ class PlanarBiped:
         # Pinocchio keeps these arrays in place, so the views stay good.
         self.mass_matrix: Array = data.M
         self.nonlinear_effects: Array = data.nle
-        self._com_jacobian_3d: Array = data.Jcom
-        self.com = np.zeros(2)
-        self.com_velocity = np.zeros(2)
-        self.com_bias = np.zeros(2)
-        self.com_jacobian = np.zeros((2, self.nv))
+        self._joint_places = [
+            data.oMi[joint].translation for joint in range(1 + BASE_DOF, self.nv + 1)
+        ]
+        self._sources = sources(model, data, self._foot_ids, foot_radius)
+        terms = PlanarTerms.zeros(self.nv)
+        self._terms = tuple(terms)
+        self.com, self.com_velocity, self.com_bias = terms[:3]
+        self.com_jacobian = terms.com_jacobian
         self.angular_momentum = 0.0
-        self.angular_momentum_jacobian = np.zeros(self.nv)
+        self.angular_momentum_jacobian = terms.angular_momentum_jacobian
         self.angular_momentum_bias = 0.0
-        self.foot_position = np.zeros((2, 2))
+        self.foot_position = terms.foot_position
         self.foot_velocity = np.zeros((2, 2))
-        self.foot_jacobian = np.zeros((2, 2, self.nv))
-        self.foot_bias = np.zeros((2, 2))
+        self.foot_jacobian = terms.foot_jacobian
+        self.foot_bias = terms.foot_bias
+
+    def __repr__(self) -> str:
+        joints = ", ".join(self.joint_names)
+        return f"<PlanarBiped {self.name}: {self.mass:.4g} kg, joints {joints}>"
 
     @classmethod
     @checked
@@ -177,46 +185,28 @@ class PlanarBiped:
         Raises:
             ParameterError: if a value is NaN or infinite.
         """
-        if not (np.isfinite(q).all() and np.isfinite(v).all()):
-            raise ParameterError(
-                f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
-            )
         model, data = self.model, self._data
         pin.computeAllTerms(model, data, q, v)
         pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
-        com, velocity, bias = data.com[0], data.vcom[0], data.acom[0]
-        self.com[0], self.com[1] = com[0], com[2]
-        self.com_velocity[0], self.com_velocity[1] = velocity[0], velocity[2]
-        self.com_bias[0], self.com_bias[1] = bias[0], bias[2]
-        self.com_jacobian[:] = self._com_jacobian_3d[::2]
-        self.angular_momentum = float(data.hg.angular[1])
-        self.angular_momentum_jacobian[:] = data.Ag[4]
-        # The base coordinates' rows of C v are the rates of linear momentum and of the
-        # angular momentum about the base at zero acceleration; move the latter to the CoM.
-        rate = self.nonlinear_effects[:BASE_DOF] - data.g[:BASE_DOF]
-        self.angular_momentum_bias = float(
-            rate[2] - (com[2] - q[1]) * rate[0] + (com[0] - q[0]) * rate[1]
+        left, right = self._foot_ids
+        pin.updateFramePlacement(model, data, left)
+        pin.updateFramePlacement(model, data, right)
+        drift = (
+            pin.getFrameClassicalAcceleration(model, data, left, _WORLD_ALIGNED).vector,
+            pin.getFrameClassicalAcceleration(model, data, right, _WORLD_ALIGNED).vector,
         )
-        r = self.foot_radius
-        for i, frame in enumerate(self._foot_ids):
-            position = pin.updateFramePlacement(model, data, frame).translation
-            jacobian = pin.getFrameJacobian(model, data, frame, _WORLD_ALIGNED)
-            drift = pin.getFrameClassicalAcceleration(model, data, frame, _WORLD_ALIGNED)
-            self.foot_position[i, 0] = position[0]
-            self.foot_position[i, 1] = position[2] - r
-            # Rolling without slip: the material point below the sphere's centre is at rest.
-            self.foot_jacobian[i, 0] = jacobian[0] - r * jacobian[4]
-            self.foot_jacobian[i, 1] = jacobian[2]
-            linear, angular = drift.linear, drift.angular
-            self.foot_bias[i, 0] = linear[0] - r * angular[1]
-            self.foot_bias[i, 1] = linear[2]
-        self.foot_velocity[:] = self.foot_jacobian @ v
+        finite, self.angular_momentum, self.angular_momentum_bias = gather(
+            self._sources, q, v, drift, self._terms
+        )
+        if not finite:
+            raise ParameterError(
+                f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
+            )
+        np.matmul(self.foot_jacobian, v, out=self.foot_velocity)
 
     def joint_positions(self, out: Array) -> None:
         """Write the actuated joints' positions (nv - 3, 2) [m] at the last update."""
-        placements = self._data.oMi
-        for i in range(self.nv - BASE_DOF):
-            position = placements[i + 1 + BASE_DOF].translation
+        for i, position in enumerate(self._joint_places):
             out[i, 0], out[i, 1] = position[0], position[2]
 
     def hip_height(self, q: Array) -> float:

@@ -36,7 +36,6 @@ _PHASES = 10  # of the step in which a push begins
 _EDGES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the way between two footholds
 _STARTS = 5  # seeds of the starts off the gait
 _PUSH_SECONDS = 0.1
-_VELOCITY_NOISE = 20.0  # [1/s] noise of velocities over that of positions
 _TIME_STEP = PlantOptions().time_step
 
 
@@ -199,8 +198,7 @@ def _weak(where: Situation, level: float, trial: int) -> SimulationOptions:
 
 
 def _noisy(where: Situation, level: float, trial: int) -> SimulationOptions:
-    rate = _VELOCITY_NOISE / where.scale.time
-    return _lasting(where, trial, sensors=SensorOptions(level, rate * level, trial))
+    return _lasting(where, trial, sensors=SensorOptions.of_size(level, where.scale, trial))
 
 
 def _late(where: Situation, level: float, trial: int) -> SimulationOptions:

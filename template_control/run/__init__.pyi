@@ -1,3 +1,8 @@
+from .config import GaitChoice as GaitChoice
+from .config import OwnPlanner as OwnPlanner
+from .config import RobotChoice as RobotChoice
+from .config import RunConfig as RunConfig
+from .data_frame import columns as columns
 from .options import FallOptions as FallOptions
 from .options import Push as Push
 from .options import SimulationOptions as SimulationOptions

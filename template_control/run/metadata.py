@@ -10,6 +10,8 @@ import numpy as np
 
 from template_control.embedding.controller import EmbeddingController
 from template_control.fitting import shown
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import plant_name
 from template_control.run.options import SimulationOptions
 from template_control.run.recorder import Recorder
@@ -38,7 +40,7 @@ def about(controller: EmbeddingController, o: SimulationOptions) -> dict[str, An
         "stiffness_slots": [[node.rear, node.front] for node in nodes],
         **_gait(controller),
         "plant": plant_name(o.plant),
-        "options": o,
+        "options": _told(o),
     }
     return {name: plain(value) for name, value in found.items()}
 
@@ -61,6 +63,12 @@ def outcome(recorder: Recorder, time_step: float, reason: str, seconds: float) -
         "summary": recorder.summary(),
     }
     return {name: plain(value) for name, value in found.items()}
+
+
+def _told(o: SimulationOptions) -> dict[str, Any]:
+    """The options as data; a plant of one's own is not data."""
+    told: dict[str, Any] = plain(o)
+    return told if isinstance(o.plant, PlantOptions | IdealOptions) else {**told, "plant": {}}
 
 
 def _gait(controller: EmbeddingController) -> dict[str, Any]:

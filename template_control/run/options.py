@@ -11,6 +11,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
+from template_control.plant.plant import Plant, check_world
 from template_control.ranges import Count, Index, NotNegative, Positive
 from template_control.robot.start import Pose
 from template_control.run.sensing import SensorOptions
@@ -80,7 +81,8 @@ class SimulationOptions(Checked):
     Attributes:
         steps: largest number of steps from section to section. None: the run goes to the end of
             the route, or makes 50 steps where the route has no end.
-        plant: the world; the type of its options says which.
+        plant: the world; the type of its options says which. Or a plant of one's own: the run
+            resets it, and leaves it open.
         embedding: the controller's tuning.
         start: (3,) VLO state to start in [m/s, m, m/s]; None for the route's.
         pose: CoM and feet to start with; None: over the stance foot at VLO. A route that
@@ -94,12 +96,13 @@ class SimulationOptions(Checked):
         falls: when the robot counts as fallen.
 
     Raises:
-        ParameterError: if a value is of a wrong type or out of its range, the delay is not a whole
-            number of physics steps up to 1 s, or a push comes after the last step.
+        ParameterError: if a value is of a wrong type or out of its range, the plant is none, the
+            delay is not a whole number of physics steps up to 1 s, or a push comes after the
+            last step.
     """
 
     steps: Count | None = None
-    plant: PlantOptions | IdealOptions = field(default_factory=PlantOptions)
+    plant: PlantOptions | IdealOptions | Plant = field(default_factory=PlantOptions)
     embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
     start: tuple[float, float, float] | None = None
     pose: Pose | None = None
@@ -110,6 +113,7 @@ class SimulationOptions(Checked):
     falls: FallOptions = field(default_factory=FallOptions)
 
     def __post_init__(self) -> None:
+        check_world(self.plant)
         super().__post_init__()
         if self.steps is not None:
             check_pushes(self.pushes, self.steps)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control import storage
+from template_control.run.data_frame import to_dataframe
 from template_control.run.old_record import from_walk
 
 Array = NDArray[np.float64]
@@ -111,6 +113,43 @@ class Record:
     def com_error(self) -> Array:
         """(T, 2) template less robot at the robot's phase [m]."""
         return self.template_com - self.com
+
+    def __repr__(self) -> str:
+        m = self.metadata
+        end = f"; fell: {m['fall_reason']}" if self.fell else ""
+        end += "; interrupted" if m.get("interrupted") else ""
+        return (
+            f"<Record of {m['robot']}, gait {m['gait']}: {self.steps} steps in"
+            f" {m['duration']:.2f} s, {len(self.time)} samples{end}>"
+        )
+
+    def to_dataframe(self) -> Any:
+        """The run as a pandas ``DataFrame``: a row a sample, a column a quantity.
+
+        Columns are named after the fields of this class and what their axes stand for, such as
+        ``time``, ``q_pitch``, ``torque_left_knee``, ``com_x`` and ``contact_force_left_foot_y``.
+        ``frame.attrs["units"]`` has the SI unit of each column by name.
+
+        Raises:
+            MissingPackageError: if pandas is not installed.
+        """
+        return to_dataframe(self)
+
+    def plot(self, figure: str = "stick_diagram") -> Any:
+        """Draw one figure of the run, as :func:`template_control.plot` does.
+
+        Args:
+            figure: its name, a key of :data:`template_control.view.FIGURES`.
+
+        Returns:
+            The Matplotlib figure.
+
+        Raises:
+            ParameterError: if there is no such figure.
+            RecordError: if the run has no samples.
+        """
+        # A run knows no view. The root knows every room, and is asked when somebody wants to see.
+        return importlib.import_module("template_control").plot(self, figure)
 
     def save(self, path: str | Path) -> Path:
         """Write the run as a compressed ``.npz``.

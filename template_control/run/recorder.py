@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,27 +50,29 @@ class Recorder:
         nv = controller.robot.nv
         nu = nv - BASE_DOF
         widths = {
+            # Single numbers first: they are written together, and so are the arrays.
             "time": 1,
+            "angular_momentum": 1,
+            "template_com": 2,
+            "template_velocity": 2,
+            "node": 1,
+            "rear": 1,
+            "solved": 1,
+            "push": 1,
             "q": nv,
             "v": nv,
             "torque": nu,
             "com": 2,
             "com_velocity": 2,
-            "angular_momentum": 1,
-            "template_com": 2,
-            "template_velocity": 2,
             "foot": 4,
             "joint": 2 * nu,
             "contact_force": 4,
             "template_force": 4,
-            "node": 1,
-            "rear": 1,
-            "solved": 1,
             "swing_reference": 4,
-            "push": 1,
         }
         ends = np.cumsum(list(widths.values()))
         starts = ends - list(widths.values())
+        self._numbers = int(starts[list(widths).index("q")])
         self._columns = {
             name: slice(int(a), int(b)) for name, a, b in zip(widths, starts, ends, strict=True)
         }
@@ -82,8 +85,9 @@ class Recorder:
         self.ticks = 0
         self.peak_torque = np.zeros(nu)
         self._torque_square = np.zeros(nu)
-        self._error_square = np.zeros(2)
-        self.error_max = np.zeros(2)
+        self._error_square = [0.0, 0.0]
+        self.error_max = [0.0, 0.0]
+        self._nearly = 0.999 * controller.qp.torque_limit
         self.saturated = 0
         self.failures = 0
 
@@ -101,10 +105,11 @@ class Recorder:
         size = np.abs(torque)
         np.maximum(self.peak_torque, size, out=self.peak_torque)
         self._torque_square += torque * torque
-        self.saturated += bool(np.any(size >= 0.999 * c.qp.torque_limit))
+        self.saturated += bool((size >= self._nearly).any())
         self.failures += not solution.solved
         template_x, template_y = c.template_com
-        for axis, error in enumerate((template_x - r.com[0], template_y - r.com[1])):
+        x, y = r.com.tolist()
+        for axis, error in enumerate((template_x - x, template_y - y)):
             self._error_square[axis] += error * error
             self.error_max[axis] = max(self.error_max[axis], abs(error))
         if self.ticks == len(self._times):
@@ -113,43 +118,32 @@ class Recorder:
         if self.ticks % self.every == 0:
             if self.rows == len(self._table):
                 self._table = np.concatenate((self._table, np.empty_like(self._table)))
-            foot = r.foot_position
             r.joint_positions(self._joint)
             swing = self._swing
             swing[:] = np.nan
             for leg in c.station.control.swings:
                 swing[c.feet.of[leg]] = c.wanted.foot[c.feet.of[leg], :, 0]
-            self._table[self.rows] = (
+            row, numbers = self._table[self.rows], self._numbers
+            row[:numbers] = (
                 time,
-                *q,
-                *v,
-                *torque,
-                *r.com,
-                *r.com_velocity,
                 r.angular_momentum,
                 template_x,
                 template_y,
                 c.reference[2],
                 c.reference[3],
-                *foot[0],
-                *foot[1],
-                *self._joint.ravel(),
-                *contact_force[0],
-                *contact_force[1],
-                *c.template_forces[0],
-                *c.template_forces[1],
                 self._node_index[c.node.name],
                 c.feet.of[Leg.REAR],
                 solution.solved,
-                *swing[0],
-                *swing[1],
                 push,
             )
+            state = (q, v, torque, r.com, r.com_velocity, r.foot_position, self._joint)
+            forces = (contact_force, c.template_forces, swing)
+            np.concatenate((*state, *forces), axis=None, out=row[numbers:])
             self.rows += 1
         self.ticks += 1
 
-    def _rms(self, squares: Array) -> list[float]:
-        return [float(x) for x in np.sqrt(squares / max(self.ticks, 1))]
+    def _rms(self, squares: Sequence[float] | Array) -> list[float]:
+        return [float(x) for x in np.sqrt(np.asarray(squares) / max(self.ticks, 1))]
 
     def summary(self) -> dict[str, Any]:
         """Statistics over all ticks, sampled or not."""

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from template_control.checked import Checked
 from template_control.ranges import Index, NotNegative
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
 
 _TRANSLATIONS = 2  # the base's x and y come first
+_VELOCITY_NOISE = 20.0  # [1/s] noise of velocities over that of positions
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,21 @@ class SensorOptions(Checked):
     position_noise: NotNegative = 0.0
     velocity_noise: NotNegative = 0.0
     seed: Index = 0
+
+    @classmethod
+    def of_size(cls, noise: float, scale: Scale, seed: int = 0) -> SensorOptions:
+        """Noise told by one number.
+
+        Args:
+            noise: of the angles [rad]; velocities have 20 times as much per second on the
+                reference template, and on another one per its own unit of time.
+            scale: of the robot's template.
+            seed: of the draws.
+
+        Raises:
+            ParameterError: if the noise is negative or not finite.
+        """
+        return cls(noise, _VELOCITY_NOISE / scale.time * noise, seed)
 
 
 class Sensors:

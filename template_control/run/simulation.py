@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 
@@ -13,8 +14,9 @@ from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.robot_route import robot_route
+from template_control.embedding.section_report import SectionReport
 from template_control.errors import ParameterError
-from template_control.plant.plant import Plant, open_plant
+from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import state_at_vlo, state_in
 from template_control.run.in_use import in_use
@@ -31,6 +33,8 @@ from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
+
+_LOG = logging.getLogger(__name__)
 
 _STEPS = 50  # of a run on a route that does not end, where the options do not say
 
@@ -94,6 +98,7 @@ def simulate(
     with in_use(robot, controller.planning.route, *controller.planning.planners.values()):
         q, v = _start(controller, o)
         controller.start(0 if o.pose is None else o.pose.rear)
+        _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
         # Before the run, which would be lost if this failed after it.
         metadata = about(controller, o)
         begin = time.perf_counter()
@@ -107,9 +112,13 @@ def simulate(
                     raise
                 reason, interrupted = "", True
         seconds = time.perf_counter() - begin
+        if reason:
+            _LOG.warning("%s fell: %s", robot.name, reason)
         metadata |= outcome(recorder, o.plant.time_step, reason, seconds)
         metadata["interrupted"] = interrupted
-        return recorder.record(metadata)
+        record = recorder.record(metadata)
+    _LOG.info("%r in %.2f s of wall-clock time", record, seconds)
+    return record
 
 
 def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
@@ -185,6 +194,7 @@ def _loop(
             return f"{reason} at {now:.3f} s, in step {done + 1}"
         if len(controller.reports) - 1 > done:
             done = len(controller.reports) - 1
+            _tell(controller.reports[-1], done)
             if progress is not None:
                 progress(done)
         try:
@@ -193,6 +203,30 @@ def _loop(
             return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
     return ""
+
+
+def _tell(report: SectionReport, number: int) -> None:
+    """Log what was decided at a section, and where the template cannot do it."""
+    decision = report.decision
+    _LOG.debug(
+        "%.3f s, step %d: at %s %s, wanted %s, controls %s",
+        report.time,
+        number,
+        report.section.name,
+        report.state,
+        report.target,
+        decision.controls,
+    )
+    if not decision.feasible:
+        _LOG.warning(
+            "%.3f s, step %d: no stride of the template starts from %s at %s",
+            report.time,
+            number,
+            report.state,
+            report.section.name,
+        )
+    elif not decision.nominal:
+        _LOG.info("%.3f s, step %d: the planner left its own law", report.time, number)
 
 
 def _push(pushes: tuple[Push, ...], controller: EmbeddingController, now: float) -> float:

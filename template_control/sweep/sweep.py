@@ -15,7 +15,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +31,15 @@ from rich.progress import (
 from template_control.checked import Checked
 from template_control.errors import SweepError
 from template_control.fitting import check, shown
-from template_control.ranges import Count, Index
+from template_control.ranges import Count, Index, Range
 from template_control.sweep.executor import ExecutorLostError, check_pickles, run_calls
 from template_control.sweep.file import Outcome, SweepFile, header
 from template_control.terminal import plain_console
 
 Item = dict[str, Any]
+
+
+_MOST_DRAWS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -137,7 +140,8 @@ def sample(count: int, seed: int, **ranges: tuple[float, float]) -> list[Item]:
     Raises:
         SweepError: if a range is not two finite numbers, low first.
     """
-    count, seed = (check(k, v, Index, SweepError) for k, v in (("count", count), ("seed", seed)))
+    count = check("count", count, Annotated[int, Range(0, _MOST_DRAWS)], SweepError)
+    seed = check("seed", seed, Index, SweepError)
     for name, bounds in ranges.items():
         pair = check(f"range {name}", bounds, tuple[float, float], SweepError)
         if pair[0] > pair[1]:

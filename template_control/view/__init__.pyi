@@ -1,4 +1,5 @@
 from .figures import FIGURES as FIGURES
+from .figures import plot as plot
 from .figures import save_figures as save_figures
 from .replay.replay import save_film as save_film
 from .replay.replay import save_html as save_html

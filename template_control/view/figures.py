@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import matplotlib as mpl
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.checked import checked
-from template_control.errors import RecordError
+from template_control.errors import ParameterError, RecordError
 from template_control.run.record import Record
 from template_control.view.state_figures import (
     energies,
@@ -189,6 +190,35 @@ FIGURES: dict[str, Callable[[Record], Figure]] = {
 """Every figure of a walk, by file name."""
 
 
+def plot(record: Record, figure: str = "stick_diagram") -> Figure:
+    """Draw one of the :data:`FIGURES` of a run.
+
+    ``plot(record, "com").savefig("com.png")`` writes it; a notebook shows it.
+
+    Args:
+        record: the run.
+        figure: name of the figure.
+
+    Raises:
+        ParameterError: if there is no such figure.
+        RecordError: if the run has no samples.
+    """
+    if figure not in FIGURES:
+        raise ParameterError(f"there is no figure {figure!r}: give one of {', '.join(FIGURES)}")
+    _check_samples(record)
+    with _style():
+        return FIGURES[figure](record)
+
+
+def _style() -> AbstractContextManager[None]:
+    return mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
+
+
+def _check_samples(record: Record) -> None:
+    if len(record.time) < 2:
+        raise RecordError("the run has fewer than two samples: there is nothing to draw")
+
+
 @checked
 def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Path]:
     """Draw all :data:`FIGURES` of a run as PNG.
@@ -204,10 +234,9 @@ def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Pat
     Raises:
         RecordError: if the folder cannot be written or the run has no samples.
     """
-    if len(record.time) < 2:
-        raise RecordError("the run has fewer than two samples: there is nothing to draw")
+    _check_samples(record)
     paths = []
-    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+    with _style():
         for name, draw in FIGURES.items():
             path = Path(folder) / f"{name}.png"
             try:

@@ -59,7 +59,7 @@ def assemble(
     tasks: Array,
     costs: Array,
     limits: Array,
-    out: Matrices,
+    out: tuple[Array, ...],
 ) -> bool:
     """Fill the QP's matrices in place.
 
@@ -73,13 +73,13 @@ def assemble(
         limits: (nu + c + 2,) largest joint torques [N m], largest normal force of each stance foot
             [N] (inf: none), coefficient of the friction cones, m g [N]. One array, as each one
             that a compiled function is handed costs time.
-        out: overwritten.
+        out: the arrays of :class:`Matrices`, overwritten; a plain tuple, as a compiled function
+            is called with a named one in twice the time.
 
     Returns:
         False where the elimination is singular.
     """
-    a_map, f_map, factor, gradient = out.a_map, out.f_map, out.factor, out.gradient
-    constraint, lower, upper = out.constraint, out.lower, out.upper
+    a_map, f_map, factor, gradient, constraint, lower, upper = out
     nv = mass_matrix.shape[0]
     nu = gradient.shape[0]
     feet = contact.shape[0] // 2

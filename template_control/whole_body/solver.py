@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -24,6 +25,8 @@ from template_control.whole_body.problem import (
 from template_control.whole_body.task import TaskStack
 
 Array = NDArray[np.float64]
+
+_LOG = logging.getLogger(__name__)
 
 _proxqp = proxsuite.proxqp
 _SOLVED = _proxqp.QPSolverOutput.PROXQP_SOLVED
@@ -107,6 +110,7 @@ class _Workspace:
             lower=np.zeros(rows),
             upper=np.zeros(rows),
         )
+        self.out = tuple(self.matrices)
         self.limits = np.zeros(nu + feet + 2)
         self.limits[-1] = weight
         self.torque_limit, self.cap = self.limits[:nu], self.limits[nu : nu + feet]
@@ -184,6 +188,7 @@ class WholeBodyQp:
             _Workspace(robot.nv, nu, feet, robot.mass * robot.gravity) for feet in range(3)
         ]
         self._torque = np.zeros(nu)
+        self._failing = False
 
     def solve(self, tasks: TaskStack, stance: Stance, load: float = 1.0) -> Solution:
         """Solve one tick.
@@ -211,11 +216,14 @@ class WholeBodyQp:
             tasks.table,
             self._costs,
             w.limits,
-            w.matrices,
+            w.out,
         )
         start = time.perf_counter()
         solved = regular and w.solve()
         seconds = time.perf_counter() - start
+        if not solved:
+            self._tell(regular, stance)
+        self._failing = not solved
         if solved:
             torques(w.matrices.factor, w.qp.results.x, limit, self._torque)
         else:
@@ -224,3 +232,14 @@ class WholeBodyQp:
         acceleration = np.empty(robot.nv)
         follow(w.matrices.a_map, w.matrices.f_map, self._torque, acceleration, force)
         return Solution(load * self._torque, force, acceleration, solved, seconds)
+
+    def _tell(self, regular: bool, stance: Stance) -> None:
+        """Log that the last solved torques are kept, once for failures in a row."""
+        if not self._failing:
+            why = "has no solution within its limits" if regular else "is singular"
+            _LOG.warning(
+                "%s: the QP with %d stance feet %s: the last torques are kept",
+                self.robot.name,
+                len(stance.feet),
+                why,
+            )

@@ -9,7 +9,7 @@ gait and not beside it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +102,8 @@ class LqrOptions(Checked):
             virtual bottom than after takes energy out, the reverse puts some in.
     """
 
+    kind: ClassVar[str] = "lqr"
+
     state_cost: _Three = tuned(
         (10.0, 100.0, 10.0), PER_SPEED_SQUARED, PER_LENGTH_SQUARED, PER_SPEED_SQUARED
     )
@@ -168,6 +170,9 @@ class LqrPlanner:
         )
         self._settling = _settling_map(self.a, self.b, np.array(o.tolerance), o.control_weight)
         self._law = self._aim()
+
+    def __repr__(self) -> str:
+        return f"<LqrPlanner on {self.gait!r}>"
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`: back to the gait it was made for, without an offset."""

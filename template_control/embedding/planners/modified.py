@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,8 @@ class ModifiedOptions(Checked):
         map_kind: the return map that steps are tried on.
     """
 
+    kind: ClassVar[str] = "modified"
+
     angle_range: Interval = tuned((-0.14, 0.08))
     stiffness_range: Interval = tuned((0.5, 1.5))
     top_margin: NotNegative = tuned(0.01)
@@ -63,6 +66,9 @@ class ModifiedPlanner:
         self._kernel = stride_kernel(gait.parameters, "w")
         k0 = gait.parameters.leg_stiffness
         self._stiffness = np.array(self.options.stiffness_range) * k0
+
+    def __repr__(self) -> str:
+        return f"<ModifiedPlanner on {self.gait!r}>"
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`: back to the gait it was made for."""

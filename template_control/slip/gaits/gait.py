@@ -83,6 +83,13 @@ class WalkingGait(Checked):
     step_length: float
     step_duration: Positive
 
+    def __repr__(self) -> str:
+        angle = np.degrees(self.controls[Slot.TOUCHDOWN_ANGLE])
+        return (
+            f"<WalkingGait {self.name}: {self.mean_speed:.3f} m/s, touchdown angle {angle:.2f} deg,"
+            f" at VLO {self.vlo[0]:.3f} m/s and {self.vlo[1]:.4f} m>"
+        )
+
     @property
     def stride(self) -> str:
         """Kind of stride: from VLO to VLO."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from template_control.checked import checked
 from template_control.errors import GaitError
+from template_control.ranges import Angle
 from template_control.slip.gaits.gait import WalkingGait, gait_at, root
 from template_control.slip.parameters import SlipParameters
 
@@ -26,21 +27,27 @@ def _nominal_angle(mean_speed: float, rest_length: float, gravity: float) -> flo
 
 
 @checked
-def mean_speed_range(parameters: SlipParameters) -> tuple[float, float] | None:
+def mean_speed_range(
+    parameters: SlipParameters, touchdown_angle: float | None = None
+) -> tuple[float, float] | None:
     """Slowest and fastest mean speed of :func:`gait_for_speed` [m/s], to a centimetre per second.
 
     They are those of the slowest gait at the steepest angle, and of the fastest at the flattest.
 
     Args:
         parameters: the template; both legs have its stiffness k0.
+        touchdown_angle: alpha of all gaits [rad]; None: the usual one at each speed.
 
     Returns:
         Both speeds, or None if there is no gait at one of these angles.
     """
+    steep, flat = float(np.radians(_ANGLES[0])), float(np.radians(_ANGLES[-1]))
+    if touchdown_angle is not None:
+        steep = flat = touchdown_angle
     unit = np.sqrt(parameters.gravity * parameters.rest_length)
     ends = []
-    for angle, speeds in ((_ANGLES[0], _VLO_SPEEDS), (_ANGLES[-1], _VLO_SPEEDS[::-1])):
-        means = (_mean_speed(parameters, float(np.radians(angle)), unit * s) for s in speeds)
+    for angle, speeds in ((steep, _VLO_SPEEDS), (flat, _VLO_SPEEDS[::-1])):
+        means = (_mean_speed(parameters, angle, unit * s) for s in speeds)
         ends.append(next((mean for mean in means if np.isfinite(mean)), np.nan))
     if not np.isfinite(ends).all():
         return None
@@ -57,7 +64,10 @@ def _mean_speed(parameters: SlipParameters, touchdown_angle: float, vlo_speed: f
 
 @checked
 def gait_for_speed(
-    parameters: SlipParameters, mean_speed: float, name: str = "walk"
+    parameters: SlipParameters,
+    mean_speed: float,
+    name: str = "walk",
+    touchdown_angle: Angle | None = None,
 ) -> WalkingGait:
     """The symmetric gait with a given mean forward speed.
 
@@ -65,6 +75,7 @@ def gait_for_speed(
         parameters: the template; both legs have its stiffness k0.
         mean_speed: step length over step duration [m/s].
         name: of the gait.
+        touchdown_angle: alpha, from the ground to the leg [rad]; None: the usual one at this speed.
 
     Raises:
         GaitError: naming the range, if there is none, or the speed is not positive.
@@ -73,7 +84,9 @@ def gait_for_speed(
     if not (np.isfinite(mean_speed) and mean_speed > 0.0):
         raise GaitError(f"speed is {mean_speed!r} m/s: give a positive number")
     unit = np.sqrt(p.gravity * p.rest_length)
-    angle = _nominal_angle(mean_speed, p.rest_length, p.gravity)
+    angle = touchdown_angle
+    if angle is None:
+        angle = _nominal_angle(mean_speed, p.rest_length, p.gravity)
 
     def surplus(vlo_speed: float) -> float:
         return _mean_speed(p, angle, vlo_speed) - mean_speed
@@ -86,10 +99,13 @@ def gait_for_speed(
             speed = root(surplus, (lo, hi), _XTOL, _RTOL)
             if speed is not None:
                 return gait_at(p, angle, speed, name)
-    found = mean_speed_range(p)
-    if found is None or found[0] <= mean_speed <= found[1]:
+    found = mean_speed_range(p, touchdown_angle)
+    at = "" if touchdown_angle is None else f" and {np.degrees(angle):g} deg at touchdown"
+    if found is not None and not found[0] <= mean_speed <= found[1]:
+        hint = f"give one from {found[0]:.2f} to {found[1]:.2f} m/s"
+    elif touchdown_angle is not None:
+        hint = "give another angle, or none"
+    else:
         stiffness = p.leg_stiffness * p.rest_length / (p.mass * p.gravity)
         hint = f"k0 l0 / (m g) is {stiffness:.3g}, and 21 has gaits at all usual speeds"
-    else:
-        hint = f"give one from {found[0]:.2f} to {found[1]:.2f} m/s"
-    raise GaitError(f"no walking gait at a mean speed of {mean_speed:g} m/s: {hint}")
+    raise GaitError(f"no walking gait at a mean speed of {mean_speed:g} m/s{at}: {hint}")

@@ -58,6 +58,13 @@ class ScenarioRecord:
     solve_seconds: Array
     metadata: dict[str, Any]
 
+    def __repr__(self) -> str:
+        end = "completed" if self.completed else f"ended: {self.metadata['failure']}"
+        return (
+            f"<ScenarioRecord of {self.metadata['name']}: {len(self.stride)} strides in"
+            f" {self.time[-1]:.2f} s, {len(self.time)} samples, {end}>"
+        )
+
     @property
     def completed(self) -> bool:
         """Whether every segment was gone through."""

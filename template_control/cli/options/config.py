@@ -1,0 +1,70 @@
+"""``--config``, and the run that a command's options describe."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from template_control.cli.options.gait import gait_choice, planner_choice, scenario_choice
+from template_control.cli.options.robot import robot_choice
+from template_control.cli.options.world import simulation_choice
+from template_control.errors import ParameterError
+from template_control.run.config import Ready, RunConfig
+from template_control.run.sensing import SensorOptions
+from template_control.run.simulation import perturbed_start
+from template_control.slip.similarity import Scale
+
+
+def add_config(parser: argparse.ArgumentParser) -> None:
+    """Add ``--config``."""
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="TOML",
+        help="a run's options, such as the run.toml that lies beside every run.npz; options on the"
+        " command line come before those of the file",
+    )
+
+
+def config_from(options: argparse.Namespace) -> RunConfig:
+    """The run that was asked for, but for what needs its gait: see :func:`prepared`.
+
+    Args:
+        options: as parsed, of all groups of this folder.
+
+    Raises:
+        TemplateControlError: naming the option or the key that is wrong.
+    """
+    base = RunConfig() if options.config is None else RunConfig.load(options.config)
+    scenario = scenario_choice(options, base.scenario)
+    return RunConfig(
+        robot=robot_choice(options, base.robot),
+        gait=gait_choice(options, base.gait),
+        planner=planner_choice(options, base.planner),
+        simulation=simulation_choice(options, base.simulation, scenario is not None),
+        scenario=scenario,
+    )
+
+
+def prepared(options: argparse.Namespace) -> tuple[RunConfig, Ready]:
+    """The run that was asked for, and what it is made of.
+
+    Args:
+        options: as parsed, of all groups of this folder.
+
+    Raises:
+        TemplateControlError: naming the option or the key that is wrong.
+    """
+    config = config_from(options)
+    if options.seed is not None and config.scenario is not None:
+        raise ParameterError("--seed does not go with a scenario: leave one out")
+    ready = config.prepare()
+    simulation = config.simulation
+    if options.seed is not None:
+        simulation = replace(simulation, start=perturbed_start(ready.gait, options.seed))
+    if options.noise is not None:
+        scale = Scale.of(ready.gait.parameters)
+        sensors = SensorOptions.of_size(options.noise, scale, simulation.sensors.seed)
+        simulation = replace(simulation, sensors=sensors)
+    return replace(config, simulation=simulation), ready

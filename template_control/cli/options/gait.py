@@ -1,0 +1,123 @@
+"""The options that say what a robot does: gait, scenario and planner."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from template_control.cli.options.ranges import check_ranges
+from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.planners.modified import ModifiedOptions
+from template_control.errors import ParameterError
+from template_control.run.config import GaitChoice, OwnPlanner, PlannerChoice
+from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.scenario.scenario import Scenario, load_scenario
+
+_PLANNERS = {options.kind: options for options in (LqrOptions, ModifiedOptions)}
+_MAPS = {kind.name.lower(): kind for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)}
+_RANGES = {"speed": (0.01, 10.0), "touchdown_angle": (1.0, 89.0)}
+
+
+def add_gait_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--scenario``, ``--gait``, ``--speed`` and ``--touchdown-angle``."""
+    parser.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="TOML",
+        help="a speed profile to walk, as template-control slip takes it, instead of one gait; it"
+        " ends with the profile, or after --steps",
+    )
+    parser.add_argument(
+        "--gait",
+        choices=("walk", "paper"),
+        help="walk (if not given): the robot's own, for most touchdown angle 66 deg and 1.1 m/s at"
+        " VLO; paper: the equilibrium of Section IV-D, 0.9818 m and 826 J; both are given for"
+        " l0 = 1 m and 80 kg and scaled to the robot",
+    )
+    parser.add_argument(
+        "--speed",
+        type=float,
+        metavar="M/S",
+        help="mean forward speed of the gait instead of the walk gait's own",
+    )
+    parser.add_argument(
+        "--touchdown-angle",
+        type=float,
+        metavar="DEG",
+        help="of the gait instead of the walk gait's own, from the ground to the leg",
+    )
+
+
+def add_planner_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--planner`` and ``--map``."""
+    parser.add_argument(
+        "--planner",
+        metavar="NAME|MODULE:CLASS",
+        help="lqr (if not given): LQR on the VLO state with an offset estimate; modified: the"
+        " paper's modified walking controller, equation (38); or a class of your own, called with"
+        " the gait",
+    )
+    parser.add_argument(
+        "--map",
+        choices=tuple(_MAPS),
+        help="return map that the modified planner tries its steps on; exact if not given",
+    )
+
+
+def gait_choice(options: argparse.Namespace, base: GaitChoice) -> GaitChoice:
+    """The gait that was asked for.
+
+    Args:
+        options: as parsed.
+        base: what holds where an option was not given.
+
+    Raises:
+        ParameterError: if a number is out of its range, or the options do not go together.
+    """
+    check_ranges(options, _RANGES)
+    given = {name: getattr(options, name) for name in _RANGES}
+    given["name"] = options.gait
+    return replace(base, **{name: value for name, value in given.items() if value is not None})
+
+
+def scenario_choice(options: argparse.Namespace, base: Scenario | None) -> Scenario | None:
+    """The scenario that was asked for.
+
+    Args:
+        options: as parsed.
+        base: what holds where the option was not given.
+
+    Raises:
+        ScenarioError: if it cannot be read.
+    """
+    return base if options.scenario is None else load_scenario(options.scenario)
+
+
+def planner_choice(options: argparse.Namespace, base: PlannerChoice) -> PlannerChoice:
+    """The planner that was asked for.
+
+    Args:
+        options: as parsed.
+        base: what holds where an option was not given.
+
+    Raises:
+        ParameterError: if there is no such planner, or it takes no map.
+    """
+    chosen = base
+    if options.planner in _PLANNERS and options.planner != base.kind:
+        chosen = _PLANNERS[options.planner]()
+    elif options.planner is not None and options.planner not in _PLANNERS:
+        if ":" not in options.planner:
+            raise ParameterError(
+                f"--planner is {options.planner!r}: give {', '.join(_PLANNERS)} or module:Class"
+            )
+        chosen = OwnPlanner(options.planner)
+    if options.map is None:
+        return chosen
+    if not isinstance(chosen, ModifiedOptions):
+        raise ParameterError(
+            f"--map does not go with planner {chosen.kind}: leave it out, or give --planner"
+            " modified"
+        )
+    return replace(chosen, map_kind=_MAPS[options.map])

@@ -1,0 +1,97 @@
+"""The options that say which robot: shared by the commands that walk one."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from template_control.errors import ParameterError
+from template_control.robot.library import ROBOTS
+from template_control.run.config import RobotChoice
+
+_DEFAULT = RobotChoice().model
+
+
+def add_robot(parser: argparse.ArgumentParser, default: str | None = _DEFAULT) -> None:
+    """Add ``--robot``.
+
+    Args:
+        parser: of the command.
+        default: where it is not given; None where the command must know that it is not.
+    """
+    parser.add_argument(
+        "--robot",
+        default=default,
+        metavar="NAME|URDF",
+        help=f"a shipped robot ({', '.join(ROBOTS)}) or the path of a planar URDF; {_DEFAULT} if"
+        " not given",
+    )
+
+
+def add_robot_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--robot`` and what a URDF of one's own may need."""
+    add_robot(parser, None)
+    own = parser.add_argument_group("a URDF of your own")
+    own.add_argument(
+        "--feet",
+        nargs=2,
+        metavar=("LEFT", "RIGHT"),
+        help="its foot links; left_foot and right_foot if not given",
+    )
+    own.add_argument(
+        "--sagittal-joints",
+        nargs=4,
+        metavar="JOINT",
+        help="of a 3D URDF: hips and knees; the other joints are locked, the base is held in"
+        " the sagittal plane",
+    )
+    own.add_argument(
+        "--locked",
+        nargs="+",
+        metavar="JOINT=RAD",
+        help="of a 3D URDF: angles of locked joints; 0 for those not named",
+    )
+    own.add_argument(
+        "--foot-radius",
+        type=float,
+        metavar="M",
+        help="of a 3D URDF: radius of the spheres put into its feet",
+    )
+
+
+def robot_choice(options: argparse.Namespace, base: RobotChoice) -> RobotChoice:
+    """The robot that was asked for.
+
+    Args:
+        options: as parsed.
+        base: what holds where an option was not given. It describes one robot: with another
+            ``--robot`` nothing of it is kept.
+    """
+    given: dict[str, Any] = {}
+    if options.robot is not None:
+        base = RobotChoice()
+        given["model"] = _model(options.robot)
+    for name in ("feet", "sagittal_joints"):
+        if getattr(options, name) is not None:
+            given[name] = tuple(getattr(options, name))
+    if options.foot_radius is not None:
+        given["foot_radius"] = options.foot_radius
+    if options.locked is not None:
+        given["locked"] = dict(map(_locked, options.locked))
+    return replace(base, **given)
+
+
+def _model(robot: str) -> str:
+    """A path is made absolute, so that what is written down does not depend on the folder."""
+    own = robot not in ROBOTS and ("/" in robot or robot.endswith(".urdf"))
+    return str(Path(robot).absolute()) if own else robot
+
+
+def _locked(text: str) -> tuple[str, float]:
+    joint, _, angle = text.rpartition("=")
+    try:
+        return joint, float(angle)
+    except ValueError:
+        raise ParameterError(f"--locked {text}: give JOINT=ANGLE with the angle in rad") from None

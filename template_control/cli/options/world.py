@@ -1,0 +1,154 @@
+"""The options that say how a run goes: plant, disturbances, length."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import Any
+
+from template_control.cli.options.ranges import check_ranges
+from template_control.errors import ParameterError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
+from template_control.run.options import Push, SimulationOptions
+
+_PLANTS = {options.kind: options for options in (PlantOptions, IdealOptions)}
+_DEFAULT = SimulationOptions()
+_RANGES = {
+    "steps": (1, 1_000_000),
+    "friction": (0.05, 5.0),
+    "mass_scale": (0.5, 2.0),
+    "torque_scale": (0.01, 10.0),
+    "noise": (0.0, 1.0),
+    "delay": (0.0, 1.0),
+    "record_every": (1, 1_000_000),
+    "seed": (0, 2**63),
+}
+STEPS = 50
+"""Steps of a run that nobody told when to stop."""
+_LONG = 200  # steps beyond which samples are thinned
+
+
+def add_world_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--plant`` and what it and the motors are like."""
+    parser.add_argument(
+        "--plant",
+        choices=tuple(_PLANTS),
+        help="pybullet if not given; ideal: rigid contacts that stick, no friction; --friction is"
+        " then the controller's cone only",
+    )
+    parser.add_argument(
+        "--friction",
+        type=float,
+        help="Coulomb friction between feet and ground, 0.7 if not given",
+    )
+    parser.add_argument(
+        "--mass-scale",
+        type=float,
+        metavar="FACTOR",
+        help="masses of the simulated robot over those the controller knows",
+    )
+    parser.add_argument(
+        "--torque-scale",
+        type=float,
+        metavar="SHARE",
+        help="share of the URDF's torque limits to use",
+    )
+
+
+def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--push``, ``--noise``, ``--delay`` and ``--seed``."""
+    parser.add_argument(
+        "--push",
+        action="append",
+        metavar="IMPULSE@STEP[:PHASE]",
+        help="push the trunk with IMPULSE N s, forward positive, over 0.1 s, in step STEP (0 is the"
+        " first), PHASE of a step's duration after its VLO; may be given several times",
+    )
+    parser.add_argument(
+        "--noise",
+        type=float,
+        metavar="RAD",
+        help="standard deviation of the noise on measured angles; on positions it is this times"
+        " l0, on velocities 20 times as many per second",
+    )
+    parser.add_argument(
+        "--delay",
+        type=float,
+        metavar="S",
+        help="from a measurement to the torques computed from it, a multiple of 0.001 s",
+    )
+    parser.add_argument(
+        "--seed",
+        type=int,
+        help="perturb the initial state by up to 5 %% in speed and 2 %% of l0 in height, drawn"
+        " with this seed; without it the walk starts on the gait",
+    )
+
+
+def add_length_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--steps`` and ``--record-every``."""
+    parser.add_argument(
+        "--steps",
+        type=int,
+        help=f"steps to walk, VLO to VLO; {STEPS} where no scenario says when to stop",
+    )
+    parser.add_argument(
+        "--record-every",
+        type=int,
+        metavar="N",
+        help=f"keep every n-th sample in run.npz; by default 1 up to {_LONG} steps, then 5",
+    )
+
+
+def simulation_choice(
+    options: argparse.Namespace, base: SimulationOptions, ends: bool
+) -> SimulationOptions:
+    """How the run is to go, but for noise and seed, which need its gait.
+
+    Args:
+        options: as parsed.
+        base: what holds where an option was not given.
+        ends: whether a scenario ends the run.
+
+    Raises:
+        ParameterError: if a number is out of its range.
+    """
+    check_ranges(options, _RANGES)
+    given: dict[str, Any] = {"plant": _plant(options, base)}
+    embedding = {name: getattr(options, name) for name in ("friction", "torque_scale")}
+    given["embedding"] = replace(base.embedding, **_without_none(embedding))
+    if options.push is not None:
+        given["pushes"] = tuple(map(_push, options.push))
+    given["delay"] = options.delay
+    given["steps"] = options.steps or base.steps or (None if ends else STEPS)
+    thinned = base == _DEFAULT and (given["steps"] or 0) > _LONG
+    given["record_every"] = options.record_every or (5 if thinned else None)
+    return replace(base, **_without_none(given))
+
+
+def _plant(options: argparse.Namespace, base: SimulationOptions) -> PlantOptions | IdealOptions:
+    plant = base.plant
+    assert isinstance(plant, PlantOptions | IdealOptions)  # a file holds no other plant
+    if options.plant not in (None, plant.kind):
+        made = _PLANTS[options.plant]
+        plant = made(time_step=plant.time_step, mass_scale=plant.mass_scale)
+    given = {"mass_scale": options.mass_scale}
+    if isinstance(plant, PlantOptions):
+        given["friction"] = options.friction
+    return replace(plant, **_without_none(given))
+
+
+def _without_none(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _push(text: str) -> Push:
+    impulse, _, when = text.partition("@")
+    step, _, phase = when.partition(":")
+    try:
+        return Push(float(impulse), int(step), float(phase or 0.0))
+    except ValueError:
+        raise ParameterError(
+            f"--push {text}: give IMPULSE@STEP or IMPULSE@STEP:PHASE, such as 10@4:0.5"
+        ) from None

@@ -1,0 +1,279 @@
+"""A whole run as data: robot, gait, planner and options, to be written down and done again.
+
+``walk`` writes one beside every run, ``run.toml``; ``walk --config run.toml`` repeats the run.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from template_control import settings, storage
+from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
+from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
+from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.robot_route import robot_route
+from template_control.embedding.robot_template import default_gait, paper_gait, template_for
+from template_control.errors import ParameterError
+from template_control.robot.library import ROBOTS, load_robot
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.run.options import SimulationOptions
+from template_control.run.record import Record
+from template_control.run.simulation import simulate
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.mean_speed import gait_for_speed
+from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.scenario.route import Route
+from template_control.slip.scenario.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class RobotChoice:
+    """Which robot; what a URDF of one's own may need is as in :meth:`PlanarBiped.from_urdf`.
+
+    Attributes:
+        model: a shipped robot, or the path of a URDF.
+        feet: its foot links; None: left_foot and right_foot.
+        sagittal_joints: of a 3D URDF, hips and knees.
+        foot_radius: of the spheres put into the feet of a 3D URDF [m].
+        locked: angle of each locked joint of a 3D URDF that is not at 0 [rad].
+    """
+
+    model: str = "five-link"
+    feet: tuple[str, str] | None = None
+    sagittal_joints: tuple[str, ...] = ()
+    foot_radius: float | None = None
+    locked: Mapping[str, float] = field(default_factory=dict)
+
+    def load(self) -> PlanarBiped:
+        """The robot.
+
+        Raises:
+            RobotError: if there is none, or it is no planar biped.
+            ParameterError: if a shipped robot comes with what only a URDF needs.
+        """
+        own = {
+            "feet": self.feet,
+            "sagittal_joints": self.sagittal_joints,
+            "foot_radius": self.foot_radius,
+            "locked": self.locked,
+        }
+        given = {name: value for name, value in own.items() if value}
+        if not given:
+            return load_robot(self.model)
+        if self.model in ROBOTS:
+            names = ", ".join(name.replace("_", " ") for name in given)
+            raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")
+        return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class GaitChoice:
+    """Which gait of the robot's template.
+
+    Attributes:
+        name: "walk", the robot's own; or "paper", the equilibrium of Section IV-D.
+        speed: mean forward speed instead of the walk's own [m/s].
+        touchdown_angle: from the ground to the leg, instead of the walk's own [deg].
+
+    Raises:
+        ParameterError: if the paper's gait is given a speed or an angle.
+    """
+
+    name: Literal["walk", "paper"] = "walk"
+    speed: float | None = None
+    touchdown_angle: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("speed", "touchdown_angle"):
+            if getattr(self, name) is not None and self.name != "walk":
+                words = name.replace("_", " ")
+                raise ParameterError(f"{words} does not go with gait {self.name}: leave one out")
+
+    def of(self, robot: PlanarBiped) -> WalkingGait:
+        """The gait on a robot's template.
+
+        Args:
+            robot: its last update is overwritten.
+
+        Raises:
+            GaitError: if the template has no such gait.
+        """
+        if self.name == "paper":
+            return paper_gait(template_for(robot))
+        angle = None if self.touchdown_angle is None else float(np.radians(self.touchdown_angle))
+        if self.speed is not None:
+            return gait_for_speed(template_for(robot), self.speed, touchdown_angle=angle)
+        return default_gait(robot, angle)
+
+
+@dataclass(frozen=True)
+class OwnPlanner:
+    """A planner of the user's own.
+
+    Attributes:
+        path: "module:Class"; the class is called with the gait. The module is looked for in the
+            current folder too.
+    """
+
+    kind: ClassVar[str] = "own"
+
+    path: str
+
+    def make(self, gait: WalkingGait) -> Planner:
+        """The planner.
+
+        Args:
+            gait: that it is to lead to.
+
+        Raises:
+            ParameterError: if there is no such class, or what it makes is no planner.
+        """
+        module, _, name = self.path.partition(":")
+        if not (module and name):
+            raise ParameterError(f"planner {self.path!r}: give lqr, modified or module:Class")
+        folder = os.getcwd()
+        if folder not in sys.path:
+            sys.path.insert(0, folder)
+        try:
+            chosen = getattr(importlib.import_module(module), name, None)
+        except ModuleNotFoundError as error:
+            raise ParameterError(
+                f"planner {self.path!r}: there is no module {error.name}; it is looked for in"
+                " the current folder and among the installed packages"
+            ) from None
+        except SyntaxError as error:
+            raise ParameterError(f"planner {self.path!r} is no Python: {error}") from None
+        if not isinstance(chosen, type):
+            raise ParameterError(f"planner {self.path!r}: module {module} has no class {name}")
+        try:
+            inspect.signature(chosen).bind(gait)
+        except TypeError as error:
+            raise ParameterError(f"planner {self.path!r} must take a gait alone: {error}") from None
+        made = chosen(gait)
+        if not isinstance(made, Planner):
+            lacking = [n for n in _PLANNER_MEMBERS if not hasattr(made, n)]
+            raise ParameterError(
+                f"planner {self.path!r} lacks {', '.join(lacking)}: docs/your_planner.md tells"
+                " what a planner has"
+            )
+        return made
+
+
+_PLANNER_MEMBERS = ("gait", "offset", "reset", "decide", "observe")
+
+PlannerChoice = LqrOptions | ModifiedOptions | OwnPlanner
+"""Which planner, with its tuning."""
+
+
+class Ready(NamedTuple):
+    """What a run is made of, loaded.
+
+    Attributes:
+        robot: the model.
+        gait: that the robot walks, or begins with.
+        route: the scenario on the robot; None: the gait is kept.
+        planners: one for each kind of stride.
+    """
+
+    robot: PlanarBiped
+    gait: WalkingGait
+    route: Route | None
+    planners: Planners
+
+    def run(
+        self, options: SimulationOptions, progress: Callable[[int], None] | None = None
+    ) -> Record:
+        """Do the run; see :func:`~.simulation.simulate`.
+
+        Args:
+            options: how it goes.
+            progress: called with the number of completed steps after each.
+
+        Raises:
+            TemplateControlError: if the robot cannot start so.
+        """
+        (planner,) = self.planners.values()
+        planners = None if self.route is None else self.planners
+        return simulate(self.robot, self.route or planner, options, progress, planners)
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """All that a run depends on; the same library repeats it to the last bit.
+
+    Attributes:
+        robot: which one.
+        gait: which one, where there is no scenario.
+        planner: which one, with its tuning.
+        simulation: how the run goes.
+        scenario: a speed profile instead of one gait.
+
+    Raises:
+        ParameterError: if both a scenario and another gait are given.
+    """
+
+    robot: RobotChoice = field(default_factory=RobotChoice)
+    gait: GaitChoice = field(default_factory=GaitChoice)
+    planner: PlannerChoice = field(default_factory=LqrOptions)
+    simulation: SimulationOptions = field(default_factory=SimulationOptions)
+    scenario: Scenario | None = None
+
+    def __post_init__(self) -> None:
+        if self.scenario is not None:
+            for f in fields(GaitChoice):
+                if getattr(self.gait, f.name) != f.default:
+                    words = "gait" if f.name == "name" else f.name.replace("_", " ")
+                    raise ParameterError(f"{words} does not go with a scenario: leave one out")
+
+    def prepare(self) -> Ready:
+        """Load the robot and make its gait, route and planner.
+
+        Raises:
+            TemplateControlError: if one of them is not to be had.
+        """
+        robot = self.robot.load()
+        route: Route | None = None
+        if self.scenario is None:
+            gait = self.gait.of(robot)
+        else:
+            route = robot_route(robot, self.scenario)
+            gait = walking_gait(route.parameters, float(route.start[0]))
+        return Ready(robot, gait, route, {gait.stride: self._planner(gait)})
+
+    def _planner(self, gait: WalkingGait) -> Planner:
+        if isinstance(self.planner, OwnPlanner):
+            return self.planner.make(gait)
+        if isinstance(self.planner, ModifiedOptions):
+            return ModifiedPlanner(gait, self.planner)
+        return LqrPlanner(gait, self.planner)
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as TOML, every number included.
+
+        Raises:
+            RecordError: if the file cannot be written.
+            ParameterError: if something in it can be given in Python only.
+        """
+        return storage.write_text(path, _HEAD + settings.text(settings.to_table(self)))
+
+    @classmethod
+    def load(cls, path: str | Path) -> RunConfig:
+        """Read what :meth:`save` wrote, or a file that has only some of its keys.
+
+        Raises:
+            ParameterError: naming the file and the key, if it cannot be read, has an unknown key
+                or a value of another type or out of its range.
+        """
+        return settings.read(cls, path)
+
+
+_HEAD = "# template-control walk --config FILE repeats this run.\n"

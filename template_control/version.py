@@ -1,0 +1,8 @@
+"""The version that the installed package's metadata tell: ``pyproject.toml`` is its one source."""
+
+from importlib.metadata import PackageNotFoundError, version
+
+try:
+    __version__ = version("template-control")
+except PackageNotFoundError:  # a checkout on the path that was never installed
+    __version__ = "unknown: not installed"

@@ -1,0 +1,63 @@
+"""What the library tells to the logger ``template_control``."""
+
+import logging
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import template_control as tc
+
+
+def test_nothing_is_printed_unless_somebody_listens():
+    code = """
+import logging
+import template_control
+logging.getLogger("template_control.run").warning("not seen")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout + done.stderr == ""
+
+
+@pytest.fixture
+def weak_walk(robot, default_gait, caplog):
+    """Messages of a walk whose motors are too weak."""
+    options = tc.SimulationOptions(steps=10, embedding=tc.EmbeddingOptions(torque_scale=0.1))
+    with caplog.at_level(logging.DEBUG, "template_control"):
+        record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
+    assert record.fell
+    assert not np.all(record.solved)
+    return record, caplog.records
+
+
+def test_start_end_and_fall_are_told(weak_walk):
+    record, messages = weak_walk
+    told = [(m.levelname, m.getMessage()) for m in messages if m.name.endswith("run.simulation")]
+    assert told[0][0] == "INFO"
+    assert "pybullet" in told[0][1]
+    assert ("WARNING", f"{record.metadata['robot']} fell: {record.metadata['fall_reason']}") in told
+    assert repr(record) in told[-1][1]
+
+
+def test_failures_of_the_qp_in_a_row_are_told_once(weak_walk):
+    record, messages = weak_walk
+    told = [m for m in messages if "the last torques are kept" in m.getMessage()]
+    failing = ~record.solved
+    rows = int(failing[0]) + int(np.sum(failing[1:] & ~failing[:-1]))
+    assert len(told) == rows
+    assert all(m.levelno == logging.WARNING for m in told)
+
+
+def test_every_section_is_told(robot, default_gait, caplog):
+    options = tc.SimulationOptions(steps=4, pushes=(tc.Push(-40.0, step=1),))
+    with caplog.at_level(logging.DEBUG, "template_control"):
+        record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
+    told = [m.getMessage() for m in caplog.records if m.levelno == logging.DEBUG]
+    assert sum("wanted" in text for text in told) == record.steps
+    # What a section decided; a plan between two sections may replace it in the record.
+    (refused,) = [m for m in caplog.records if "no stride of the template" in m.getMessage()]
+    assert refused.levelno == logging.WARNING
+    left = [m for m in caplog.records if "left its own law" in m.getMessage()]
+    assert len(left) >= 1
+    assert all(m.levelno == logging.INFO for m in left)
