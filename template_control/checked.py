@@ -18,6 +18,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from functools import cache, wraps
+from itertools import chain, repeat
 from types import SimpleNamespace
 from typing import Any, ClassVar, ParamSpec, TypeVar, get_type_hints
 
@@ -26,6 +27,8 @@ from template_control.fitting import check
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+_POSITIONAL = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
 
 class Checked:
@@ -57,7 +60,12 @@ def checked(function: Callable[P, T]) -> Callable[P, T]:
     What does not fit is a :class:`~.errors.ParameterError`; a wrong number of arguments stays
     a TypeError.
     """
-    signature = inspect.signature(function)
+    parameters = inspect.signature(function).parameters.values()
+    positional = [p.name for p in parameters if p.kind in _POSITIONAL]
+    rest, named = (
+        next((p.name for p in parameters if p.kind is kind), None)
+        for kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    )
     owner, _, name = function.__qualname__.rpartition(".")
     called = owner if name == "__init__" else name
 
@@ -68,24 +76,19 @@ def checked(function: Callable[P, T]) -> Callable[P, T]:
         holder = SimpleNamespace(__annotations__=wanted)
         return get_type_hints(holder, function.__globals__, include_extras=True)
 
+    def fitting(key: str, value: Any, declared: str | None) -> Any:
+        found = hints()
+        if declared not in found:  # self; or one too many, which Python tells
+            return value
+        return check(f"{called}: {key}", value, found[declared])
+
     @wraps(function)
     def with_checks(*args: P.args, **kwargs: P.kwargs) -> T:
-        try:
-            bound = signature.bind(*args, **kwargs)
-        except TypeError:
-            return function(*args, **kwargs)  # its own message names the function
-        for key, value in bound.arguments.items():
-            if key not in hints():
-                continue
-            where, hint = f"{called}: {key}", hints()[key]
-            kind = signature.parameters[key].kind
-            if kind is inspect.Parameter.VAR_KEYWORD:
-                found: Any = {k: check(f"{called}: {k}", v, hint) for k, v in value.items()}
-            elif kind is inspect.Parameter.VAR_POSITIONAL:
-                found = tuple(check(where, v, hint) for v in value)
-            else:
-                found = check(where, value, hint)
-            bound.arguments[key] = found
-        return function(*bound.args, **bound.kwargs)
+        # Not by Signature.bind, which takes as long as the check.
+        keys = chain(positional, repeat(rest))
+        good = [fitting(str(k), v, k) for k, v in zip(keys, args, strict=False)]
+        known = hints()
+        also = {k: fitting(k, v, k if k in known else named) for k, v in kwargs.items()}
+        return function(*good, **also)
 
     return with_checks

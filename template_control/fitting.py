@@ -6,7 +6,7 @@ import inspect
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -57,28 +57,36 @@ def shown(value: Any) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
+_PLANS: dict[int, tuple[Any, Callable[[Any], Any]]] = {}
+"""How to fit a value to an annotation, by the annotation's identity; to hash one takes long."""
+
+
 def _fit(value: Any, hint: Any) -> Any:
     """See :func:`check`; raises :class:`_Refused`."""
-    if get_origin(hint) is Annotated:
-        inner, *extras = get_args(hint)
-        return _annotated(value, inner, extras)
+    known = _PLANS.get(id(hint))
+    if known is None:
+        known = _PLANS[id(hint)] = hint, _plan(hint)  # held here, its identity stays its own
+    return known[1](value)
+
+
+def _plan(hint: Any) -> Callable[[Any], Any]:
+    origin, args = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return partial(_annotated, inner=args[0], extras=args[1:])
     if hint in _SIMPLE:
-        return _SIMPLE[hint](value)
-    origin = get_origin(hint)
+        return _SIMPLE[hint]
     if origin in (Union, types.UnionType):
-        return _one_of(value, get_args(hint))
-    if origin is Literal:
-        if not any(type(value) is type(x) and value == x for x in get_args(hint)):
-            raise _Refused(_words(hint))
-        return value
+        return partial(_one_of, hints=args)
+    if origin in (list, Sequence):
+        hint, origin = types.GenericAlias(tuple, (args[0], ...)), tuple
     if origin in _COMPOUND:
-        return _COMPOUND[origin](value, hint)
+        return partial(_COMPOUND[origin], hint=hint)
     if isinstance(hint, type):
-        return _instance(value, hint)
-    return value
+        return partial(_instance, kind=hint)
+    return _as_is
 
 
-def _annotated(value: Any, inner: Any, extras: list[Any]) -> Any:
+def _annotated(value: Any, inner: Any, extras: tuple[Any, ...]) -> Any:
     for extra in extras:
         if isinstance(extra, Range):
             return _number(value, extra, whole=inner is int)
@@ -171,19 +179,19 @@ def _one_of(value: Any, hints: tuple[Any, ...]) -> Any:
     raise _Refused(" or ".join(dict.fromkeys(reasons)))
 
 
-def _items(value: Any, wanted: str) -> list[Any]:
+def _items(value: Any, hint: Any) -> list[Any]:
     """Entries of a sequence; an array's rows become lists."""
     if isinstance(value, np.ndarray) and value.ndim > 0:
         return list(value.tolist())
     if isinstance(value, str | bytes) or not isinstance(value, Sequence):
-        raise _Refused(wanted)
+        raise _Refused(_words(hint))
     return list(value)
 
 
 def _tuple(value: Any, hint: Any) -> tuple[Any, ...]:
     hints = get_args(hint)
     many = len(hints) == 2 and hints[1] is Ellipsis
-    items = _items(value, _words(hint))
+    items = _items(value, hint)
     if not many and len(items) != len(hints):
         raise _Refused(_words(hint))
     each = [hints[0]] * len(items) if many else hints
@@ -195,8 +203,10 @@ def _tuple(value: Any, hint: Any) -> tuple[Any, ...]:
     return value if unchanged else found
 
 
-def _sequence(value: Any, hint: Any) -> Any:
-    return _tuple(value, tuple[get_args(hint)[0], ...])  # type: ignore[misc]
+def _literal(value: Any, hint: Any) -> Any:
+    if not any(type(value) is type(x) and value == x for x in get_args(hint)):
+        raise _Refused(_words(hint))
+    return value
 
 
 def _mapping(value: Any, hint: Any) -> Any:
@@ -241,10 +251,9 @@ def _iterable(value: Any, hint: Any) -> Any:
     return value
 
 
-_COMPOUND: dict[Any, Callable[[Any, Any], Any]] = {
+_COMPOUND: dict[Any, Callable[..., Any]] = {
+    Literal: _literal,
     tuple: _tuple,
-    list: _sequence,
-    Sequence: _sequence,
     Mapping: _mapping,
     dict: _mapping,
     np.ndarray: _array,
