@@ -256,7 +256,8 @@ WORDS = (
     "", "1", "-1", "0.5", "1.05", "nan", "inf", "1e300", "-0", "10000000000000000000000", "x",
     "[/nope]", "$x^{", "walk", "run", "paper", "modified", "exact", "ideal", "height=0.98",
     "energy=820", "speed=nan", "height=", "=", "energy", "height", "0.97", "five-link", "bolt",
-    "left_foot", "left_hip", "10@0", "nan@0", "1@1:x", "os:path", "left_hip=0", "a\nb", "\u00fc", "/", "/dev/null", "/proc/x", ".", "--", "-h",
+    "left_foot", "left_hip", "10@0", "nan@0", "1@1:x", "os:path", "left_hip=0",
+    "a\nb", "\u00fc", "/", "/dev/null", "/proc/x", ".", "--", "-h",
 )  # fmt: skip
 
 
