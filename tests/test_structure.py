@@ -36,14 +36,18 @@ SLIP_STAGES = (
     ("scenario",),
 )
 SHARED = (
+    "checked",
     "compiled",
     "compiling",
     "errors",
     "file_lock",
+    "fitting",
     "parts",
+    "ranges",
     "settings",
     "source_stamp",
     "storage",
+    "terminal",
     "version",
 )  # modules of the root that every room may import
 MOST_ROOMS = 12

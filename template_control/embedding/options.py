@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from template_control.embedding.guards import GuardOptions
 from template_control.embedding.learners.lean import LeanOptions
@@ -13,6 +14,7 @@ from template_control.embedding.phases import PHASES, PhaseControl
 from template_control.embedding.references.leg_forces import UnloadOptions
 from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.embedding.stride_planning import ReplanOptions
+from template_control.ranges import Range
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
 from template_control.whole_body.solver import QpOptions
@@ -37,7 +39,7 @@ class EmbeddingOptions(QpOptions):
         lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
     """
 
-    trunk_pitch: float = tuned(0.0)
+    trunk_pitch: Annotated[float, Range(-1.5, 1.5)] = tuned(0.0)
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(PHASES))
     guards: GuardOptions = field(default_factory=GuardOptions)
     swing: SwingOptions = field(default_factory=SwingOptions)

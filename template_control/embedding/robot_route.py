@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from template_control.checked import checked
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.planar_biped import PlanarBiped
@@ -16,6 +17,7 @@ _RANGES = {"walk": speed_range, "run": running_speeds}
 _WHERE = {"walk": "at VLO", "run": "at apex"}
 
 
+@checked
 def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
     """The scenario on the robot's own template.
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checked import Checked
 from template_control.embedding.planners.planner import Decision, Planner, Planners
 from template_control.embedding.references.template_path import (
     Landing,
@@ -22,6 +24,8 @@ from template_control.embedding.references.template_path import (
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
 from template_control.errors import ParameterError
+from template_control.fitting import check
+from template_control.ranges import NotNegative, Positive, Range, Share, Triple
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Slot
@@ -38,7 +42,7 @@ _NEWTON = 4
 
 
 @dataclass(frozen=True)
-class ReplanOptions:
+class ReplanOptions(Checked):
     """When a stride is planned anew between two sections, and from where.
 
     Attributes:
@@ -55,14 +59,14 @@ class ReplanOptions:
         path: how the robot's place on the path is looked for.
     """
 
-    speed: float = tuned(0.05, SPEED)
-    interval: float = tuned(0.02, TIME)
-    patience: float = tuned(0.01, TIME)
-    angle_drop: float = tuned(0.15)
-    agility: float = tuned(8.0, RATE_SQUARED)
-    foresight: float = tuned(1.0, TIME)
-    calmer: tuple[float, ...] = tuned((0.5, 0.0))
-    highest: float = tuned(0.99)
+    speed: Annotated[float, Range(0.0, endless=True)] = tuned(0.05, SPEED)
+    interval: NotNegative = tuned(0.02, TIME)
+    patience: Annotated[float, Range(0.0, endless=True)] = tuned(0.01, TIME)
+    angle_drop: NotNegative = tuned(0.15)
+    agility: NotNegative = tuned(8.0, RATE_SQUARED)
+    foresight: NotNegative = tuned(1.0, TIME)
+    calmer: tuple[Share, ...] = tuned((0.5, 0.0))
+    highest: Positive = tuned(0.99)
     path: PathOptions = field(default_factory=PathOptions)
 
 
@@ -183,7 +187,7 @@ class StridePlanning:
                 goal=goal,
                 target=end.padded(goal.target),
                 decision=decision,
-                offset=self.planner_of(goal).offset.copy(),
+                offset=check("the planner's offset", self.planner_of(goal).offset, Triple).copy(),
                 learnt=learnt,
                 plan_seconds=seconds,
             )

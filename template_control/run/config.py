@@ -32,7 +32,8 @@ from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
-from template_control.slip.gaits.gait import WalkingGait, gait_for_speed
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.scenario.route import ScenarioRoute

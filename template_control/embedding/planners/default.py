@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from template_control.checked import checked
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
@@ -36,6 +37,7 @@ def _keeping_up(route: Route, gait: RunningGait) -> RunningOptions:
     return replace(options, pace=max(options.pace, float(needed)))
 
 
+@checked
 def default_planners(route: Route) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 
