@@ -26,7 +26,7 @@ def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
         scenario: speeds in m/s, as they are; its heights are scaled with l0.
 
     Raises:
-        ScenarioError: if a segment runs, or wants a speed at VLO that no walking gait has.
+        ScenarioError: if a segment or the start wants a speed that no gait of the robot has.
     """
     own = scenario.on(template_for(robot))
     for number, segment in enumerate(own.segments, 1):
