@@ -13,7 +13,7 @@ from rich.console import Console
 
 from template_control import view
 from template_control.cli.options.output import output_folder
-from template_control.cli.output import progress_bar
+from template_control.cli.report.output import progress_bar
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.run.config import Ready, RunConfig
 from template_control.run.record import Record, RunInterrupted
