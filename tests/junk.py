@@ -25,6 +25,7 @@ SEGMENT = slip.Segment("walk", speed=1.1, steps=1)
 SCENARIO = slip.Scenario((SEGMENT,))
 MAP = tc.ReturnMap(P)
 PLANNER = tc.LqrPlanner(GAIT)
+RUN = slip.running_gait(P, 3.0)
 ROUTE = slip.SteadyRoute.of(GAIT)
 RECORD = tc.simulate(ROBOT, PLANNER, tc.SimulationOptions(steps=1, record_every=20))
 NAMES = ("", "[/nope]", "$x^{", ":bus:", "walk", "w", "r", "a\nb", "nul\0", "five-link", "ü" * 80)
@@ -104,8 +105,10 @@ def targets(folder):
     held = {"height": 0.98, "stiffness": 16.5e3}
     options = (
         tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
-        tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LoadOptions,
+        tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
+        embedding.LoadOptions,
         embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
+        embedding.RunningOptions,
         embedding.SwingOptions, embedding.TrimOptions, embedding.UnloadOptions, run.FallOptions,
         sweep.SweepOptions, whole_body.ComTask, whole_body.FootTask, whole_body.MomentumTask,
         whole_body.PostureTask, whole_body.QpOptions,
@@ -139,6 +142,10 @@ def targets(folder):
         tc.ScenarioRoute: {"scenario": SCENARIO},
         slip.Family: {"parameters": P, "stride": "w", "fixed": held},
         slip.WalkingFamily: {"gait": GAIT},
+        slip.RunningFamily: {"gait": RUN},
+        tc.RunningPlanner: {"gait": RUN},
+        embedding.Lean: {"speeds": (2.0, 3.0), "pitches": (0.3, 0.4)},
+        run.GaitChoice: {"name": "run"},
         tc.LqrPlanner: {"gait": GAIT},
         tc.ModifiedPlanner: {"gait": GAIT},
         tc.EmbeddingController: {"robot": ROBOT, "planners": PLANNER},
@@ -149,6 +156,8 @@ def targets(folder):
         tc.gait_for_speed: {"parameters": P, "mean_speed": 1.2},
         tc.gait_from_energy: {"parameters": P, "height": 0.9818, "energy": 826.0},
         slip.mean_speed_range: {"parameters": P},
+        slip.running_gait: {"parameters": P, "speed": 3.0},
+        slip.running_speeds: {"parameters": P},
         slip.walking_gait: {"parameters": P, "vlo_speed": 1.1},
         slip.controls: {"touchdown_angle": 1.15, "k_sc": 16e3, "k_sd": 16e3},
         slip.margin: {"parameters": P, "controls": U, "goal": (0.98, 0.0), "energy": 820.0,
@@ -228,6 +237,10 @@ FLAGS = {
              "--speed", "--planner", "--map", "--plant", "--friction", "--mass-scale",
              "--torque-scale", "--seed", "--record-every", "--json", "--push", "--noise", "--delay",
              "--touchdown-angle", "--config", "--locked"),
+    "run": ("--robot", "--speed", "--apex", "--plant", "--friction", "--mass-scale",
+            "--torque-scale", "--seed", "--record-every", "--json", "--push", "--noise", "--delay",
+            "--config"),
+    "go": ("--robot", "--plant", "--friction", "--record-every", "--json", "--push", "--config"),
     "robots": ("--json",),
     "replay": ("--speed", "--fps", "--start", "--end"),
     "plots": ("--output",),
@@ -243,6 +256,8 @@ FLAGS = {
 ALWAYS = {
     # One step is enough to see what a command makes of its options.
     "walk": ["--steps", "1", "--no-figures"],
+    "run": ["--steps", "1", "--no-figures"],
+    "go": ["--steps", "1", "--no-figures"],
     "replay": ["--html", "page.html", "--no-browser"],
     # It refuses: a campaign takes minutes.
     "robustness": ["--workers", "0"],
@@ -251,7 +266,7 @@ ALWAYS = {
     "automaton": ["--no-figure"],
     "reproduce": ["--no-figures"],
 }
-POSITIONAL = ("replay", "plots", "slip", "reproduce")
+POSITIONAL = ("go", "replay", "plots", "slip", "reproduce")
 WORDS = (
     "", "1", "-1", "0.5", "1.05", "nan", "inf", "1e300", "-0", "10000000000000000000000", "x",
     "[/nope]", "$x^{", "walk", "run", "paper", "modified", "exact", "ideal", "height=0.98",

@@ -9,6 +9,7 @@ import pytest
 import template_control as tc
 from template_control import embedding, run, slip, sweep, whole_body
 from template_control.checked import Checked, checked
+from template_control.embedding.planners.transition import TransitionOptions
 from template_control.errors import ParameterError, RobotError, ScenarioError, SweepError
 from template_control.ranges import Array, Count, Interval, NotNegative, Positive, Range, Shape
 
@@ -83,8 +84,10 @@ def test_a_function_checks_its_arguments():
 
 OPTIONS = [
     tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
-    tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LoadOptions,
+    tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
+    embedding.LoadOptions,
     embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
+    embedding.RunningOptions, TransitionOptions, run.GaitChoice,
     embedding.SwingOptions, embedding.TrimOptions, embedding.UnloadOptions, run.FallOptions,
     sweep.SweepOptions, whole_body.ComTask, whole_body.FootTask, whole_body.MomentumTask,
     whole_body.PostureTask, whole_body.QpOptions,
@@ -114,6 +117,13 @@ def test_no_field_of_any_options_takes_a_stranger(kind):
         lambda: tc.SimulationOptions(pushes=tc.Push(1.0)),
         lambda: tc.simulate("five-link", None),
         lambda: tc.LqrPlanner(tc.SlipParameters()),
+        lambda: tc.RunningPlanner(tc.gait_at(tc.SlipParameters(), np.radians(66.0), 1.1)),
+        lambda: embedding.Lean((2.0, 1.0), (0.3, 0.3)),
+        lambda: embedding.Lean((2.0,), ()),
+        lambda: TransitionOptions(base=(12.2,)),
+        lambda: run.GaitChoice("jump"),
+        lambda: slip.running_gait(tc.SlipParameters(), 3.0, leg_stiffness=-1.0),
+        lambda: tc.ScenarioRoute(slip.Scenario((slip.Segment("walk", speed=1.1, steps=1),)), 0.98),
         lambda: tc.gait_at(None, 1.1, 1.1),
         lambda: tc.load_robot(3),
         lambda: tc.ReturnMap("w"),

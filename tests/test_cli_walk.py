@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from template_control.cli import walk
 from template_control.cli.main import main
+from template_control.cli.report import kept
 from template_control.errors import RecordError
 from template_control.robot.library import robot_path
 from template_control.run.record import Record
@@ -98,7 +98,10 @@ def test_the_example_walks_at_several_speeds(tmp_path, capfd):
     ("change", "told"),
     [
         (('gait = "walk"\nacc', 'gait = "run"\nacc'), "segment 2 is to run"),
-        (("speed = 1.1", "speed = 1.9"), "segment 1 wants 1.9 m/s at VLO: five-link walks from"),
+        (
+            ("speed = 1.1", "speed = 1.9"),
+            "segment 1 wants to walk at 1.9 m/s: five-link can",
+        ),
         (("start = [1.1", "start = [0.3"), "the start has 0.3 m/s at VLO"),
         (("speed = 1.1", "sped = 1.1"), "unknown key 'sped'"),
     ],
@@ -136,7 +139,7 @@ def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
 
         yield advance
 
-    monkeypatch.setattr(walk, "progress_bar", impatient)
+    monkeypatch.setattr(kept, "progress_bar", impatient)
     arguments = ["walk", "--steps", "100000", "--no-figures", "--output", str(tmp_path)]
     assert main(arguments) == 130
     told = capfd.readouterr()

@@ -1,12 +1,15 @@
 """A run begins afresh with what an earlier one used, and shares nothing with one that goes on."""
 
 import threading
+from functools import partial
 
 import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.embedding.planners.transition import RUN_TO_WALK, TransitionPlanner
 from template_control.errors import ParameterError
+from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.gaits.walking_family import walking_gait
 
 OPTIONS = tc.SimulationOptions(steps=3, record_every=10)
@@ -25,6 +28,27 @@ def test_a_planner_forgets_the_gaits_of_an_earlier_run(kind, default_gait):
     for again in (planner.decide(z), fresh.decide(z)):
         np.testing.assert_array_equal(again.controls, first.controls)
         np.testing.assert_array_equal(again.predicted, first.predicted)
+
+
+def test_running_and_transition_planners_forget_the_gaits_of_an_earlier_run():
+    slow, fast = (running_gait(tc.SlipParameters(), speed) for speed in (3.0, 3.5))
+    planner, fresh = tc.RunningPlanner(slow), tc.RunningPlanner(slow)
+    z = slow.apex * [1.01, 1.0]
+    planner.observe(planner.decide(z, fast.apex), z)
+    assert planner.gait.apex[0] == 3.5
+    planner.reset()
+    assert planner.gait is slow
+    again, first = planner.decide(z), fresh.decide(z)
+    np.testing.assert_array_equal(again.controls, first.controls)
+    np.testing.assert_array_equal(again.predicted, first.predicted)
+
+    walk = partial(walking_gait, tc.SlipParameters())
+    landing = TransitionPlanner("rw", planner, lambda speed: walk(min(speed, 1.2)), RUN_TO_WALK)
+    own = landing.gait
+    landing.decide(z, walk(0.95).vlo)
+    assert landing.gait is not own
+    landing.reset()
+    assert landing.gait is own
 
 
 def test_a_second_run_of_one_robot_and_planner_is_as_the_first(robot, default_gait):

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 import template_control as tc
 from template_control.errors import MissingPackageError
 from template_control.run.data_frame import columns
-from template_control.view import FIGURES
+from template_control.view.figures import figures_of
 
 
 def test_every_quantity_of_a_sample_has_named_columns_with_units(short_walk):
@@ -69,10 +69,14 @@ def test_without_pandas_one_line_says_what_to_install(short_walk, monkeypatch):
 
 
 def test_a_record_draws_each_of_its_figures(short_walk):
-    for name in FIGURES:
+    for name in figures_of(short_walk):
         assert isinstance(short_walk.plot(name), Figure)
-    with pytest.raises(tc.TemplateControlError, match=r"no figure 'speed': give one of stick_"):
+    with pytest.raises(
+        tc.TemplateControlError, match=r"no figure 'speed' of this run: give one of stick_"
+    ):
         tc.plot(short_walk, "speed")
+    with pytest.raises(tc.TemplateControlError, match="no figure 'apex_return' of this run"):
+        tc.plot(short_walk, "apex_return")
 
 
 def test_texts_are_short_and_say_what_it_is(short_walk, robot, default_gait):

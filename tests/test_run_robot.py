@@ -167,7 +167,7 @@ def test_stiffnesses_follow_from_where_the_foot_has_landed(planning, gait, early
     np.testing.assert_allclose(planning.path.section_state, [*gait.apex, 0.0], atol=0.03)
 
 
-@pytest.mark.slow(seconds=60)
+@pytest.mark.slow(seconds=11)
 @pytest.mark.parametrize("speed", [1.3, 2.0, 2.5, 3.5, 4.0])
 def test_robot_runs_at_other_speeds(speed):
     record = run(speed, 60)
@@ -176,14 +176,14 @@ def test_robot_runs_at_other_speeds(speed):
     assert record.solved.all()
 
 
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow(seconds=7)
 def test_robot_runs_at_five_metres_a_second_with_stronger_motors():
     record = run(5.0, 60, embedding=EmbeddingOptions(torque_scale=1.3))
     assert record.metadata["fall_reason"] == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(5.0, rel=0.01)
 
 
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow(seconds=3)
 @pytest.mark.parametrize("impulse", [20.0, -20.0])
 @pytest.mark.parametrize("phase", [0.1, 0.6])
 def test_robot_runs_on_after_a_push(impulse, phase):
@@ -194,7 +194,7 @@ def test_robot_runs_on_after_a_push(impulse, phase):
     assert np.max(np.abs(speed[18:] / 3.0 - 1.0)) < 0.02
 
 
-@pytest.mark.slow(seconds=30)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("mass_scale", [0.9, 1.1])
 def test_robot_runs_with_another_mass_than_its_model_has(mass_scale):
     record = run(3.0, 30, plant=tc.PlantOptions(mass_scale=mass_scale))
@@ -202,7 +202,7 @@ def test_robot_runs_with_another_mass_than_its_model_has(mass_scale):
     assert record.section_state[-10:, 0].mean() == pytest.approx(3.0, rel=0.01)
 
 
-@pytest.mark.slow(seconds=30)
+@pytest.mark.slow(seconds=5)
 @pytest.mark.parametrize("name", ["human", "bolt"])
 def test_other_robots_run_by_similarity(name):
     record = run(2.0, 30, name)

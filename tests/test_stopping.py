@@ -13,8 +13,8 @@ import pytest
 from sweep_work import alive, hold, wait_until
 
 import template_control as tc
-from template_control.cli import walk
 from template_control.cli.main import main
+from template_control.cli.report import kept
 from template_control.run.record import Record, RunInterrupted
 from template_control.sweep.executor import workers
 
@@ -58,7 +58,7 @@ def test_ctrl_c_while_figures_are_drawn_keeps_the_run_and_its_table(tmp_path, ca
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(walk.view, "save_figures", interrupted)
+    monkeypatch.setattr(kept.view, "save_figures", interrupted)
     assert main(["walk", "--steps", "1", "--output", str(tmp_path)]) == 130
     told = capfd.readouterr()
     assert "mean speed" in told.out

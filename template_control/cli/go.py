@@ -20,8 +20,8 @@ from template_control.cli.options.world import (
     add_length_options,
     add_world_options,
 )
-from template_control.cli.output import INTERRUPTED
 from template_control.cli.report.kept import run_and_keep
+from template_control.cli.report.output import INTERRUPTED
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.run.summary import summarise

@@ -15,7 +15,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any, NamedTuple
 
-from template_control.cli.output import INTERRUPTED
+from template_control.cli.report.output import INTERRUPTED
 from template_control.errors import TemplateControlError
 
 

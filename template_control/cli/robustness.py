@@ -13,7 +13,7 @@ import matplotlib as mpl
 from rich.table import Table
 
 from template_control.cli.options.robot import add_robot
-from template_control.cli.output import INTERRUPTED
+from template_control.cli.report.output import INTERRUPTED
 from template_control.errors import ParameterError
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.library import load_robot

@@ -14,9 +14,10 @@ from template_control.cli.options.world import (
     add_length_options,
     add_world_options,
 )
-from template_control.cli.output import INTERRUPTED
 from template_control.cli.report.kept import run_and_keep
+from template_control.cli.report.output import INTERRUPTED
 from template_control.cli.report.run_table import print_table
+from template_control.errors import ScenarioError
 from template_control.run.config import Ready, RunConfig
 from template_control.run.summary import summarise
 
@@ -42,7 +43,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Walk as told; returns 0, 1 after a fall, 130 after Ctrl-C."""
-    return report(options, *prepared(options), "walking")
+    config, ready = prepared(options)
+    for number, segment in enumerate(config.scenario.segments if config.scenario else (), 1):
+        if segment.gait != "walk":
+            raise ScenarioError(
+                f"segment {number} is to {segment.gait}: give the scenario to template-control go"
+            )
+    return report(options, config, ready, "walking")
 
 
 def report(options: argparse.Namespace, config: RunConfig, ready: Ready, doing: str) -> int:

@@ -25,6 +25,7 @@ from template_control.embedding.learners.lean import TrunkLean
 from template_control.embedding.learners.load import LoadEstimate
 from template_control.embedding.learners.momentum_trim import MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.phases import Clock
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
 from template_control.embedding.references.feet import Feet
@@ -107,6 +108,7 @@ class EmbeddingController:
         self.phase_offset = 0.0
         self.ground = 0.0
         self.time = 0.0
+        self._fresh = True
         self._rear_shift = 0.0
         self._sensed = Sensed(swing_time=self.feet.swing_time)
         self._guards = RobotGuards(self.parameters, o.guards)
@@ -308,6 +310,7 @@ class EmbeddingController:
     def _on_new_path(self) -> None:
         """The path starts where the robot is."""
         self.phase_time = self.phase_offset = 0.0
+        self._fresh = True
 
     # -- control ----------------------------------------------------------------------
 
@@ -315,8 +318,11 @@ class EmbeddingController:
         """The template's state and forces at the robot's phase."""
         s, path, toe = self._sensed, self.planning.path, self.planning.toe
         x, y = s.state[0] + self.phase_offset - s.toes[0], s.state[1]
+        # Since the last tick, unless the path begins at this one. A direction needs a guess only.
+        passed = 0.0 if self._fresh and self.station.control.clock is Clock.TIME else dt
+        self._fresh = False
         self.phase_time, row = self.station.locate(
-            *path.curve, x, y, self.phase_time + dt, self.reference
+            *path.curve, x, y, self.phase_time + passed, self.reference
         )
         self.phase_offset += (s.state[2] - self.robot.com_velocity[0]) * dt
         segment = path.curve.meta[row]

@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checked import Checked
-from template_control.embedding.planners.planner import Decision, Planner, Planners
+from template_control.embedding.planners.planner import (
+    Ahead,
+    Decision,
+    LandingPlanner,
+    Planner,
+    Planners,
+)
 from template_control.embedding.references.template_path import (
     Landing,
     PathOptions,
@@ -23,6 +29,7 @@ from template_control.embedding.references.template_path import (
 )
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
+from template_control.embedding.touchdown import flown_angle, free_controls
 from template_control.errors import ParameterError
 from template_control.fitting import check
 from template_control.ranges import NotNegative, Positive, Range, Share, Triple
@@ -38,7 +45,6 @@ from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 Array = NDArray[np.float64]
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
-_NEWTON = 4
 
 
 @dataclass(frozen=True)
@@ -266,33 +272,31 @@ class StridePlanning:
             sensed: the robot's state.
             now: time [s].
         """
-        report = self.reports[-1]
-        if hasattr(self.planner, "land"):
-            toes = (float(sensed.toes[0]), float(sensed.toes[1]))
-            state = sensed.state.copy()
-            end = section_of(self.automaton.sections(node.name)[1])
-
-            def ahead(u: Array) -> tuple[Array, Outcome]:
-                stride = self._simulator.run(node.name, state, u, toes)
-                return end.of(stride.state), stride.outcome
-
-            free = sorted(
-                {
-                    int(slot)
-                    for later in self.automaton.stride(node.name)
-                    for slot in (later.rear, later.front)
-                    if slot is not None
-                }
-            )
-            decision = self.planner.land(ahead, report.decision, report.goal.target, free)
+        report, planner = self.reports[-1], self.planner
+        if isinstance(planner, LandingPlanner):
+            free = free_controls(self.automaton, node)
+            ahead = self._ahead(node, sensed)
+            decision = planner.land(ahead, report.decision, report.goal.target, free)
             self.reports[-1] = replace(report, decision=decision)
         else:
             z = self._back_to_section(self.automaton.start(report.goal.stride), report, sensed)
             if z is not None:
-                angle = self._landing_angle(node, sensed)
-                decision = self.planner.decide(z, report.goal.target, (angle, angle))
+                angle = flown_angle(sensed, self.parameters)
+                decision = planner.decide(z, report.goal.target, (angle, angle))
                 self.reports[-1] = replace(report, decision=decision)
         self.follow(node, sensed, now)
+
+    def _ahead(self, node: Node, sensed: Sensed) -> Ahead:
+        """Where the present stride ends from here, by its controls."""
+        toes = (float(sensed.toes[0]), float(sensed.toes[1]))
+        state = sensed.state.copy()
+        end = section_of(self.automaton.sections(node.name)[1])
+
+        def ahead(u: Array) -> tuple[Array, Outcome]:
+            stride = self._simulator.run(node.name, state, u, toes)
+            return end.of(stride.state), stride.outcome
+
+        return ahead
 
     def due(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
@@ -391,28 +395,3 @@ class StridePlanning:
         if not past.completed:
             return None
         return report.section.mirror(report.section.of(past.state))
-
-    def _landing_angle(self, node: Node, sensed: Sensed) -> float:
-        """The angle with which the template would have landed where the robot has [rad]."""
-        if len(node.stance) == 1:
-            return _flown_angle(sensed, self.parameters)
-        # With a leg on the ground already, the guard compares heights: l0 sin(alpha) = y.
-        return float(np.arcsin(min(sensed.state[1] / self.parameters.rest_length, 1.0)))
-
-
-def _flown_angle(sensed: Sensed, parameters: SlipParameters) -> float:
-    """Angle of the template's leg as it comes to l0 on the ballistic path through the robot [rad].
-
-    The robot's foot meets the ground a little before or after.
-    """
-    x, y, dx, dy = sensed.state.tolist()
-    x -= float(sensed.toes[0])
-    time = 0.0
-    for _ in range(_NEWTON):
-        px, py, speed = x + dx * time, y + dy * time - 0.5 * parameters.gravity * time**2, dy
-        speed -= parameters.gravity * time
-        slope = 2.0 * (px * dx + py * speed)
-        if slope >= 0.0:
-            break
-        time -= (px**2 + py**2 - parameters.rest_length**2) / slope
-    return float(np.arctan2(py, -px))

@@ -11,7 +11,7 @@ from typing import Any
 
 from template_control import view
 from template_control.cli.options.output import output_folder
-from template_control.cli.output import progress_bar
+from template_control.cli.report.output import progress_bar
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.run.config import Ready, RunConfig
 from template_control.run.record import Record, RunInterrupted

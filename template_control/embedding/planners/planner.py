@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol, runtime_checkable
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.checked import Checked
 from template_control.ranges import Shape
-from template_control.slip.automaton.vocabulary import NUM_SLOTS
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.gaits.gait import Gait
 
 Array = NDArray[np.float64]
@@ -73,6 +73,34 @@ class Planner(Protocol):
         Args:
             decision: the decision that planned the stride.
             z: (n,) section state in which it ended, as for :meth:`decide`.
+        """
+
+
+class Ahead(Protocol):
+    """Where the rest of a stride leads."""
+
+    def __call__(self, u: Array) -> tuple[Array, Outcome]:
+        """(m,) state at the section where it ends, and how it ends, with (5,) controls ``u``."""
+
+
+@runtime_checkable
+class LandingPlanner(Planner, Protocol):
+    """A planner that knows how to choose again where a foot has landed.
+
+    Of any other, :meth:`Planner.decide` is asked, for the section state from which the template
+    would have come there.
+    """
+
+    def land(
+        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+    ) -> Decision:
+        """Controls for the rest of a stride.
+
+        Args:
+            ahead: where it leads.
+            decision: what holds so far.
+            target: (m,) state wanted at the section where the stride ends.
+            free: slots of the stiffnesses that the rest depends on.
         """
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.planners.planner import Ahead
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
@@ -16,7 +17,7 @@ from template_control.slip.maps.section import PADDED
 Array = NDArray[np.float64]
 
 _DIFFERENCE = 1e-6  # of a control
-_GRID = 6
+_GRID = 5  # points of each control, where the base's stride fails
 
 
 @dataclass(frozen=True)
@@ -41,64 +42,78 @@ class Prior:
     rounds: int
 
 
-class Ahead(Protocol):
-    """Where a stride ends with given controls."""
+class StrideEnd(Protocol):
+    """Where a stride, or the rest of one, ends with given controls."""
 
-    def __call__(self, u: Array) -> tuple[Array, Outcome]:
-        """(m,) state at the section where the stride ends, and how it ends, with (5,) controls."""
+    def at(self, u: Array) -> tuple[Array, Outcome]:
+        """(m,) state at the section where it ends, and how, with (5,) controls ``u``."""
+
+    def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
+        """As :meth:`at`, with the (m, f) derivatives by the free controls in the middle."""
 
 
-Derivatives = Callable[[Array], tuple[Array, Array, Outcome]]
-"""(m,) end, (m, f) its derivatives by the free controls, and outcome, at (5,) controls."""
+@dataclass(frozen=True)
+class FromSection:
+    """A whole stride, with exact derivatives.
 
-
-def from_section(step: ReturnMap, z: Array, slots: Sequence[int]) -> Derivatives:
-    """Exact derivatives of a whole stride.
-
-    Args:
+    Attributes:
         step: the map.
         z: (n,) where the stride begins.
         slots: the free controls.
     """
-    m, columns = step.dimensions[1], np.array(slots) + PADDED
 
-    def derivatives(u: Array) -> tuple[Array, Array, Outcome]:
-        result, jacobian, outcome = step.derivatives(z, u, columns)
+    step: ReturnMap
+    z: Array
+    slots: Sequence[int]
+
+    def at(self, u: Array) -> tuple[Array, Outcome]:
+        """See :class:`StrideEnd`."""
+        return self.step.step(self.z, u)
+
+    def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
+        """See :class:`StrideEnd`."""
+        m, columns = self.step.dimensions[1], np.array(self.slots) + PADDED
+        result, jacobian, outcome = self.step.derivatives(self.z, u, columns)
         return result[:m], jacobian[:m], outcome
 
-    return derivatives
 
+@dataclass(frozen=True)
+class FromHere:
+    """The rest of a stride, with differences: no map begins within one.
 
-def from_here(ahead: Ahead, slots: Sequence[int]) -> Derivatives:
-    """Differences of what is left of a stride; no map begins within one.
-
-    Args:
+    Attributes:
         ahead: where it ends.
         slots: the free controls.
     """
 
-    def derivatives(u: Array) -> tuple[Array, Array, Outcome]:
-        end, outcome = ahead(u)
-        jacobian = np.zeros((len(end), len(slots)))
-        for column, slot in enumerate(slots):
+    ahead: Ahead
+    slots: Sequence[int]
+
+    def at(self, u: Array) -> tuple[Array, Outcome]:
+        """See :class:`StrideEnd`."""
+        return self.ahead(u)
+
+    def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
+        """See :class:`StrideEnd`."""
+        end, outcome = self.ahead(u)
+        jacobian = np.zeros((len(end), len(self.slots)))
+        for column, slot in enumerate(self.slots):
             changed = u.copy()
             changed[slot] *= 1.0 + _DIFFERENCE
-            other, how = ahead(changed)
+            other, how = self.ahead(changed)
             if how is not Outcome.SECTION:
                 return end, jacobian, how
             jacobian[:, column] = (other - end) / (changed[slot] - u[slot])
         return end, jacobian, outcome
 
-    return derivatives
-
 
 def solve_stride(
-    derivatives: Derivatives, aim: Array, prior: Prior, tolerance: Array
+    stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array
 ) -> tuple[Array, Array | None]:
     """min |(P(u) - aim) / tolerance|^2 + |(u - base) / change|^2 over bounded u.
 
     Args:
-        derivatives: of P.
+        stride: its P.
         aim: (m,) where the stride should end.
         prior: the free controls.
         tolerance: (m,) errors that count as 1.
@@ -106,12 +121,12 @@ def solve_stride(
     Returns:
         (5,) controls; (m,) where the stride ends, None where none of those tried completes it.
     """
-    x, u = prior.base.copy(), prior.controls.copy()
-    x = _start(derivatives, aim, prior, tolerance)
+    u = prior.controls.copy()
+    x = _start(stride, aim, prior, tolerance)
     best: tuple[float, Array, Array] | None = None
     for _ in range(prior.rounds + 1):
         u[prior.slots] = x
-        end, jacobian, outcome = derivatives(u)
+        end, jacobian, outcome = stride.slopes(u)
         if outcome is not Outcome.SECTION:
             if best is None:
                 break
@@ -132,11 +147,11 @@ def solve_stride(
     return u, best[2]
 
 
-def _start(derivatives: Derivatives, aim: Array, prior: Prior, tolerance: Array) -> Array:
+def _start(stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array) -> Array:
     """The base, or where that fails the best of a grid within the bounds."""
     u = prior.controls.copy()
     u[prior.slots] = prior.base
-    if derivatives(u)[2] is Outcome.SECTION:
+    if stride.at(u)[1] is Outcome.SECTION:
         return prior.base.copy()
     axes = [
         np.linspace(low, high, _GRID) for low, high in zip(prior.lower, prior.upper, strict=True)
@@ -144,7 +159,7 @@ def _start(derivatives: Derivatives, aim: Array, prior: Prior, tolerance: Array)
     best, least = prior.base.copy(), np.inf
     for x in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes)):
         u[prior.slots] = x
-        end, _, outcome = derivatives(u)
+        end, outcome = stride.at(u)
         if outcome is Outcome.SECTION:
             residual = np.concatenate(((end - aim) / tolerance, (x - prior.base) / prior.change))
             cost = float(residual @ residual)

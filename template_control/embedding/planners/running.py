@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.checked import Checked, checked
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.embedding.planners.regularised import Prior, from_section, solve_stride
+from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
 from template_control.ranges import Index, Interval, NotNegative, Positive, Share
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
@@ -107,8 +107,8 @@ class RunningPlanner:
             ]
         )
         prior = self._prior(z, near, angles)
-        derivatives = from_section(self._map, z, prior.slots)
-        u, end = solve_stride(derivatives, aim - self.offset[:2], prior, np.array(o.tolerance))
+        stride = FromSection(self._map, z, prior.slots)
+        u, end = solve_stride(stride, aim - self.offset[:2], prior, np.array(o.tolerance))
         completed = end is not None
         predicted = APEX.padded(z if end is None else end) + self.offset
         at_target = bool(np.all(np.abs(wanted - aim) < 1e-9))

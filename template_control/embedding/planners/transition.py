@@ -14,16 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checked import Checked, checked
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision, Planner
+from template_control.embedding.planners.planner import ANY_ANGLE, Ahead, Decision, Planner
 from template_control.embedding.planners.regularised import (
-    Ahead,
+    FromHere,
+    FromSection,
     Prior,
-    from_here,
-    from_section,
     solve_stride,
 )
 from template_control.errors import ParameterError
-from template_control.ranges import Index, Interval, Positive
+from template_control.ranges import Index, Interval, NotNegative, Positive
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
@@ -41,8 +40,10 @@ class TransitionOptions(Checked):
         slots: the controls that are free.
         base: what they change from: alpha [rad], and stiffnesses over m g / l0.
         change: changes of each that count as 1 [rad, shares of the base].
-        range: bounds of each: alpha relative to the base [rad], shares of the base.
+        bounds: of each: alpha relative to the base [rad], shares of the base.
         tolerance: errors of dx/dt, y, dy/dt at the end that count as 1.
+        top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the foot
+            would touch down at once.
         again: change of each, a share, that counts as 1 when a foot has landed.
         rounds: Gauss-Newton steps.
 
@@ -53,14 +54,15 @@ class TransitionOptions(Checked):
     slots: tuple[Slot, ...] = tuned((Slot.K_SC_WR, Slot.K_SD_WR))
     base: tuple[Positive, ...] = tuned((12.2, 20.8))
     change: tuple[Positive, ...] = tuned((0.3, 0.3))
-    range: tuple[Interval, ...] = tuned(((0.5, 2.0), (0.5, 2.0)))
+    bounds: tuple[Interval, ...] = tuned(((0.5, 2.0), (0.5, 2.0)))
     tolerance: tuple[Positive, Positive, Positive] = tuned((0.05, 0.01, 0.1), SPEED, LENGTH, SPEED)
+    top_margin: NotNegative = tuned(0.005)
     again: Positive = tuned(0.3)
     rounds: Index = tuned(6)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("base", "change", "range"):
+        for name in ("base", "change", "bounds"):
             entries = len(getattr(self, name))
             if entries != len(self.slots):
                 raise ParameterError(
@@ -76,7 +78,7 @@ RUN_TO_WALK = TransitionOptions(
     slots=(Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD),
     base=(1.34, 24.0, 20.0),
     change=(0.05, 0.3, 0.3),
-    range=((-0.12, 0.1), (0.5, 2.0), (0.5, 2.0)),
+    bounds=((-0.12, 0.1), (0.5, 2.0), (0.5, 2.0)),
 )
 """Angle and both stiffnesses, as in Section IV-C2."""
 
@@ -128,13 +130,13 @@ class TransitionPlanner:
         size = self._map.dimensions[1]
         prior = self._prior(z, angles)
         tolerance = np.array(self.options.tolerance)[:size]
-        u, end = solve_stride(from_section(self._map, z, prior.slots), wanted, prior, tolerance)
+        u, end = solve_stride(FromSection(self._map, z, prior.slots), wanted, prior, tolerance)
         return self._decision(u, end, wanted)
 
     def land(
         self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
     ) -> Decision:
-        """See :meth:`~.planner.Planner.land`."""
+        """See :meth:`~.planner.LandingPlanner.land`."""
         o, controls = self.options, decision.controls
         stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE]
         base = controls[stiff]
@@ -142,7 +144,7 @@ class TransitionPlanner:
             controls.copy(), stiff, base, o.again * base, 0.5 * base, 2.0 * base, o.rounds
         )
         tolerance = np.array(o.tolerance)[: len(target)]
-        u, end = solve_stride(from_here(ahead, stiff), target, prior, tolerance)
+        u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
         return self._decision(u, end, target)
 
     def _decision(self, u: Array, end: Array | None, wanted: Array) -> Decision:
@@ -155,14 +157,14 @@ class TransitionPlanner:
         slots = [int(slot) for slot in o.slots]
         turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
         base = np.array(o.base) * np.where(turns, 1.0, unit)
-        low, high = np.array(o.range).T
+        low, high = np.array(o.bounds).T
         lower = np.where(turns, base + low, base * low)
         upper = np.where(turns, base + high, base * high)
         controls = self._before.decide(z).controls.copy()
         if angles[0] == angles[1]:
             controls[Slot.TOUCHDOWN_ANGLE] = angles[0]
             lower[turns] = upper[turns] = angles[0]
-        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - 0.005
+        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
         upper[turns] = np.minimum(upper[turns], top)
         lower[turns] = np.minimum(lower[turns], upper[turns])
         change = np.array(o.change) * np.where(turns, 1.0, base)
