@@ -8,10 +8,18 @@ import pytest
 
 import template_control as tc
 from template_control import embedding, run, slip, sweep, whole_body
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import (
+    Array,
+    Count,
+    Interval,
+    NotNegative,
+    Positive,
+    Range,
+    Shape,
+)
 from template_control.embedding.planners.transition import TransitionOptions
 from template_control.errors import ParameterError, RobotError, ScenarioError, SweepError
-from template_control.ranges import Array, Count, Interval, NotNegative, Positive, Range, Shape
 
 
 @dataclass(frozen=True)

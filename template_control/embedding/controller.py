@@ -19,7 +19,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.embedding.guards import PLACED, RobotGuards
 from template_control.embedding.learners.lean import TrunkLean
 from template_control.embedding.learners.load import LoadEstimate

@@ -15,9 +15,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Range
 from template_control.embedding.sensing import Sensed
-from template_control.ranges import NotNegative, Range
 from template_control.slip.automaton.hybrid import Edge
 from template_control.slip.automaton.vocabulary import Event, Leg, Reset
 from template_control.slip.dynamics.guards import guard

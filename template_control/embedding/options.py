@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from template_control.checks.ranges import Range
 from template_control.embedding.guards import GuardOptions
 from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.learners.load import LoadOptions
@@ -14,7 +15,6 @@ from template_control.embedding.phases import PHASES, PhaseControl
 from template_control.embedding.references.leg_forces import UnloadOptions
 from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.embedding.stride_planning import ReplanOptions
-from template_control.ranges import Range
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
 from template_control.whole_body.solver import QpOptions

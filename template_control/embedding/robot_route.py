@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.planar_biped import PlanarBiped

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from template_control.checked import checked
-from template_control.ranges import Angle
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Angle
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy

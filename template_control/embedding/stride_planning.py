@@ -13,7 +13,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.fitting import check
+from template_control.checks.ranges import NotNegative, Positive, Range, Share, Triple
 from template_control.embedding.planners.planner import (
     Ahead,
     Decision,
@@ -31,8 +33,6 @@ from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.touchdown import flown_angle, free_controls
 from template_control.errors import ParameterError
-from template_control.fitting import check
-from template_control.ranges import NotNegative, Positive, Range, Share, Triple
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Slot

@@ -12,11 +12,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Positive
 from template_control.errors import RobotError
 from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import silenced
-from template_control.ranges import Positive
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 from template_control.robot.urdf import link_masses

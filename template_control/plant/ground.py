@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
-from template_control.ranges import Range
 from template_control.slip.gaits.gait import WalkingGait
 
 _HIGHEST = 1.0  # [m]

@@ -17,10 +17,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError
 from template_control.plant.rigid_contact import pressing, solve
-from template_control.ranges import Positive
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 

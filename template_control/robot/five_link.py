@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Interval, NotNegative, Positive
 from template_control.errors import RobotError
-from template_control.ranges import Interval, NotNegative, Positive
 
 _COLOURS = {"grey": "0.55 0.57 0.60 1", "blue": "0.16 0.38 0.63 1", "orange": "0.86 0.45 0.13 1"}
 _SIDES = (("left", "blue", 0.5), ("right", "orange", -0.5))

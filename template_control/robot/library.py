@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.errors import RobotError
 from template_control.robot.planar_biped import PlanarBiped
 

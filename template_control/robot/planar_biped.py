@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError, RobotError
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planar_terms import PlanarTerms, gather, sources

@@ -8,9 +8,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import NotNegative, Pair, Range, Shape, Triple
 from template_control.errors import RobotError
-from template_control.ranges import NotNegative, Pair, Range, Shape, Triple
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 

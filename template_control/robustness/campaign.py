@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.robot_template import default_gait
 from template_control.errors import ParameterError, RobotError, SweepError

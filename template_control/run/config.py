@@ -17,7 +17,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from template_control import settings, storage
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from template_control.checks.fitting import shown
 from template_control.embedding.controller import EmbeddingController
-from template_control.fitting import shown
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import plant_name

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import Plant, check_world
-from template_control.ranges import Count, Index, NotNegative, Positive
 from template_control.robot.start import Pose
 from template_control.run.sensing import SensorOptions
 from template_control.slip.similarity import tuned

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked
-from template_control.ranges import Index, NotNegative
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Index, NotNegative
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import Scale
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from template_control.checked import Checked
-from template_control.ranges import Positive
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Positive
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from template_control.checked import Checked
-from template_control.ranges import Positive
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Positive
 from template_control.slip.parameters import SlipParameters
 
 T = TypeVar("T")

@@ -28,10 +28,10 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.fitting import check, shown
+from template_control.checks.ranges import Count, Index, Range
 from template_control.errors import SweepError
-from template_control.fitting import check, shown
-from template_control.ranges import Count, Index, Range
 from template_control.sweep.executor import ExecutorLostError, check_pickles, run_calls
 from template_control.sweep.file import Outcome, SweepFile, header
 from template_control.terminal import plain_console

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError, RecordError
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event

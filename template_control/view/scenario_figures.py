@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.view.figure_file import save_figure

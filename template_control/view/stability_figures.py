@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.slip.gaits.branch import BranchPoint, Special
 from template_control.slip.gaits.stability import Kind
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from template_control.checked import Checked
-from template_control.ranges import NotNegative
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import PER_RATE_TO_THE_FOURTH, RATE, RATE_SQUARED, tuned
 from template_control.whole_body.task import Rows

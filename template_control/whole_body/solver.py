@@ -11,8 +11,8 @@ import numpy as np
 import proxsuite
 from numpy.typing import NDArray
 
-from template_control.checked import Checked, checked
-from template_control.ranges import NotNegative, Positive
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import NotNegative, Positive
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import RATE, tuned
 from template_control.whole_body.problem import (

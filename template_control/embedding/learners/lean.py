@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Share
 from template_control.errors import ParameterError
-from template_control.ranges import NotNegative, Share
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import RATE, SPEED, tuned
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Share
 from template_control.embedding.references.template_path import TemplatePath
-from template_control.ranges import NotNegative, Share
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait, vlo_jacobians
 from template_control.slip.parameters import SlipParameters

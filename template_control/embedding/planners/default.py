@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner

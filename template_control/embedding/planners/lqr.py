@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import (
+    Count,
+    Index,
+    Interval,
+    NotNegative,
+    Positive,
+    Range,
+    Share,
+)
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.step_search import (
     FALL_PRICE,
@@ -27,7 +36,6 @@ from template_control.embedding.planners.step_search import (
 )
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.parts import ready
-from template_control.ranges import Count, Index, Interval, NotNegative, Positive, Range, Share
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WALKING_SLOTS, WalkingGait, vlo_jacobians

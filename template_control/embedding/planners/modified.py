@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Interval, NotNegative, Positive
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.ranges import Interval, NotNegative, Positive
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
 from template_control.slip.dynamics.kernel import new_scratch

@@ -9,8 +9,8 @@ from typing import Annotated, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked
-from template_control.ranges import Shape
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Shape
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.gaits.gait import Gait
 

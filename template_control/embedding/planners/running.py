@@ -13,10 +13,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Index, Interval, NotNegative, Positive, Share
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
-from template_control.ranges import Index, Interval, NotNegative, Positive, Share
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap

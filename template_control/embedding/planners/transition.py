@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Index, Interval, NotNegative, Positive
 from template_control.embedding.planners.planner import ANY_ANGLE, Ahead, Decision, Planner
 from template_control.embedding.planners.regularised import (
     FromHere,
@@ -22,7 +23,6 @@ from template_control.embedding.planners.regularised import (
     solve_stride,
 )
 from template_control.errors import ParameterError
-from template_control.ranges import Index, Interval, NotNegative, Positive
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap

@@ -12,10 +12,10 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Pair
 from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions
 from template_control.errors import ParameterError
-from template_control.ranges import Pair
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, state_in
 from template_control.slip.automaton.automaton import AUTOMATON

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
-from template_control.ranges import NotNegative
 from template_control.slip.similarity import tuned
 
 Array = NDArray[np.float64]

@@ -15,9 +15,9 @@ from math import isfinite, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.compiled import compiled
-from template_control.ranges import NotNegative, Positive, Share
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, tuned
 
 Array = NDArray[np.float64]

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import Checked
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.embedding.phases import Clock
-from template_control.ranges import NotNegative, Positive
 from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.dynamics.taylor import ORDER

@@ -12,10 +12,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Range, Shape
 from template_control.compiled import compiled, inner
 from template_control.errors import ParameterError
-from template_control.ranges import Range, Shape
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel

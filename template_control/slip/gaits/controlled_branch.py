@@ -13,9 +13,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Count, Vector
 from template_control.errors import GaitError, ParameterError
-from template_control.ranges import Count, Vector
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.control.section_target import VARIED, TargetedPolicy
 from template_control.slip.gaits.branch import Branch, BranchPoint, Equations, null_vector

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Phase

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Positive, Shape, Triple
 from template_control.errors import GaitError
-from template_control.ranges import Positive, Shape, Triple
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.stride import controls, simulate_stride

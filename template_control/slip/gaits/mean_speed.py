@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Angle
 from template_control.errors import GaitError
-from template_control.ranges import Angle
 from template_control.slip.gaits.gait import WalkingGait, gait_at, root
 from template_control.slip.parameters import SlipParameters
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.errors import GaitError
 from template_control.slip.gaits.gait import WalkingGait, gait_at
 from template_control.slip.parameters import SlipParameters

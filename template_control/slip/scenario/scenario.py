@@ -8,7 +8,7 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from template_control.checked import Checked, checked
+from template_control.checks.checked import Checked, checked
 from template_control.errors import ScenarioError, TemplateControlError
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.parameters import SlipParameters

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from template_control.checked import checked
+from template_control.checks.checked import checked
 from template_control.run.record import Record
 from template_control.view.replay.film import write_film
 from template_control.view.replay.playback import playback

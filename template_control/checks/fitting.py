@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from template_control.checks.ranges import Range, Rising, Shape
 from template_control.errors import ParameterError, TemplateControlError
-from template_control.ranges import Range, Rising, Shape
 
 _ANY_NUMBER = Range()
 _LONGEST = 60  # characters of a value that a message shows
@@ -216,9 +216,14 @@ def _mapping(value: Any, hint: Any) -> Any:
     found = {}
     for key, entry in value.items():
         try:
-            found[_fit(key, key_hint)] = _fit(entry, value_hint)
+            fitted = _fit(key, key_hint)
         except _Refused as refused:
-            raise _Refused(f"{_words(hint)}; each {refused}") from None
+            raise _Refused(f"{_words(hint)}; each key {refused}") from None
+        try:
+            found[fitted] = _fit(entry, value_hint)
+        except _Refused as refused:
+            text = f"{key} is {shown(entry)}, which should be {refused}"
+            raise _Refused(f"{_words(hint)}; {text}") from None
     same = all(found.get(key) is entry for key, entry in value.items())
     return value if same else found
 

@@ -22,8 +22,8 @@ from itertools import chain, repeat
 from types import SimpleNamespace
 from typing import Any, ClassVar, ParamSpec, TypeVar, get_type_hints
 
+from template_control.checks.fitting import check
 from template_control.errors import ParameterError, TemplateControlError
-from template_control.fitting import check
 
 P = ParamSpec("P")
 T = TypeVar("T")
