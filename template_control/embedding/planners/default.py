@@ -10,7 +10,7 @@ import numpy as np
 from template_control.checks.checked import checked
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planners
-from template_control.embedding.planners.running import RunningOptions, RunningPlanner
+from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
 from template_control.embedding.planners.transition import (
     RUN_TO_WALK,
     WALK_TO_RUN,
@@ -20,21 +20,23 @@ from template_control.slip.gaits.running_gait import RunningGait, running_gait, 
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.route import Route, ScenarioRoute
-from template_control.slip.similarity import Scale
+from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.similarity import REFERENCE
 
 _STRIDE = 0.95  # duration of a running stride over sqrt(l0 / g)
+_GENTLE = 0.05  # of g: up to this acceleration moderate controls keep up
 
 
-def _keeping_up(route: Route, gait: RunningGait) -> RunningOptions:
-    """Options with a pace that keeps up with the accelerations of a scenario."""
-    options = RunningOptions()
-    if not isinstance(route, ScenarioRoute):
-        return options
-    segments = route.scenario.segments
-    fastest = max((abs(s.acceleration) for s in segments if s.gait == "run"), default=0.0)
-    p = gait.parameters
-    needed = _STRIDE * fastest * np.sqrt(p.rest_length / p.gravity) / Scale.of(p).speed
-    return replace(options, pace=max(options.pace, float(needed)))
+def _keeping_up(scenario: Scenario) -> RunningOptions:
+    """Options with which a run keeps up with the accelerations of a scenario."""
+    p, options = scenario.parameters, RunningOptions()
+    runs = [abs(s.acceleration) for s in scenario.segments if s.gait == "run"]
+    fastest = max(runs, default=0.0) / p.gravity
+    if fastest > _GENTLE:
+        return AGILE
+    # A change of speed over a stride, for the reference template as all options are.
+    pace = _STRIDE * fastest * float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length))
+    return replace(options, pace=max(options.pace, pace))
 
 
 @checked
@@ -58,8 +60,8 @@ def default_planners(route: Route) -> Planners:
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
     walk = LqrPlanner(walking_gait(p, speed))
-    first = runs(slowest)
-    run = RunningPlanner(first, _keeping_up(route, first))
+    options = _keeping_up(route.scenario) if isinstance(route, ScenarioRoute) else None
+    run = RunningPlanner(runs(slowest), options)
     return {
         "w": walk,
         "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),

@@ -63,6 +63,10 @@ class RunningOptions(Checked):
     rounds: Index = tuned(4)
 
 
+AGILE = RunningOptions(change=(0.03, 0.3, 0.3), stiffness_range=(0.4, 2.5), pace=0.45)
+"""For accelerations of a tenth of g and more: the legs change their stiffness further."""
+
+
 class RunningPlanner:
     """min |(P(z, u) + d - z*) / tolerance|^2 + |(u - u_g) / change|^2 over bounded u.
 
