@@ -36,8 +36,8 @@ from .slip.automaton.vocabulary import MapKind as MapKind
 from .slip.control.controllers import ActiveRunning as ActiveRunning
 from .slip.dynamics.stride import simulate_stride as simulate_stride
 from .slip.gaits.gait import gait_at as gait_at
-from .slip.gaits.gait import gait_for_speed as gait_for_speed
 from .slip.gaits.gait import gait_from_energy as gait_from_energy
+from .slip.gaits.mean_speed import gait_for_speed as gait_for_speed
 from .slip.gaits.running_gait import running_gait as running_gait
 from .slip.maps.return_map import ReturnMap as ReturnMap
 from .slip.parameters import SlipParameters as SlipParameters

@@ -111,6 +111,15 @@ SEGMENT = '[[segment]]\ngait = "walk"\nspeed = 1.1\nsteps = 2\n'
         ("apex_height = -1\n" + SEGMENT, "apex_height is -1"),
         ("vlo = [1.2, 0.0]\n" + SEGMENT, "vlo height is 1.2"),
         ("[parameters]\nmass = -80.0\n" + SEGMENT, "mass is -80"),
+        ('[parameters]\nmass = "80"\n' + SEGMENT, "SlipParameters.mass is '80'"),
+        ("[parameters]\nmass = true\n" + SEGMENT, "SlipParameters.mass is True"),
+        (SEGMENT.replace("walk", "jump"), "segment 1 gait is 'jump': give one of 'walk', 'run'"),
+        (SEGMENT.replace("steps = 2", "duration = 1e300"), "at most 3600 s"),
+        (SEGMENT.replace("2", "100000000"), "give at most 10000"),
+        (SEGMENT.replace("2", "2.5"), "segment 1 steps is 2.5: give a whole number"),
+        (SEGMENT.replace("steps = 2", "until_speed = 5\nacceleration = -0.5"), "the other sign"),
+        (SEGMENT.replace("steps = 2", "until_speed = 5\nacceleration = 1e-9"), "at most 3600 s"),
+        ("start = 3\n" + SEGMENT, "start is 3: give 3 times a finite number"),
         ("[parameters]\nweight = 80.0\n" + SEGMENT, "unknown key 'weight'"),
         ("", "no segments"),
         ("= 3", "is no TOML"),
@@ -210,3 +219,11 @@ def test_reproduce_command(name, tmp_path, monkeypatch, capfd):
 def test_unknown_reproduction_is_named(capfd):
     assert main(["reproduce", "fig99"]) == 2
     assert "no reproduction 'fig99'" in capfd.readouterr().err
+
+
+def test_a_run_that_is_stopped_is_not_called_complete(monkeypatch):
+    monkeypatch.setattr("template_control.slip.scenario.run.MOST_STRIDES", 3)
+    record = simulate_scenario(Scenario((Segment("walk", speed=1.1, steps=9),)))
+    assert not record.completed
+    assert record.metadata["failure"] == "stopped in segment 1, after 3 strides"
+    assert len(record.strides) == 3

@@ -115,7 +115,7 @@ def test_a_file_that_is_not_there_is_told(tmp_path):
 
 ROUND_TRIPS = {
     "simulation": tc.SimulationOptions(
-        steps=7,
+        steps=17,
         plant=tc.IdealOptions(mass_scale=1.1),
         embedding=tc.EmbeddingOptions(friction=0.123456789012345),
         start=(1.1, 0.97, -0.0),

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
 from template_control.errors import ParameterError
@@ -27,6 +26,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.storage import Files, writable
+from template_control.terminal import plain_console
 from template_control.view.figure_file import save_figure
 from template_control.view.stability_figures import UNITS, branch_figure
 
@@ -246,7 +246,7 @@ def _print(points: list[BranchPoint], gait: str, over: str, paths: list[Path]) -
         text = point.special.name.lower() if point.special else point.kind.value
         target = [_number(over, point.quantity("target"))] if controlled else []
         table.add_row(*target, *values, _eigenvalues(point), text)
-    console = Console()
+    console = plain_console()
     console.print(table)
     for path in paths:
         console.print(f"figure: {path}", highlight=False)

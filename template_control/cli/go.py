@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from template_control import view
@@ -28,6 +27,7 @@ from template_control.run.record import Record
 from template_control.run.summary import summarise
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
+from template_control.terminal import plain_console
 
 _NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
 _FROM_THE_RUN = (
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     config, ready = prepared(options)
     if ready.route is None:
         raise ParameterError("no scenario is given: name a file, such as examples/example_one.toml")
-    with Console(stderr=True).status("the template"):
+    with plain_console(stderr=True).status("the template"):
         template = simulate_scenario(ready.route.scenario)
 
     def more(record: Record, folder: Path) -> None:
@@ -136,4 +136,4 @@ def _print(figures: dict[str, Any]) -> None:
     table.add_row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
     table.add_row("QP failures", f"{figures['qp_failures']}")
     table.add_row("record", figures["record"] or "not saved")
-    Console().print(table)
+    plain_console().print(table)

@@ -171,13 +171,12 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
     try:
         options = build_parser(arguments).parse_args(arguments)
         # Not before: whoever asks for help need not wait for it.
-        from rich.console import Console
-
         from template_control.compiling import compiling
+        from template_control.terminal import plain_console
 
         if output is not None:
             _on_signals(_interrupt)
-        with compiling(Console(stderr=True)):
+        with compiling(plain_console(stderr=True)):
             status = int(options.run(options))
         sys.stdout.flush()
         return status

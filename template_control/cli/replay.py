@@ -6,10 +6,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+from rich.text import Text
 
 from template_control.errors import ParameterError
 from template_control.run.record import Record
+from template_control.terminal import plain_console
 from template_control.view.replay.replay import GIF_FPS, GIF_SECONDS, replay, save_film, save_html
 
 
@@ -77,9 +78,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _film(record: Record, path: Path, part: dict[str, Any]) -> Path:
-    with Console(stderr=True).status(f"drawing {path}") as status:
+    with plain_console(stderr=True).status(Text(f"drawing {path}")) as status:
         return save_film(
-            record, path, progress=lambda n: status.update(f"drawing {path}, frame {n}"), **part
+            record,
+            path,
+            progress=lambda n: status.update(Text(f"drawing {path}, frame {n}")),
+            **part,
         )
 
 

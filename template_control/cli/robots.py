@@ -7,12 +7,12 @@ import json
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from template_control.embedding.robot_template import default_gait
 from template_control.robot.library import ROBOTS, load_robot
 from template_control.slip.automaton.vocabulary import Slot
+from template_control.terminal import plain_console
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
             f"{row['template']['leg_stiffness'] / 1e3:.3g} kN/m",
             f"{gait['touchdown_angle_deg']:.0f} deg, {gait['mean_speed']:.2f} m/s",
         )
-    console = Console()
+    console = plain_console()
     console.print(table)
     for row in rows:
         console.print(f"- {row['robot']}: {row['about']}", highlight=False)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-from rich.console import Console
 from rich.table import Table
 
 from template_control.cli.options.robot import add_robot
@@ -22,6 +21,7 @@ from template_control.robustness.campaign import SETTLED, Finding, Robustness, m
 from template_control.robustness.disturbances import AFTER, DISTURBANCES
 from template_control.storage import Files, writable
 from template_control.sweep.executor import workers
+from template_control.terminal import plain_console
 from template_control.view.figure_file import save_figure
 from template_control.view.robustness_figure import robustness_figure
 
@@ -192,7 +192,7 @@ def _print_table(found: Robustness, figure: Path | None) -> None:
         table.add_column(column, no_wrap=column == _COLUMNS[0])
     for finding in found.findings:
         table.add_row(*_row(finding))
-    console = Console()
+    console = plain_console()
     console.print(table)
     if figure is not None:
         console.print(f"figure: {figure}", highlight=False)

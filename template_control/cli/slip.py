@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from template_control import view
@@ -20,6 +19,7 @@ from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import Files
+from template_control.terminal import plain_console
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}
 _NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     if options.map is not None:
         scenario = replace(scenario, map_kind=_MAPS[options.map])
     folder = output_folder(options.output)
-    with Console(stderr=True).status("simulating") as status:
+    with plain_console(stderr=True).status("simulating") as status:
         record = simulate_scenario(scenario, lambda now: status.update(f"simulating, {now:.1f} s"))
     files = Files()
     path = files.write(lambda: record.save(folder / "run.npz"))
@@ -111,4 +111,4 @@ def _print(figures: dict[str, Any]) -> None:
         "last section dx/dt, y, dy/dt", "  ".join(f"{z:.4f}" for z in figures["last_section"])
     )
     table.add_row("record", figures["record"] or "not saved")
-    Console().print(table)
+    plain_console().print(table)

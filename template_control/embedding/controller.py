@@ -19,6 +19,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.embedding.guards import PLACED, RobotGuards
 from template_control.embedding.learners.lean import TrunkLean
 from template_control.embedding.learners.load import LoadEstimate
@@ -74,6 +75,7 @@ class EmbeddingController:
         template_forces: (2, 2) leg forces of the template at this phase [N], rear and front.
     """
 
+    @checked
     def __init__(
         self,
         robot: PlanarBiped,

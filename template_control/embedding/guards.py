@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Range
 from template_control.embedding.sensing import Sensed
-from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Edge
 from template_control.slip.automaton.vocabulary import Event, Leg, Reset
 from template_control.slip.dynamics.guards import guard
@@ -29,7 +31,7 @@ PLACED = {Reset.PLACE_REAR: Leg.REAR, Reset.PLACE_FRONT: Leg.FRONT}
 
 
 @dataclass(frozen=True)
-class GuardOptions:
+class GuardOptions(Checked):
     """When a touchdown or a liftoff is believed.
 
     Attributes:
@@ -47,15 +49,9 @@ class GuardOptions:
         ParameterError: if the angle is not between 0 and pi.
     """
 
-    shortest_swing: float = tuned(0.3)
-    overstretch: float = tuned(0.03)
-    liftoff_angle: float | None = tuned(None)
-
-    def __post_init__(self) -> None:
-        if self.liftoff_angle is not None and not 0.0 < self.liftoff_angle < np.pi:
-            raise ParameterError(
-                f"liftoff_angle is {self.liftoff_angle!r} rad: give an angle between 0 and pi"
-            )
+    shortest_swing: NotNegative = tuned(0.3)
+    overstretch: NotNegative = tuned(0.03)
+    liftoff_angle: Annotated[float, Range(0.0, np.pi, above=True, below=True)] | None = tuned(None)
 
 
 @dataclass(frozen=True)

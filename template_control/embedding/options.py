@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
+from template_control.checks.ranges import Range
 from template_control.embedding.guards import GuardOptions
 from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.learners.load import LoadOptions
@@ -37,7 +39,7 @@ class EmbeddingOptions(QpOptions):
         lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
     """
 
-    trunk_pitch: float = tuned(0.0)
+    trunk_pitch: Annotated[float, Range(-1.5, 1.5)] = tuned(0.0)
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(PHASES))
     guards: GuardOptions = field(default_factory=GuardOptions)
     swing: SwingOptions = field(default_factory=SwingOptions)

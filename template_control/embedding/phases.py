@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from template_control.checks.checked import Checked
 from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Node
@@ -31,7 +32,7 @@ class Clock(StrEnum):
 
 
 @dataclass(frozen=True)
-class PhaseControl:
+class PhaseControl(Checked):
     """What a phase needs.
 
     Attributes:

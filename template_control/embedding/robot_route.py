@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from template_control.checks.checked import checked
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.planar_biped import PlanarBiped
@@ -16,6 +17,7 @@ _RANGES = {"walk": speed_range, "run": running_speeds}
 _WHERE = {"walk": "at VLO", "run": "at apex"}
 
 
+@checked
 def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
     """The scenario on the robot's own template.
 
@@ -24,7 +26,7 @@ def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
         scenario: speeds in m/s, as they are; its heights are scaled with l0.
 
     Raises:
-        ScenarioError: if a segment runs, or wants a speed at VLO that no walking gait has.
+        ScenarioError: if a segment or the start wants a speed that no gait of the robot has.
     """
     own = scenario.on(template_for(robot))
     for number, segment in enumerate(own.segments, 1):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Angle
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
@@ -17,7 +19,8 @@ _WALK = (_TOUCHDOWN, 1.1 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_leng
 _STRETCH = 0.903514524055713
 
 
-def default_gait(robot: PlanarBiped, touchdown_angle: float | None = None) -> WalkingGait:
+@checked
+def default_gait(robot: PlanarBiped, touchdown_angle: Angle | None = None) -> WalkingGait:
     """The robot's walk: its own if it has one, else 66 degrees and 1.1 m/s for l0 = 1 m.
 
     Args:
@@ -35,6 +38,7 @@ def default_gait(robot: PlanarBiped, touchdown_angle: float | None = None) -> Wa
     )
 
 
+@checked
 def paper_gait(parameters: SlipParameters) -> WalkingGait:
     """The equilibrium of Section IV-D: 0.9818 m and 826 J for 80 kg and l0 = 1 m."""
     scale = Scale.of(parameters)
@@ -42,6 +46,7 @@ def paper_gait(parameters: SlipParameters) -> WalkingGait:
     return gait_from_energy(parameters, 0.9818 * scale.length, 826.0 * energy)
 
 
+@checked
 def template_for(robot: PlanarBiped) -> SlipParameters:
     """The reference template scaled to a robot's mass and legs by dynamic similarity.
 

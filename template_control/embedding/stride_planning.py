@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked
+from template_control.checks.fitting import check
+from template_control.checks.ranges import NotNegative, Positive, Range, Share, Triple
 from template_control.embedding.planners.planner import (
     Ahead,
     Decision,
@@ -44,7 +48,7 @@ _TOUCHDOWN = int(Event.TOUCHDOWN)
 
 
 @dataclass(frozen=True)
-class ReplanOptions:
+class ReplanOptions(Checked):
     """When a stride is planned anew between two sections, and from where.
 
     Attributes:
@@ -61,14 +65,14 @@ class ReplanOptions:
         path: how the robot's place on the path is looked for.
     """
 
-    speed: float = tuned(0.05, SPEED)
-    interval: float = tuned(0.02, TIME)
-    patience: float = tuned(0.01, TIME)
-    angle_drop: float = tuned(0.15)
-    agility: float = tuned(8.0, RATE_SQUARED)
-    foresight: float = tuned(1.0, TIME)
-    calmer: tuple[float, ...] = tuned((0.5, 0.0))
-    highest: float = tuned(0.99)
+    speed: Annotated[float, Range(0.0, endless=True)] = tuned(0.05, SPEED)
+    interval: NotNegative = tuned(0.02, TIME)
+    patience: Annotated[float, Range(0.0, endless=True)] = tuned(0.01, TIME)
+    angle_drop: NotNegative = tuned(0.15)
+    agility: NotNegative = tuned(8.0, RATE_SQUARED)
+    foresight: NotNegative = tuned(1.0, TIME)
+    calmer: tuple[Share, ...] = tuned((0.5, 0.0))
+    highest: Positive = tuned(0.99)
     path: PathOptions = field(default_factory=PathOptions)
 
 
@@ -189,7 +193,7 @@ class StridePlanning:
                 goal=goal,
                 target=end.padded(goal.target),
                 decision=decision,
-                offset=self.planner_of(goal).offset.copy(),
+                offset=check("the planner's offset", self.planner_of(goal).offset, Triple).copy(),
                 learnt=learnt,
                 plan_seconds=seconds,
             )

@@ -6,12 +6,12 @@ import argparse
 import json
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
 from template_control.errors import ParameterError
 from template_control.paper.reproduction import REPRODUCTIONS, Reproduction
 from template_control.storage import Files, writable
+from template_control.terminal import plain_console
 from template_control.view.figure_file import save_figure
 
 
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
             f"no reproduction {options.name!r}: give one of {', '.join(REPRODUCTIONS)}"
         )
     folder = None if options.no_figures else writable(options.output)
-    with Console(stderr=True).status(f"computing {options.name}"):
+    with plain_console(stderr=True).status(f"computing {options.name}"):
         result = REPRODUCTIONS[options.name]()
     files, paths = Files(), []
     if folder is not None:
@@ -58,7 +58,7 @@ def _save(result: Reproduction, folder: Path) -> list[Path]:
 
 
 def _print(result: Reproduction, paths: list[Path]) -> None:
-    console = Console()
+    console = plain_console()
     table = Table(title=result.title)
     for i, column in enumerate(result.columns):
         table.add_column(column, justify="left" if i < 1 else "right")

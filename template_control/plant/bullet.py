@@ -12,7 +12,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.errors import ParameterError, RobotError
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Positive
+from template_control.errors import RobotError
 from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import silenced
 from template_control.robot.planar_biped import PlanarBiped
@@ -73,7 +75,7 @@ def _ground_bodies(step: GroundStep | None, client: int) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class PlantOptions:
+class PlantOptions(Checked):
     """What the world is like.
 
     Attributes:
@@ -89,16 +91,10 @@ class PlantOptions:
 
     kind: ClassVar[str] = "pybullet"
 
-    friction: float = 0.7
-    time_step: float = 1e-3
-    mass_scale: float = 1.0
+    friction: Positive = 0.7
+    time_step: Positive = 1e-3
+    mass_scale: Positive = 1.0
     ground_step: GroundStep | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("friction", "time_step", "mass_scale"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f"plant option {name} is {value!r}: give a positive number")
 
     def ground_height(self, x: float) -> float:
         """Height of the ground at ``x`` [m]."""
@@ -120,6 +116,7 @@ class BulletPlant:
         joints: PyBullet's joint indices in the order of q.
     """
 
+    @checked
     def __init__(self, robot: PlanarBiped, options: PlantOptions) -> None:
         self.robot = robot
         self.options = options

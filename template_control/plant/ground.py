@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
 from template_control.slip.gaits.gait import WalkingGait
 
@@ -14,7 +15,7 @@ _FARTHEST = 1000.0  # [m]
 
 
 @dataclass(frozen=True)
-class GroundStep:
+class GroundStep(Checked):
     """A single step of the ground: at height 0 before ``x``, at ``height`` from there on.
 
     The edge is a vertical wall, on which a foot can trip; place it between footholds, as
@@ -28,20 +29,13 @@ class GroundStep:
         ParameterError: if the height is 0 or more than 1 m, or x is not within 0 to 1000 m.
     """
 
-    height: float
-    x: float
+    height: Annotated[float, Range(-_HIGHEST, _HIGHEST)]
+    x: Annotated[float, Range(0.0, _FARTHEST, above=True)]
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.height) and 0.0 < abs(self.height) <= _HIGHEST):
-            raise ParameterError(
-                f"ground step height is {self.height!r} m: give a number other than 0 from"
-                f" {-_HIGHEST:g} to {_HIGHEST:g}"
-            )
-        if not (np.isfinite(self.x) and 0.0 < self.x <= _FARTHEST):
-            raise ParameterError(
-                f"ground step x is {self.x!r} m: give a number above 0, where the robot starts,"
-                f" up to {_FARTHEST:g}"
-            )
+        super().__post_init__()
+        if self.height == 0.0:
+            raise ParameterError("GroundStep.height is 0: give a number other than 0")
 
     @classmethod
     def at_step(cls, gait: WalkingGait, height: float, step: int, share: float = 0.5) -> GroundStep:

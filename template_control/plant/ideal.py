@@ -17,6 +17,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError
 from template_control.plant.rigid_contact import pressing, solve
 from template_control.robot.planar_biped import PlanarBiped
@@ -33,7 +35,7 @@ _DRIFT = 1e-12  # constraint error [m, m/s] that is projected away
 
 
 @dataclass(frozen=True)
-class IdealOptions:
+class IdealOptions(Checked):
     """What the ideal world is like. Friction is not modelled: stance feet stick.
 
     Attributes:
@@ -46,18 +48,8 @@ class IdealOptions:
 
     kind: ClassVar[str] = "ideal"
 
-    time_step: float = 1e-3
-    mass_scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.time_step < np.inf:
-            raise ParameterError(
-                f"ideal plant: time_step is {self.time_step!r}: give a positive number of seconds"
-            )
-        if not 0.0 < self.mass_scale < np.inf:
-            raise ParameterError(
-                f"ideal plant: mass_scale is {self.mass_scale!r}: give a positive number"
-            )
+    time_step: Positive = 1e-3
+    mass_scale: Positive = 1.0
 
     def ground_height(self, x: float) -> float:
         """Height of the ground at ``x`` [m]: flat."""
@@ -83,6 +75,7 @@ class IdealPlant:
             foot would have slid or bounced.
     """
 
+    @checked
     def __init__(self, robot: PlanarBiped, options: IdealOptions) -> None:
         self.options = options
         model = robot.model.copy()

@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
@@ -114,6 +115,7 @@ def plant_name(world: World) -> str:
     return type(world).__name__
 
 
+@checked
 def open_plant(robot: PlanarBiped, world: World) -> AbstractContextManager[Plant]:
     """Make the plant that options describe, to be used as a context manager.
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Interval, NotNegative, Positive
 from template_control.errors import RobotError
 
 _COLOURS = {"grey": "0.55 0.57 0.60 1", "blue": "0.16 0.38 0.63 1", "orange": "0.86 0.45 0.13 1"}
@@ -17,7 +19,7 @@ _BASE = (
 
 
 @dataclass(frozen=True)
-class Link:
+class Link(Checked):
     """A rigid link of the sagittal plane.
 
     Attributes:
@@ -28,14 +30,16 @@ class Link:
         inertia: about +y through its centre of mass [kg m^2].
     """
 
-    length: float
-    mass: float
-    com: float
-    inertia: float
+    _error = RobotError
+
+    length: Positive
+    mass: Positive
+    com: Positive
+    inertia: Positive
 
 
 @dataclass(frozen=True)
-class FiveLink:
+class FiveLink(Checked):
     """A trunk and two equal legs of thigh and shank, with spheres as feet.
 
     Attributes:
@@ -51,26 +55,18 @@ class FiveLink:
         RobotError: if a number of a link is not positive and finite.
     """
 
+    _error = RobotError
+
     name: str
     trunk: Link
     thigh: Link
     shank: Link
-    torque_limit: tuple[float, float]
-    velocity_limit: float = 20.0
-    hip_width: float = 0.2
-    foot_radius: float = 0.01
-    hip_range: tuple[float, float] = (-2.0, 1.5)
-    knee_range: tuple[float, float] = (0.0, 2.5)
-
-    def __post_init__(self) -> None:
-        for part in ("trunk", "thigh", "shank"):
-            link: Link = getattr(self, part)
-            for quantity in ("length", "mass", "com", "inertia"):
-                value = getattr(link, quantity)
-                if not 0.0 < value < float("inf"):
-                    raise RobotError(
-                        f"{self.name}: {part} {quantity} is {value!r}: give a positive number"
-                    )
+    torque_limit: tuple[Positive, Positive]
+    velocity_limit: Positive = 20.0
+    hip_width: NotNegative = 0.2
+    foot_radius: Positive = 0.01
+    hip_range: Interval = (-2.0, 1.5)
+    knee_range: Interval = (0.0, 2.5)
 
     def urdf(self) -> str:
         """The robot as URDF text, planar: x, z and pitch unactuated, hinges about +y."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from template_control.checks.checked import checked
 from template_control.errors import RobotError
 from template_control.robot.planar_biped import PlanarBiped
 
@@ -59,6 +60,7 @@ ROBOTS: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
 """Names that :func:`load_robot` knows, with a line about each."""
 
 
+@checked
 def robot_path(name: str) -> Path:
     """The URDF of a shipped robot, from a wheel or from a checkout.
 
@@ -91,6 +93,7 @@ def _files(entry: _Entry) -> list[Path]:
     return [Path(str(f.locate())) for f in files if f.name == entry.file]
 
 
+@checked
 def load_robot(name: str | Path) -> PlanarBiped:
     """A shipped robot by name, or any planar biped by the path of its URDF.
 

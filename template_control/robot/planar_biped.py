@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError, RobotError
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planar_terms import PlanarTerms, gather, sources
@@ -134,6 +135,7 @@ class PlanarBiped:
         return f"<PlanarBiped {self.name}: {self.mass:.4g} kg, joints {joints}>"
 
     @classmethod
+    @checked
     def from_urdf(
         cls,
         path: str | Path,

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import NotNegative, Pair, Range, Shape, Triple
 from template_control.errors import RobotError
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
@@ -18,7 +21,7 @@ _OUTPUTS = 7  # CoM (2), trunk (1), both feet (4)
 
 
 @dataclass(frozen=True)
-class Pose:
+class Pose(Checked):
     """Where the CoM and the feet are, and how they move.
 
     Attributes:
@@ -35,17 +38,18 @@ class Pose:
             CoM: it is the momentum about the foot below, over m y.
     """
 
-    com: Array
-    com_velocity: Array
-    feet: Array
-    feet_velocity: Array
-    rear: int = 0
-    swung: tuple[float, float] | None = None
+    com: Pair
+    com_velocity: Pair
+    feet: Annotated[Array, Shape((2, 2))]
+    feet_velocity: Annotated[Array, Shape((2, 2))]
+    rear: Annotated[int, Range(0, 1)] = 0
+    swung: tuple[NotNegative, NotNegative] | None = None
     pitch: float = 0.0
     angular_momentum: float | None = None
     momentum_speed: bool = False
 
 
+@checked
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     """State of a robot whose CoM and feet are in a pose.
 
@@ -128,7 +132,7 @@ def _configuration(robot: PlanarBiped, pose: Pose, longest: float) -> Array:
         error = residual()
         if np.max(np.abs(error)) < 1e-12:
             return q
-        step = np.linalg.solve(jacobian(), error)
+        step = _solved(robot, jacobian(), error)
         q -= step * min(1.0, longest / np.max(np.abs(step)))
     return np.full(robot.nv, np.nan)
 
@@ -147,17 +151,18 @@ def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:
     rows[3:5] = robot.foot_jacobian[stance]
     rows[5:7] = robot.foot_jacobian[swing]
     wanted = [*pose.com_velocity, pose.angular_momentum or 0.0, *pose.feet_velocity.ravel()]
-    v = np.linalg.solve(rows, wanted)
+    v = _solved(robot, rows, np.array(wanted))
     robot.update(q, v)
     return v
 
 
+@checked
 def state_at_vlo(
     robot: PlanarBiped,
-    z: Array,
-    stance: int,
-    swing_position: Array,
-    swing_velocity: Array,
+    z: Triple,
+    stance: Annotated[int, Range(0, 1)],
+    swing_position: Pair,
+    swing_velocity: Pair,
     pitch: float = 0.0,
 ) -> tuple[Array, Array]:
     """State of a robot at VLO, with the stance foot at x = 0.
@@ -186,6 +191,13 @@ def state_at_vlo(
         momentum_speed=True,
     )
     return state_in(robot, pose)
+
+
+def _solved(robot: PlanarBiped, matrix: Array, right: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        raise RobotError(f"{robot.name}: the legs do not determine the pose; bend them") from None
 
 
 def _angular_momentum_row(robot: PlanarBiped, q: Array) -> Array:

@@ -8,7 +8,7 @@ fall, or more than half of them twice running; so it goes past the level where n
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from template_control.checks.checked import checked
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.robot_template import default_gait
 from template_control.errors import ParameterError, RobotError, SweepError
@@ -147,6 +148,7 @@ def off_gait(record: Record, gait: WalkingGait) -> tuple[float, float]:
     return float(speed / gait.mean_speed - 1.0), float(height / gait.vlo[1] - 1.0)
 
 
+@checked
 def trial(robot: str, disturbance: str, level: float, number: int) -> dict[str, Any]:
     """One walk under one disturbance, as a sweep's worker runs it.
 
@@ -173,9 +175,10 @@ def trial(robot: str, disturbance: str, level: float, number: int) -> dict[str, 
     }
 
 
+@checked
 def measure(
     robot: str,
-    names: Iterable[str] | None = None,
+    names: Sequence[str] | None = None,
     folder: Path | None = None,
     executor: Executor | None = None,
     quick: bool = False,

@@ -17,6 +17,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from template_control import settings, storage
+from template_control.checks.checked import Checked
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
@@ -32,7 +33,8 @@ from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
-from template_control.slip.gaits.gait import WalkingGait, gait_for_speed
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.scenario.route import ScenarioRoute
@@ -41,7 +43,7 @@ from template_control.slip.similarity import REFERENCE
 
 
 @dataclass(frozen=True)
-class RobotChoice:
+class RobotChoice(Checked):
     """Which robot; what a URDF of one's own may need is as in :meth:`PlanarBiped.from_urdf`.
 
     Attributes:
@@ -89,7 +91,7 @@ _RUN = 3.0 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length))
 
 
 @dataclass(frozen=True)
-class GaitChoice:
+class GaitChoice(Checked):
     """Which gait of the robot's template.
 
     Attributes:
@@ -109,6 +111,7 @@ class GaitChoice:
     apex_height: float | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("speed", "touchdown_angle", "apex_height"):
             if getattr(self, name) is not None and name not in _GAIT_NUMBERS[self.name]:
                 words = name.replace("_", " ")
@@ -138,7 +141,7 @@ class GaitChoice:
 
 
 @dataclass(frozen=True)
-class OwnPlanner:
+class OwnPlanner(Checked):
     """A planner of the user's own.
 
     Attributes:
@@ -229,7 +232,7 @@ class Ready(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RunConfig:
+class RunConfig(Checked):
     """All that a run depends on; the same library repeats it to the last bit.
 
     Attributes:
@@ -250,6 +253,7 @@ class RunConfig:
     scenario: Scenario | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.scenario is not None:
             for f in fields(GaitChoice):
                 if getattr(self.gait, f.name) != f.default:

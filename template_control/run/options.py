@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
@@ -19,7 +21,7 @@ _LONGEST_DELAY = 1.0  # [s]
 
 
 @dataclass(frozen=True)
-class Push:
+class Push(Checked):
     """A horizontal force on the trunk.
 
     Attributes:
@@ -30,13 +32,13 @@ class Push:
     """
 
     impulse: float
-    step: int = 10
-    phase: float = 0.0
-    duration: float = 0.1
+    step: Index = 10
+    phase: NotNegative = 0.0
+    duration: Positive = 0.1
 
 
 @dataclass(frozen=True)
-class FallOptions:
+class FallOptions(Checked):
     """When a foot touches the ground, and when a robot counts as fallen.
 
     Attributes:
@@ -48,14 +50,32 @@ class FallOptions:
         patience: number of the gait's step durations that may pass without a section.
     """
 
-    contact_force: float = tuned(0.005)
-    height: float = tuned(0.35)
-    pitch: float = tuned(float(np.radians(60.0)))
-    patience: float = tuned(4.0)
+    contact_force: NotNegative = tuned(0.005)
+    height: NotNegative = tuned(0.35)
+    pitch: Positive = tuned(float(np.radians(60.0)))
+    patience: Positive = tuned(4.0)
+
+
+def check_pushes(pushes: tuple[Push, ...], steps: int) -> None:
+    """Check that a run is long enough for its pushes.
+
+    Args:
+        pushes: of the run.
+        steps: that it has at most.
+
+    Raises:
+        ParameterError: naming the push that would never come.
+    """
+    for push in pushes:
+        if push.step >= steps:
+            raise ParameterError(
+                f"a push is in step {push.step}, and the run has steps 0 to {steps - 1}: give an"
+                " earlier step or a longer run"
+            )
 
 
 @dataclass(frozen=True)
-class SimulationOptions:
+class SimulationOptions(Checked):
     """How a run goes.
 
     Attributes:
@@ -77,30 +97,30 @@ class SimulationOptions:
         falls: when the robot counts as fallen.
 
     Raises:
-        ParameterError: if the plant is none, a number is less than 1, or the delay is not a whole
-            number of physics steps up to 1 s.
+        ParameterError: if a value is of a wrong type or out of its range, the plant is none, the
+            delay is not a whole number of physics steps up to 1 s, or a push comes after the
+            last step.
     """
 
-    steps: int | None = None
+    steps: Count | None = None
     plant: PlantOptions | IdealOptions | Plant = field(default_factory=PlantOptions)
     embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
     start: tuple[float, float, float] | None = None
     pose: Pose | None = None
     pushes: tuple[Push, ...] = ()
     sensors: SensorOptions = field(default_factory=SensorOptions)
-    delay: float = 0.0
-    record_every: int = 1
+    delay: NotNegative = 0.0
+    record_every: Count = 1
     falls: FallOptions = field(default_factory=FallOptions)
 
     def __post_init__(self) -> None:
         check_world(self.plant)
-        if self.steps is not None and self.steps < 1:
-            raise ParameterError(f"steps is {self.steps}: give at least 1")
-        if self.record_every < 1:
-            raise ParameterError(f"record_every is {self.record_every}: give at least 1")
+        super().__post_init__()
+        if self.steps is not None:
+            check_pushes(self.pushes, self.steps)
         step = self.plant.time_step
-        whole = np.isfinite(self.delay) and abs(self.delay / step - self.delay_ticks) < 1e-6
-        if not (whole and 0.0 <= self.delay <= _LONGEST_DELAY):
+        whole = abs(self.delay / step - self.delay_ticks) < 1e-6
+        if not (whole and self.delay <= _LONGEST_DELAY):
             raise ParameterError(
                 f"delay is {self.delay!r} s: give a multiple of the time step, {step:g} s, from 0"
                 f" to {_LONGEST_DELAY:g} s"
@@ -109,4 +129,4 @@ class SimulationOptions:
     @property
     def delay_ticks(self) -> int:
         """The delay in physics steps."""
-        return round(self.delay / self.plant.time_step) if np.isfinite(self.delay) else 0
+        return round(self.delay / self.plant.time_step)

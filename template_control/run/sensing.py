@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.errors import ParameterError
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Index, NotNegative
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import Scale
 
@@ -19,7 +20,7 @@ _VELOCITY_NOISE = 20.0  # [1/s] noise of velocities over that of positions
 
 
 @dataclass(frozen=True)
-class SensorOptions:
+class SensorOptions(Checked):
     """White Gaussian noise on the measured state, drawn anew at every tick.
 
     Attributes:
@@ -32,9 +33,9 @@ class SensorOptions:
         ParameterError: if a number is negative or not finite.
     """
 
-    position_noise: float = 0.0
-    velocity_noise: float = 0.0
-    seed: int = 0
+    position_noise: NotNegative = 0.0
+    velocity_noise: NotNegative = 0.0
+    seed: Index = 0
 
     @classmethod
     def of_size(cls, noise: float, scale: Scale, seed: int = 0) -> SensorOptions:
@@ -50,12 +51,6 @@ class SensorOptions:
             ParameterError: if the noise is negative or not finite.
         """
         return cls(noise, _VELOCITY_NOISE / scale.time * noise, seed)
-
-    def __post_init__(self) -> None:
-        for name in ("position_noise", "velocity_noise", "seed"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                raise ParameterError(f"sensor option {name} is {value!r}: give 0 or more")
 
 
 class Sensors:

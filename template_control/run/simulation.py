@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import asdict, fields, is_dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.default import default_planners
@@ -20,18 +18,17 @@ from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.section_report import SectionReport
 from template_control.errors import ParameterError
-from template_control.plant.bullet import PlantOptions
-from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, state_at_vlo, state_in
-from template_control.run.options import Push, SimulationOptions
+from template_control.run.in_use import in_use
+from template_control.run.metadata import about, outcome
+from template_control.run.options import Push, SimulationOptions, check_pushes
 from template_control.run.record import Record, RunInterrupted
 from template_control.run.recorder import Recorder, Truth
 from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.gaits.flight import flight_share
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.route import Route
@@ -44,6 +41,7 @@ _LOG = logging.getLogger(__name__)
 _STEPS = 50  # of a run on a route that does not end, where the options do not say
 
 
+@checked
 def perturbed_start(gait: Gait, seed: int) -> tuple[float, float, float]:
     """The gait's state at its section, changed by up to 5 % in speed and 2 % of l0 in height.
 
@@ -60,6 +58,7 @@ def perturbed_start(gait: Gait, seed: int) -> tuple[float, float, float]:
     return float(z[0] * (1.0 + 0.05 * draw[0])), float(height), float(z[2])
 
 
+@checked
 def simulate(
     robot: PlanarBiped,
     route: Route | Scenario | Planner,
@@ -84,7 +83,8 @@ def simulate(
 
     Raises:
         RobotError: if the robot's legs do not reach the start.
-        ParameterError: if there is no planner for a stride of the route, or no pose to start in.
+        ParameterError: if there is no planner for a stride of the route, no pose to start in, or
+            if another run uses the robot, the route or a planner at this moment.
         ScenarioError: if the scenario asks for what the robot cannot do.
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
@@ -98,24 +98,28 @@ def simulate(
         chosen = planners or default_planners(route)
         controller = EmbeddingController(robot, chosen, o.embedding, route, automaton)
     recorder = Recorder(controller, o.record_every)
-    q, v = _start(controller, o)
-    _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
-    begin = time.perf_counter()
-    stop: KeyboardInterrupt | None = None
-    with open_plant(robot, o.plant) as plant:
-        plant.reset(q, v)
-        try:
-            reason = _loop(plant, controller, recorder, o, progress)
-        except KeyboardInterrupt as error:
-            if not recorder.rows:
-                raise
-            reason, stop = "", error
-    seconds = time.perf_counter() - begin
-    if reason:
-        _LOG.warning("%s fell: %s", robot.name, reason)
-    metadata = _metadata(controller, recorder, o, reason, seconds)
-    metadata["interrupted"] = stop is not None
-    record = recorder.record(metadata)
+    last = _last_step(controller, o)
+    with in_use(robot, controller.planning.route, *controller.planning.planners.values()):
+        q, v = _start(controller, o)
+        _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
+        # Before the run, which would be lost if this failed after it.
+        metadata = about(controller, o)
+        begin = time.perf_counter()
+        stop: KeyboardInterrupt | None = None
+        with open_plant(robot, o.plant) as plant:
+            plant.reset(q, v)
+            try:
+                reason = _loop(plant, controller, recorder, o, (last, progress))
+            except KeyboardInterrupt as error:
+                if not recorder.rows:
+                    raise
+                reason, stop = "", error
+        seconds = time.perf_counter() - begin
+        if reason:
+            _LOG.warning("%s fell: %s", robot.name, reason)
+        metadata |= outcome(recorder, o.plant.time_step, reason, seconds)
+        metadata["interrupted"] = stop is not None
+        record = recorder.record(metadata)
     _LOG.info("%r in %.2f s of wall-clock time", record, seconds)
     if stop is not None:
         raise RunInterrupted(record) from stop
@@ -155,21 +159,38 @@ def _apex_pose(controller: EmbeddingController, z: Array) -> Pose:
     return apex_pose(controller.robot, ApexStart(z, gait, swing, pitch, planning.automaton))
 
 
+def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
+    """How many steps the run has at most.
+
+    Raises:
+        ParameterError: if a push comes after the last of them.
+    """
+    if o.steps is not None:
+        return o.steps  # the options have looked at the pushes
+    if not controller.planning.route.endless:
+        return np.inf
+    check_pushes(o.pushes, _STEPS)
+    return _STEPS
+
+
 def _loop(
     plant: Plant,
     controller: EmbeddingController,
     recorder: Recorder,
     o: SimulationOptions,
-    progress: Callable[[int], None] | None,
+    until: tuple[float, Callable[[int], None] | None],
 ) -> str:
-    """Run until the steps are done ("") or the robot falls (why)."""
+    """Run until the steps are done ("") or the robot falls (why).
+
+    ``until`` holds the number of steps, and what is called with those done.
+    """
+    last, progress = until
     robot, planning = controller.robot, controller.planning
     dt = o.plant.time_step
     length = controller.parameters.rest_length
     sensors, delay = Sensors(o.sensors, robot, length), TorqueDelay(o.delay_ticks)
     q, v, forces = np.zeros(robot.nv), np.zeros(robot.nv), np.zeros((2, 2))
     threshold = o.falls.contact_force * robot.mass * robot.gravity
-    last = o.steps if o.steps is not None else (_STEPS if planning.route.endless else np.inf)
     done, tick = 0, 0
     while done < last and not planning.arrived:
         now = tick * dt
@@ -252,65 +273,3 @@ def _fallen(
     if plant.trunk_touches_ground():
         return "the trunk touched the ground"
     return ""
-
-
-def _metadata(
-    controller: EmbeddingController,
-    recorder: Recorder,
-    o: SimulationOptions,
-    reason: str,
-    seconds: float,
-) -> dict[str, Any]:
-    robot, gait = controller.robot, controller.planner.gait
-    parameters = asdict(gait.parameters)
-    nodes = controller.planning.automaton.nodes
-    metadata = {
-        "robot": robot.name,
-        "urdf": robot.urdf,
-        "mass": robot.mass,
-        "joints": list(robot.joint_names),
-        "torque_limit": controller.qp.torque_limit.tolist(),
-        "velocity_limit": robot.velocity_limit.tolist(),
-        "feet": list(robot.feet),
-        "legs": [list(leg) for leg in robot.legs],
-        "trunk_com": robot.trunk_com,
-        "nodes": [node.name for node in nodes],
-        "phases": [node.phase.name for node in nodes],
-        "stiffness_slots": [[node.rear, node.front] for node in nodes],
-        "gait": gait.name,
-        "template": parameters,
-        "gait_state": gait.state.tolist(),
-        "gait_controls": gait.controls.tolist(),
-        "gait_flight_share": flight_share(gait, controller.planning.automaton),
-        "gait_mean_speed": gait.step_length / gait.step_duration,
-        "planner": type(controller.planner).__name__,
-        "plant": plant_name(o.plant),
-        "options": _told(o),
-        "fall_reason": reason,
-        "arrived": controller.planning.arrived,
-        "wall_seconds": seconds,
-        "duration": recorder.ticks * o.plant.time_step,
-        "ticks": recorder.ticks,
-        "summary": recorder.summary(),
-    }
-    # As it will be read back: JSON knows lists, not tuples.
-    return dict(json.loads(json.dumps(metadata, default=_plain)))
-
-
-def _told(o: SimulationOptions) -> dict[str, Any]:
-    """The options as data; a plant of one's own is not data."""
-    own = not isinstance(o.plant, PlantOptions | IdealOptions)
-    rest = {f.name: getattr(o, f.name) for f in fields(o) if not (own and f.name == "plant")}
-    told = {name: _data(value) for name, value in rest.items()}
-    return {**told, "plant": {}} if own else told
-
-
-def _data(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return [_data(entry) for entry in value]
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
-
-
-def _plain(value: Any) -> Any:
-    """What JSON knows of a value it does not: arrays are lists, anything else is its text."""
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)

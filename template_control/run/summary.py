@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.maps.section import section_of
@@ -70,6 +71,7 @@ def _quantiles(seconds: Array) -> dict[str, float]:
     return {"median": float(median), "p99": float(p99)}
 
 
+@checked
 def summarise(record: Record, path: str | None) -> dict[str, Any]:
     """Summary of a run in SI units.
 

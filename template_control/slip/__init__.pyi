@@ -33,9 +33,10 @@ from .gaits.controlled_branch import controlled_fixed_point as controlled_fixed_
 from .gaits.gait import Gait as Gait
 from .gaits.gait import WalkingGait as WalkingGait
 from .gaits.gait import gait_at as gait_at
-from .gaits.gait import gait_for_speed as gait_for_speed
 from .gaits.gait import gait_from_energy as gait_from_energy
 from .gaits.gait_branch import Family as Family
+from .gaits.mean_speed import gait_for_speed as gait_for_speed
+from .gaits.mean_speed import mean_speed_range as mean_speed_range
 from .gaits.running_gait import RunningFamily as RunningFamily
 from .gaits.running_gait import RunningGait as RunningGait
 from .gaits.running_gait import running_gait as running_gait

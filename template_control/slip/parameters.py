@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from template_control.errors import ParameterError
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Positive
 
 
 @dataclass(frozen=True)
-class SlipParameters:
+class SlipParameters(Checked):
     """Parameters of the bipedal SLIP (Section II-A); the defaults are Table IV's.
 
     Attributes:
@@ -22,15 +22,7 @@ class SlipParameters:
         ParameterError: if any of them is not a positive finite number.
     """
 
-    mass: float = 80.0
-    gravity: float = 9.81
-    rest_length: float = 1.0
-    leg_stiffness: float = 16.5e3
-
-    def __post_init__(self) -> None:
-        for name in ("mass", "gravity", "rest_length", "leg_stiffness"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ParameterError(
-                    f"SLIP parameter {name} is {value!r}: give a positive finite number"
-                )
+    mass: Positive = 80.0
+    gravity: Positive = 9.81
+    rest_length: Positive = 1.0
+    leg_stiffness: Positive = 16.5e3

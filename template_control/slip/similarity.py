@@ -13,6 +13,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Positive
 from template_control.slip.parameters import SlipParameters
 
 T = TypeVar("T")
@@ -72,7 +74,7 @@ def dimensions_of(options: Any) -> dict[str, tuple[Dimension, ...]]:
 
 
 @dataclass(frozen=True)
-class Scale:
+class Scale(Checked):
     """Units of a template over those of the reference template.
 
     Attributes:
@@ -80,8 +82,8 @@ class Scale:
         time: sqrt(l0 / g) over the reference's.
     """
 
-    length: float
-    time: float
+    length: Positive
+    time: Positive
 
     @classmethod
     def of(cls, parameters: SlipParameters) -> Scale:

@@ -15,11 +15,10 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -29,11 +28,18 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from template_control.checks.checked import Checked
+from template_control.checks.fitting import check, shown
+from template_control.checks.ranges import Count, Index, Range
 from template_control.errors import SweepError
 from template_control.sweep.executor import ExecutorLostError, check_pickles, run_calls
 from template_control.sweep.file import Outcome, SweepFile, header
+from template_control.terminal import plain_console
 
 Item = dict[str, Any]
+
+
+_MOST_DRAWS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,7 @@ class SweepResult:
 
 
 @dataclass(frozen=True)
-class SweepOptions:
+class SweepOptions(Checked):
     """How a sweep goes about its items.
 
     Attributes:
@@ -101,14 +107,12 @@ class SweepOptions:
         SweepError: if no item may be in flight.
     """
 
+    _error = SweepError
+
     progress: bool = True
     label: str = "sweep"
     retry_failed: bool = False
-    in_flight: int = 1000
-
-    def __post_init__(self) -> None:
-        if self.in_flight < 1:
-            raise SweepError(f"in_flight is {self.in_flight}: give at least 1")
+    in_flight: Count = 1000
 
 
 def grid(**axes: Iterable[Any]) -> list[Item]:
@@ -120,7 +124,7 @@ def grid(**axes: Iterable[Any]) -> list[Item]:
     values = []
     for name, axis in axes.items():
         if isinstance(axis, str) or not isinstance(axis, Iterable):
-            raise SweepError(f"axis {name} is {axis!r}: give a list of values")
+            raise SweepError(f"axis {name} is {shown(axis)}: give a list of values")
         values.append(axis.tolist() if isinstance(axis, np.ndarray) else list(axis))
     return [dict(zip(axes, row, strict=True)) for row in product(*values)]
 
@@ -136,11 +140,12 @@ def sample(count: int, seed: int, **ranges: tuple[float, float]) -> list[Item]:
     Raises:
         SweepError: if a range is not two finite numbers, low first.
     """
+    count = check("count", count, Annotated[int, Range(0, _MOST_DRAWS)], SweepError)
+    seed = check("seed", seed, Index, SweepError)
     for name, bounds in ranges.items():
-        if np.shape(bounds) != (2,) or not np.all(np.isfinite(bounds)) or bounds[0] > bounds[1]:
-            raise SweepError(f"range {name} is {bounds!r}: give (low, high)")
-    if count < 0 or seed < 0:
-        raise SweepError(f"count is {count}, seed is {seed}: give numbers that are not negative")
+        pair = check(f"range {name}", bounds, tuple[float, float], SweepError)
+        if pair[0] > pair[1]:
+            raise SweepError(f"range {name} is {pair!r}: give (low, high)")
     low, high = np.array(list(ranges.values()), dtype=np.float64).reshape(-1, 2).T
     draws = np.random.default_rng(seed).uniform(low, high, (count, len(ranges)))
     return [dict(zip(ranges, row, strict=True)) for row in draws.tolist()]
@@ -156,6 +161,7 @@ def item_seed(seed: int, index: int) -> int:
         seed: of the whole sweep, not negative.
         index: place of the item in the sweep, from 0.
     """
+    seed, index = check("seed", seed, Index, SweepError), check("index", index, Index, SweepError)
     return int(np.random.SeedSequence(seed, spawn_key=(index,)).generate_state(1, np.uint64)[0])
 
 
@@ -260,7 +266,7 @@ def _checked(
 def _bar(shown: bool) -> Progress:
     """On stderr; without a thread of its own, as workers may be forked meanwhile."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[failed]} failed"),
@@ -269,7 +275,7 @@ def _bar(shown: bool) -> Progress:
     )
     return Progress(
         *columns,
-        console=Console(stderr=True),
+        console=plain_console(stderr=True),
         auto_refresh=False,
         redirect_stdout=False,
         redirect_stderr=False,

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError, RecordError
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
@@ -31,6 +32,7 @@ from template_control.view.style import (
     TEMPLATE,
     TRUNK,
     WINDOW,
+    as_text,
     shade,
     window,
 )
@@ -80,7 +82,8 @@ def stick_diagram(record: Record, seconds: float = WINDOW, interval: float = 0.0
     for foot, name in enumerate(("left leg", "right leg")):
         axes.plot([], [], color=_LEGS[foot], label=name)
     _ground(axes, record)
-    axes.set(xlabel="x [m]", ylabel="y [m]", title=f"{record.metadata['robot']}: stick diagram")
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.set_title(f"{as_text(record.metadata['robot'])}: stick diagram")
     axes.set_aspect("equal")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4, frameon=False)
     return figure
@@ -114,7 +117,7 @@ def com_tracking(record: Record, seconds: float = WINDOW) -> Figure:
     for axes in (upper, middle, lower):
         shade(axes, record, w)
         axes.legend(loc="upper right")
-    upper.set_title(f"{record.metadata['robot']}: centre of mass (single stance shaded)")
+    upper.set_title(f"{as_text(record.metadata['robot'])}: centre of mass (single stance shaded)")
     return figure
 
 
@@ -137,7 +140,7 @@ def joint_torques(record: Record, seconds: float = WINDOW) -> Figure:
         shade(axes, record, w)
         axes.set_ylabel("torque [N m]")
         axes.legend(loc="upper right")
-    panels[0].set_title(f"{record.metadata['robot']}: joint torques, limits dotted")
+    panels[0].set_title(f"{as_text(record.metadata['robot'])}: joint torques, limits dotted")
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -173,7 +176,7 @@ def ground_forces(record: Record, seconds: float = WINDOW) -> Figure:
         shade(axes, record, w)
         axes.set_ylabel(f"{name} force [N]")
         axes.legend(loc="upper right")
-    panels[0].set_title(f"{record.metadata['robot']}: ground reaction forces")
+    panels[0].set_title(f"{as_text(record.metadata['robot'])}: ground reaction forces")
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -238,6 +241,7 @@ def _check_samples(record: Record) -> None:
         raise RecordError("the run has fewer than two samples: there is nothing to draw")
 
 
+@checked
 def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Path]:
     """Draw the :data:`FIGURES` of a run as PNG, those that :func:`figures_of` names.
 

@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 
 from template_control.robustness.campaign import Finding, Robustness
 from template_control.robustness.disturbances import AFTER
+from template_control.view.style import as_text
 
 _RATE, _STANDING, _POINT = "#2a6196", "0.6", "#db7321"
 _COLUMNS = 5
@@ -29,7 +30,7 @@ def robustness_figure(found: Robustness) -> Figure:
     for axes in panels[len(found.findings) :]:
         axes.set_visible(False)
     figure.supylabel("success rate [%]", fontsize=9)
-    figure.suptitle(f"{found.robot}: success over {AFTER} steps", fontsize=10)
+    figure.suptitle(f"{as_text(found.robot)}: success over {AFTER} steps", fontsize=10)
     marks = (
         Line2D([], [], color=_RATE, marker="o", markersize=3.5, label="success"),
         Line2D([], [], color=_STANDING, label="no fall"),

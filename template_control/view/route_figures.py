@@ -9,11 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.run.record import Record
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.view.figure_file import save_figure
 from template_control.view.state_figures import template_energies
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, shade
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text, shade
 
 Array = NDArray[np.float64]
 
@@ -91,7 +92,8 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
     path.legend(loc="center right", fontsize=7, ncols=3)
     for axes in (speed, stiffness, torque):
         axes.legend(loc="upper right", fontsize=7, ncols=2)
-    speed.set_title(f"{record.metadata['robot']} through its scenario (single stance shaded)")
+    name = as_text(record.metadata["robot"])
+    speed.set_title(f"{name} through its scenario (single stance shaded)")
     return figure
 
 
@@ -140,6 +142,7 @@ def transition_energies(record: Record) -> Figure:
     return figure
 
 
+@checked
 def save_route_figures(record: Record, template: ScenarioRecord, folder: str | Path) -> list[Path]:
     """Write the figures as PNG; a run without transitions has no figure of their energies.
 

@@ -14,6 +14,7 @@ from template_control.view.style import (
     TEMPLATE,
     TRUNK,
     WINDOW,
+    as_text,
     shade,
     window,
 )
@@ -40,7 +41,7 @@ def joint_speeds(record: Record, seconds: float = WINDOW) -> Figure:
         shade(axes, record, w)
         axes.set_ylabel("speed [rad/s]")
         axes.legend(loc="upper right")
-    panels[0].set_title(f"{record.metadata['robot']}: joint speeds, limits dotted")
+    panels[0].set_title(f"{as_text(record.metadata['robot'])}: joint speeds, limits dotted")
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -68,7 +69,7 @@ def apex_return(record: Record) -> Figure:
         axes.set(xlabel=f"{name} at an apex [{unit}]", ylabel=f"{name} at the next [{unit}]")
         axes.legend(loc="upper left")
     figure.colorbar(points, label="step")
-    figure.suptitle(f"{record.metadata['robot']}: from apex to apex")
+    figure.suptitle(f"{as_text(record.metadata['robot'])}: from apex to apex")
     return figure
 
 
@@ -91,5 +92,7 @@ def turning(record: Record, seconds: float = WINDOW) -> Figure:
     lower.set_xlabel("time [s]")
     for axes in (upper, lower):
         shade(axes, record, w)
-    upper.set_title(f"{record.metadata['robot']}: trunk and angular momentum (forward positive)")
+    upper.set_title(
+        f"{as_text(record.metadata['robot'])}: trunk and angular momentum (forward positive)"
+    )
     return figure

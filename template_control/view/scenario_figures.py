@@ -9,9 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.view.figure_file import save_figure
+from template_control.view.style import as_text
 
 Array = NDArray[np.float64]
 
@@ -89,7 +91,8 @@ def scenario_figure(record: ScenarioRecord) -> Figure:
     _path(path, record)
     _controls(stiffness, angle, record)
     _speed(speed, record)
-    path.set_title(f"{record.metadata['name']}, controllers on the {record.metadata['map']} map")
+    name, map_name = as_text(record.metadata["name"]), record.metadata["map"]
+    path.set_title(f"{name}, controllers on the {map_name} map")
     return figure
 
 
@@ -122,6 +125,7 @@ def energy_figure(record: ScenarioRecord) -> Figure:
     return figure
 
 
+@checked
 def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Path]:
     """Write the figures as PNG; a run without transitions has no energy figure.
 

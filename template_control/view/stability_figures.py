@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.slip.gaits.branch import BranchPoint, Special
 from template_control.slip.gaits.stability import Kind
 
@@ -36,6 +37,7 @@ UNITS = {
 }
 
 
+@checked
 def branch_figure(
     points: Sequence[BranchPoint], over: str, show: Sequence[str], controlled: bool = False
 ) -> Figure:
@@ -83,6 +85,7 @@ def branch_figure(
     return figure
 
 
+@checked
 def basin_figure(
     energies: Array,
     heights: Array,
@@ -128,6 +131,7 @@ def basin_figure(
     return figure
 
 
+@checked
 def deadbeat_figure(
     heights: Array,
     angles: Array,

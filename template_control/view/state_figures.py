@@ -13,7 +13,7 @@ from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.maps.section import PADDED, VLO, Section, section_of
 from template_control.slip.parameters import SlipParameters
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, shade, window
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text, shade, window
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def phase_portrait(record: Record) -> Figure:
         axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=f"{where} of the gait")
     upright.set(xlabel="y [m]", ylabel="dy/dt [m/s]")
     forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
-    upright.set_title(f"{record.metadata['robot']}: phase portrait", loc="left")
+    upright.set_title(f"{as_text(record.metadata['robot'])}: phase portrait", loc="left")
     handles, labels = upright.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
     return figure
@@ -126,7 +126,7 @@ def tracking_errors(record: Record) -> Figure:
                 record.time, 0.0, 1.0, where=(record.push != 0.0).tolist(),
                 transform=axes.get_xaxis_transform(), color=RIGHT, alpha=0.25, linewidth=0,
             )  # fmt: skip
-    title = f"{record.metadata['robot']}: template less robot, and trunk"
+    title = f"{as_text(record.metadata['robot'])}: template less robot, and trunk"
     if np.any(record.push):
         title += " (pushes shaded)"
     panels[0].set_title(title)
@@ -202,7 +202,7 @@ def energies(record: Record) -> Figure:
         shade(axes, record, w)
     handles, labels = lower.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    panels[0].set_title(f"{record.metadata['robot']}: energies (single stance shaded)")
+    panels[0].set_title(f"{as_text(record.metadata['robot'])}: energies (single stance shaded)")
     return figure
 
 
@@ -253,7 +253,7 @@ def section_states(record: Record) -> Figure:
         )  # fmt: skip
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    title = f"{record.metadata['robot']}: at {_where(record)}"
+    title = f"{as_text(record.metadata['robot'])}: at {_where(record)}"
     panels[0].set_title(f"{title} (dx/dt from the angular momentum where a foot stands)")
     panels[-1].set(xlabel="step", xlim=(-0.5, len(state) - 0.5))
     panels[-1].xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)

@@ -26,6 +26,11 @@ def window(record: Record, seconds: float = WINDOW) -> slice:
     return slice(int(np.searchsorted(record.time, record.time[-1] - seconds)), None)
 
 
+def as_text(name: str) -> str:
+    """A user's name for a title: its dollar signs begin no formula, and it stays on one line."""
+    return " ".join(name.split()).replace("$", r"\$")
+
+
 def single_stance(record: Record) -> NDArray[np.bool_]:
     """(T,) whether the robot's controller was in single stance."""
     single = np.array([phase == Phase.SS.name for phase in record.metadata["phases"]])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import PER_ACCELERATION_SQUARED, RATE, RATE_SQUARED, tuned
 from template_control.whole_body.task import Rows
@@ -11,7 +13,7 @@ from template_control.whole_body.wanted import Wanted
 
 
 @dataclass(frozen=True)
-class ComTask:
+class ComTask(Checked):
     """Two rows, x and y of the CoM c, towards the template's r.
 
     The y row asks for J_y a + dJ_y/dt v = r_y'' + kp (r_y - c_y) + kd (r_y' - c_y').
@@ -28,8 +30,8 @@ class ComTask:
         gains: kp [1/s^2] and kd [1/s].
     """
 
-    weight: tuple[float, float] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
-    gains: tuple[float, float] = tuned((60.0, 16.0), RATE_SQUARED, RATE)
+    weight: tuple[NotNegative, NotNegative] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
+    gains: tuple[NotNegative, NotNegative] = tuned((60.0, 16.0), RATE_SQUARED, RATE)
 
     @property
     def weights(self) -> tuple[float, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.similarity import PER_ACCELERATION_SQUARED, RATE, RATE_SQUARED, tuned
@@ -12,7 +14,7 @@ from template_control.whole_body.wanted import Wanted
 
 
 @dataclass(frozen=True)
-class FootTask:
+class FootTask(Checked):
     """Two rows, x and y of a foot p, towards its reference r.
 
         J a + dJ/dt v = r'' + kp (r - p) + kd (r' - p')
@@ -29,9 +31,9 @@ class FootTask:
     """
 
     leg: Leg = Leg.FRONT
-    weight: tuple[float, float] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
-    gains: tuple[float, float] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
-    hold_gains: tuple[float, float] = tuned((1e4, 200.0), RATE_SQUARED, RATE)
+    weight: tuple[NotNegative, NotNegative] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
+    gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
+    hold_gains: tuple[NotNegative, NotNegative] = tuned((1e4, 200.0), RATE_SQUARED, RATE)
 
     @property
     def weights(self) -> tuple[float, ...]:

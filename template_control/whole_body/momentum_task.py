@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import PER_RATE_TO_THE_FOURTH, RATE, tuned
 from template_control.whole_body.task import Rows
@@ -11,7 +13,7 @@ from template_control.whole_body.wanted import Wanted
 
 
 @dataclass(frozen=True)
-class MomentumTask:
+class MomentumTask(Checked):
     """One row: the rate of the angular momentum L = A_L v about the CoM, over m h^2.
 
         (A_L a + dA_L/dt v) / (m h^2) = k (w (theta_ref - theta) - L / (m h^2))
@@ -26,9 +28,9 @@ class MomentumTask:
         turning: w, angular momentum over m h^2 for each radian of error [1/s].
     """
 
-    weight: float = tuned(1.0, PER_RATE_TO_THE_FOURTH)
-    bandwidth: float = tuned(20.0, RATE)
-    turning: float = tuned(1.35, RATE)
+    weight: NotNegative = tuned(1.0, PER_RATE_TO_THE_FOURTH)
+    bandwidth: NotNegative = tuned(20.0, RATE)
+    turning: NotNegative = tuned(1.35, RATE)
 
     @property
     def weights(self) -> tuple[float, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import PER_RATE_TO_THE_FOURTH, RATE, RATE_SQUARED, tuned
 from template_control.whole_body.task import Rows
@@ -13,7 +15,7 @@ _PITCH = 2  # place of the trunk's pitch in q
 
 
 @dataclass(frozen=True)
-class PostureTask:
+class PostureTask(Checked):
     """One row: theta'' = kp (theta_ref - theta) - kd theta', theta the trunk's pitch.
 
     Pitch is a coordinate of the robot, so T is a unit row and there is no bias.
@@ -23,8 +25,8 @@ class PostureTask:
         gains: kp [1/s^2] and kd [1/s].
     """
 
-    weight: float = tuned(1.0, PER_RATE_TO_THE_FOURTH)
-    gains: tuple[float, float] = tuned((100.0, 20.0), RATE_SQUARED, RATE)
+    weight: NotNegative = tuned(1.0, PER_RATE_TO_THE_FOURTH)
+    gains: tuple[NotNegative, NotNegative] = tuned((100.0, 20.0), RATE_SQUARED, RATE)
 
     @property
     def weights(self) -> tuple[float, ...]:

@@ -11,6 +11,8 @@ import numpy as np
 import proxsuite
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import NotNegative, Positive
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import RATE, tuned
 from template_control.whole_body.problem import (
@@ -31,7 +33,7 @@ _SOLVED = _proxqp.QPSolverOutput.PROXQP_SOLVED
 
 
 @dataclass(frozen=True)
-class QpOptions:
+class QpOptions(Checked):
     """What the QP knows of motors and ground, and how it regularises.
 
     Attributes:
@@ -45,12 +47,12 @@ class QpOptions:
             optimum unique.
     """
 
-    friction: float = tuned(0.7)
-    friction_margin: float = tuned(0.9)
-    torque_scale: float = tuned(1.0)
-    contact_damping: float = tuned(40.0, RATE)
-    force_cost: float = tuned(1e-3)
-    torque_cost: float = tuned(1e-4)
+    friction: Positive = tuned(0.7)
+    friction_margin: Positive = tuned(0.9)
+    torque_scale: Positive = tuned(1.0)
+    contact_damping: NotNegative = tuned(40.0, RATE)
+    force_cost: Positive = tuned(1e-3)
+    torque_cost: Positive = tuned(1e-4)
 
     @property
     def cone(self) -> float:
@@ -173,6 +175,7 @@ class WholeBodyQp:
         friction: coefficient the cones are built with.
     """
 
+    @checked
     def __init__(self, robot: PlanarBiped, options: QpOptions | None = None) -> None:
         o = options or QpOptions()
         self.robot = robot

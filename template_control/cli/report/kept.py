@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from template_control import view
 from template_control.cli.options.output import output_folder
 from template_control.cli.report.output import progress_bar
@@ -18,6 +16,7 @@ from template_control.plant.quiet import stdout_to_stderr
 from template_control.run.config import Ready, RunConfig
 from template_control.run.record import Record, RunInterrupted
 from template_control.storage import Files
+from template_control.terminal import plain_console
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,9 @@ def run_and_keep(
     files = Files()
     with stdout_to_stderr():
         try:
-            with progress_bar(Console(stderr=True), doing, config.simulation.steps) as advance:
+            with progress_bar(
+                plain_console(stderr=True), doing, config.simulation.steps
+            ) as advance:
                 record = ready.run(config.simulation, advance)
         except RunInterrupted as stop:
             record = stop.record

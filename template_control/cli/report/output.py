@@ -35,7 +35,7 @@ def progress_bar(console: Console, text: str, total: float | None) -> Iterator[A
     )
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
+
+from template_control.terminal import plain_console
 
 _MEAN = 50  # strides at most whose section states the summary averages
 
@@ -76,7 +77,7 @@ def print_table(figures: dict[str, Any]) -> None:
         row(f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us")
     row("real-time factor", f"{figures['real_time_factor']:.1f}")
     row("record", figures["record"] or "not saved")
-    Console().print(table)
+    plain_console().print(table)
 
 
 def _state(z: dict[str, float]) -> str:

@@ -9,26 +9,43 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Share
+from template_control.errors import ParameterError
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import RATE, SPEED, tuned
 
 
 @dataclass(frozen=True)
-class Lean:
+class Lean(Checked):
     """Mean pitch of the trunk by speed, linear between the entries.
 
     Attributes:
         speeds: at the section, rising [m/s].
         pitches: at these speeds [rad], forward positive.
         excess: by which the reference is to exceed the mean at first [rad].
+
+    Raises:
+        ParameterError: if the speeds do not rise, or have not a pitch each.
     """
 
-    speeds: tuple[float, ...] = tuned((), SPEED)
-    pitches: tuple[float, ...] = tuned(())
+    speeds: tuple[float, ...] = tuned((0.0,), SPEED)
+    pitches: tuple[float, ...] = tuned((0.0,))
     excess: float = tuned(0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.speeds or len(self.speeds) != len(self.pitches):
+            raise ParameterError(
+                f"a Lean has {len(self.speeds)} speeds and {len(self.pitches)} pitches: give one"
+                " pitch for each of at least one speed"
+            )
+        if any(b <= a for a, b in pairwise(self.speeds)):
+            raise ParameterError(f"Lean.speeds are {self.speeds}: give rising ones")
 
     def at(self, speed: float) -> float:
         """The mean pitch [rad] at a speed [m/s]."""
@@ -45,7 +62,7 @@ def _leans() -> dict[str, Lean]:
 
 
 @dataclass(frozen=True)
-class LeanOptions:
+class LeanOptions(Checked):
     """How the trunk's lean is chosen and regulated.
 
     Attributes:
@@ -58,10 +75,10 @@ class LeanOptions:
     """
 
     strides: Mapping[str, Lean] = field(default_factory=_leans)
-    rate: float = tuned(0.1, RATE)
-    gain: float = tuned(0.2)
-    error_bound: float = tuned(0.05)
-    bound: float = tuned(0.25)
+    rate: NotNegative = tuned(0.1, RATE)
+    gain: Share = tuned(0.2)
+    error_bound: NotNegative = tuned(0.05)
+    bound: NotNegative = tuned(0.25)
 
     def of(self, goal: StrideGoal) -> Lean | None:
         """The lean of a stride; one without a lean of its own prepares that of the next kind."""

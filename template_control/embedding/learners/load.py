@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.slip.similarity import tuned
 
 
 @dataclass(frozen=True)
-class LoadOptions:
+class LoadOptions(Checked):
     """Tuning of the load estimate.
 
     Attributes:
@@ -21,11 +23,11 @@ class LoadOptions:
         bounds: of the factor.
     """
 
-    gain: float = tuned(0.7)
-    dead_zone: float = tuned(0.02)
-    leak: float = tuned(0.1)
-    step_bound: float = tuned(0.05)
-    bounds: tuple[float, float] = tuned((0.7, 1.4))
+    gain: Share = tuned(0.7)
+    dead_zone: NotNegative = tuned(0.02)
+    leak: Share = tuned(0.1)
+    step_bound: NotNegative = tuned(0.05)
+    bounds: tuple[Positive, Positive] = tuned((0.7, 1.4))
 
 
 class LoadEstimate:

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Share
 from template_control.embedding.references.template_path import TemplatePath
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait, vlo_jacobians
@@ -24,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class TrimOptions:
+class TrimOptions(Checked):
     """Tuning of the momentum trim; drifts are speeds over sqrt(g l0).
 
     Attributes:
@@ -35,11 +37,11 @@ class TrimOptions:
         bound: of the acceleration over g.
     """
 
-    share: float = tuned(0.2)
-    gain: float = tuned(0.1)
-    dead_zone: float = tuned(0.0008)
-    largest: float = tuned(0.01)
-    bound: float = tuned(0.03)
+    share: Share = tuned(0.2)
+    gain: NotNegative = tuned(0.1)
+    dead_zone: NotNegative = tuned(0.0008)
+    largest: NotNegative = tuned(0.01)
+    bound: NotNegative = tuned(0.03)
 
 
 class MomentumTrim:

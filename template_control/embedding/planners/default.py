@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from template_control.checks.checked import checked
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
@@ -38,6 +39,7 @@ def _keeping_up(scenario: Scenario) -> RunningOptions:
     return replace(options, pace=max(options.pace, pace))
 
 
+@checked
 def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 

@@ -9,12 +9,22 @@ gait and not beside it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import (
+    Count,
+    Index,
+    Interval,
+    NotNegative,
+    Positive,
+    Range,
+    Share,
+)
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.step_search import (
     FALL_PRICE,
@@ -41,10 +51,12 @@ from template_control.slip.similarity import (
 )
 
 Array = NDArray[np.float64]
+_Several = Annotated[int, Range(2)]
+_Three = tuple[NotNegative, NotNegative, NotNegative]
 
 
 @dataclass(frozen=True)
-class SearchOptions:
+class SearchOptions(Checked):
     """How a step is searched for where the linear law's own is not good enough.
 
     Attributes:
@@ -59,18 +71,18 @@ class SearchOptions:
             the spacing of that one's alphas: what lies beyond has its neighbour's price.
     """
 
-    first_weight: float = tuned(0.3)
-    coarse: tuple[int, int, int] = tuned((5, 3, 3))
-    fine: tuple[int, int] = tuned((5, 3))
-    rounds: int = tuned(2)
-    narrowing: float = tuned(0.4)
+    first_weight: NotNegative = tuned(0.3)
+    coarse: tuple[Count, Count, Count] = tuned((5, 3, 3))
+    fine: tuple[_Several, _Several] = tuned((5, 3))
+    rounds: Index = tuned(2)
+    narrowing: Annotated[float, Range(0.0, 0.5, above=True)] = tuned(0.4)
 
 
 _VLO_STATE = (SPEED, LENGTH, SPEED)
 
 
 @dataclass(frozen=True)
-class LqrOptions:
+class LqrOptions(Checked):
     """Tuning of the LQR; states in m/s, m, m/s, controls in rad and shares of k0.
 
     States are those of the reference template (80 kg, 1 m, 9.81 m/s^2); the planner scales
@@ -102,22 +114,22 @@ class LqrOptions:
 
     kind: ClassVar[str] = "lqr"
 
-    state_cost: tuple[float, float, float] = tuned(
+    state_cost: _Three = tuned(
         (10.0, 100.0, 10.0), PER_SPEED_SQUARED, PER_LENGTH_SQUARED, PER_SPEED_SQUARED
     )
-    control_cost: tuple[float, float, float] = tuned((5.0, 2.0, 2.0))
-    offset_gain: float = tuned(0.2)
-    offset_bound: tuple[float, float, float] = tuned((0.06, 0.015, 0.12), *_VLO_STATE)
-    surprise_bound: tuple[float, float, float] = tuned((0.03, 0.008, 0.06), *_VLO_STATE)
-    tolerance: tuple[float, float, float] = tuned((0.011, 0.005, 0.03), *_VLO_STATE)
-    control_weight: float = tuned(100.0)
-    stiffness_range: tuple[float, float] = tuned((0.5, 1.5))
-    angle_range: tuple[float, float] = tuned((-0.12, 0.065))
-    top_margin: float = tuned(0.01)
-    trusted_price: float = tuned(1.0)
-    spread: tuple[float, float] = tuned((0.16, 0.25))
+    control_cost: tuple[Positive, Positive, Positive] = tuned((5.0, 2.0, 2.0))
+    offset_gain: Share = tuned(0.2)
+    offset_bound: _Three = tuned((0.06, 0.015, 0.12), *_VLO_STATE)
+    surprise_bound: _Three = tuned((0.03, 0.008, 0.06), *_VLO_STATE)
+    tolerance: tuple[Positive, Positive, Positive] = tuned((0.011, 0.005, 0.03), *_VLO_STATE)
+    control_weight: Positive = tuned(100.0)
+    stiffness_range: Interval = tuned((0.5, 1.5))
+    angle_range: Interval = tuned((-0.12, 0.065))
+    top_margin: NotNegative = tuned(0.01)
+    trusted_price: NotNegative = tuned(1.0)
+    spread: tuple[NotNegative, NotNegative] = tuned((0.16, 0.25))
     search: SearchOptions = field(default_factory=SearchOptions)
-    second_steps: tuple[tuple[float, float, float], ...] = tuned(
+    second_steps: tuple[tuple[float, NotNegative, NotNegative], ...] = tuned(
         (
             (0.0, 1.5, 1.0),
             (-0.058, 1.0, 0.75),
@@ -143,6 +155,7 @@ class LqrPlanner:
         a, b: (3, 3) state and control Jacobians of the VLO map at the gait.
     """
 
+    @checked
     def __init__(self, gait: WalkingGait, options: LqrOptions | None = None) -> None:
         ready(WALK)
         self.options = scaled(options or LqrOptions(), Scale.of(gait.parameters))
@@ -170,9 +183,9 @@ class LqrPlanner:
         return f"<LqrPlanner on {self.gait!r}>"
 
     def reset(self) -> None:
-        """See :class:`~.planner.Planner`."""
+        """See :class:`~.planner.Planner`: back to the gait it was made for, without an offset."""
         self.offset = np.zeros(3)
-        self._law = self._aim()
+        self._settle_on(self._family.reset())
 
     def _aim(self) -> Law:
         """The linear law about the fixed point the robot has with the present offset."""

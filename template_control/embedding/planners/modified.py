@@ -8,6 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Interval, NotNegative, Positive
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
@@ -22,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class ModifiedOptions:
+class ModifiedOptions(Checked):
     """Bounds of the search.
 
     Attributes:
@@ -36,10 +38,10 @@ class ModifiedOptions:
 
     kind: ClassVar[str] = "modified"
 
-    angle_range: tuple[float, float] = tuned((-0.14, 0.08))
-    stiffness_range: tuple[float, float] = tuned((0.5, 1.5))
-    top_margin: float = tuned(0.01)
-    tolerance: float = tuned(0.05, SPEED)
+    angle_range: Interval = tuned((-0.14, 0.08))
+    stiffness_range: Interval = tuned((0.5, 1.5))
+    top_margin: NotNegative = tuned(0.01)
+    tolerance: Positive = tuned(0.05, SPEED)
     map_kind: MapKind = MapKind.EXACT
 
 
@@ -54,6 +56,7 @@ class ModifiedPlanner:
         offset: zero; the paper's planner learns nothing.
     """
 
+    @checked
     def __init__(self, gait: WalkingGait, options: ModifiedOptions | None = None) -> None:
         self.gait = gait
         self.options = scaled(options or ModifiedOptions(), Scale.of(gait.parameters))
@@ -68,7 +71,8 @@ class ModifiedPlanner:
         return f"<ModifiedPlanner on {self.gait!r}>"
 
     def reset(self) -> None:
-        """See :class:`~.planner.Planner`; the paper's planner learns nothing."""
+        """See :class:`~.planner.Planner`: back to the gait it was made for."""
+        self.gait = self._family.reset()
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE

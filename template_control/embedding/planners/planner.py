@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.slip.automaton.vocabulary import Outcome
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Shape
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.gaits.gait import Gait
 
 Array = NDArray[np.float64]
@@ -20,7 +22,7 @@ ANY_ANGLE = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True)
-class Decision:
+class Decision(Checked):
     """Controls for the stride that begins at a section.
 
     Attributes:
@@ -32,8 +34,8 @@ class Decision:
             is learnt from other strides.
     """
 
-    controls: Array
-    predicted: Array
+    controls: Annotated[Array, Shape((NUM_SLOTS,), finite=False)]
+    predicted: Annotated[Array, Shape((3,), finite=False)]
     feasible: bool
     lasting: bool
     nominal: bool

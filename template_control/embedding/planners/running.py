@@ -13,6 +13,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Index, Interval, NotNegative, Positive, Share
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
 from template_control.slip.automaton.vocabulary import Slot
@@ -27,7 +29,7 @@ _SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]
 
 
 @dataclass(frozen=True)
-class RunningOptions:
+class RunningOptions(Checked):
     """Tuning of the running planner.
 
     Attributes:
@@ -48,17 +50,17 @@ class RunningOptions:
 
     kind: ClassVar[str] = "deadbeat"
 
-    tolerance: tuple[float, float] = tuned((0.02, 0.004), SPEED, LENGTH)
-    change: tuple[float, float, float] = tuned((0.02, 0.15, 0.15))
-    angle_range: tuple[float, float] = tuned((-0.1, 0.1))
-    stiffness_range: tuple[float, float] = tuned((0.6, 1.6))
-    top_margin: float = tuned(0.005)
-    pace: float = tuned(0.06, SPEED)
-    climb: float = tuned(0.02, LENGTH)
-    offset_gain: float = tuned(0.2)
-    offset_bound: tuple[float, float] = tuned((0.3, 0.03), SPEED, LENGTH)
-    surprise_bound: tuple[float, float] = tuned((0.06, 0.008), SPEED, LENGTH)
-    rounds: int = tuned(4)
+    tolerance: tuple[Positive, Positive] = tuned((0.02, 0.004), SPEED, LENGTH)
+    change: tuple[Positive, Positive, Positive] = tuned((0.02, 0.15, 0.15))
+    angle_range: Interval = tuned((-0.1, 0.1))
+    stiffness_range: Interval = tuned((0.6, 1.6))
+    top_margin: NotNegative = tuned(0.005)
+    pace: Positive = tuned(0.06, SPEED)
+    climb: Positive = tuned(0.02, LENGTH)
+    offset_gain: Share = tuned(0.2)
+    offset_bound: tuple[NotNegative, NotNegative] = tuned((0.3, 0.03), SPEED, LENGTH)
+    surprise_bound: tuple[NotNegative, NotNegative] = tuned((0.06, 0.008), SPEED, LENGTH)
+    rounds: Index = tuned(4)
 
 
 AGILE = RunningOptions(change=(0.03, 0.3, 0.3), stiffness_range=(0.4, 2.5), pace=0.45)
@@ -77,6 +79,7 @@ class RunningPlanner:
         offset: (3,) the estimate of d.
     """
 
+    @checked
     def __init__(self, gait: RunningGait, options: RunningOptions | None = None) -> None:
         self.gait = gait
         self.options = scaled(options or RunningOptions(), Scale.of(gait.parameters))
@@ -88,8 +91,9 @@ class RunningPlanner:
         self.decide(gait.apex)
 
     def reset(self) -> None:
-        """See :class:`~.planner.Planner`."""
+        """See :class:`~.planner.Planner`: back to the gait it was made for, without an offset."""
         self.offset = np.zeros(PADDED)
+        self.gait = self._family.reset()
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Index, Interval, NotNegative, Positive
 from template_control.embedding.planners.planner import ANY_ANGLE, Ahead, Decision, Planner
 from template_control.embedding.planners.regularised import (
     FromHere,
@@ -20,6 +22,7 @@ from template_control.embedding.planners.regularised import (
     Prior,
     solve_stride,
 )
+from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
@@ -30,13 +33,12 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class TransitionOptions:
+class TransitionOptions(Checked):
     """Tuning of a transition's planner.
 
     Attributes:
         slots: the controls that are free.
-        base: what they change from: alpha [rad], and stiffnesses over m g / l0. NaN: the
-            present gait's.
+        base: what they change from: alpha [rad], and stiffnesses over m g / l0.
         change: changes of each that count as 1 [rad, shares of the base].
         bounds: of each: alpha relative to the base [rad], shares of the base.
         tolerance: errors of dx/dt, y, dy/dt at the end that count as 1.
@@ -44,16 +46,29 @@ class TransitionOptions:
             would touch down at once.
         again: change of each, a share, that counts as 1 when a foot has landed.
         rounds: Gauss-Newton steps.
+
+    Raises:
+        ParameterError: if there are not as many of each as there are free controls.
     """
 
     slots: tuple[Slot, ...] = tuned((Slot.K_SC_WR, Slot.K_SD_WR))
-    base: tuple[float, ...] = tuned((12.2, 20.8))
-    change: tuple[float, ...] = tuned((0.3, 0.3))
-    bounds: tuple[tuple[float, float], ...] = tuned(((0.5, 2.0), (0.5, 2.0)))
-    tolerance: tuple[float, float, float] = tuned((0.05, 0.01, 0.1), SPEED, LENGTH, SPEED)
-    top_margin: float = tuned(0.005)
-    again: float = tuned(0.3)
-    rounds: int = tuned(6)
+    base: tuple[Positive, ...] = tuned((12.2, 20.8))
+    change: tuple[Positive, ...] = tuned((0.3, 0.3))
+    bounds: tuple[Interval, ...] = tuned(((0.5, 2.0), (0.5, 2.0)))
+    tolerance: tuple[Positive, Positive, Positive] = tuned((0.05, 0.01, 0.1), SPEED, LENGTH, SPEED)
+    top_margin: NotNegative = tuned(0.005)
+    again: Positive = tuned(0.3)
+    rounds: Index = tuned(6)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("base", "change", "bounds"):
+            entries = len(getattr(self, name))
+            if entries != len(self.slots):
+                raise ParameterError(
+                    f"TransitionOptions.{name} has {entries} entries: give {len(self.slots)}, one"
+                    " for each slot"
+                )
 
 
 WALK_TO_RUN = TransitionOptions()
@@ -83,6 +98,7 @@ class TransitionPlanner:
         offset: (3,) zero: a stride that is made once teaches nothing.
     """
 
+    @checked
     def __init__(
         self,
         stride: str,
@@ -95,10 +111,11 @@ class TransitionPlanner:
         self.options = scaled(options, Scale.of(p))
         self.offset: Array = np.zeros(PADDED)
         self._map = ReturnMap(p, stride)
-        self.gait = after(float(before.gait.state[0]))
+        self.gait = self._first = after(float(before.gait.state[0]))
 
     def reset(self) -> None:
-        """See :class:`~.planner.Planner`."""
+        """See :class:`~.planner.Planner`: back to the gait it was made for."""
+        self.gait = self._first
 
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`."""

@@ -12,6 +12,8 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Pair
 from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions
 from template_control.errors import ParameterError
 from template_control.robot.planar_biped import PlanarBiped
@@ -31,7 +33,7 @@ _TICK = 1e-3  # over which the references move on [s]; finer ones end in the sam
 
 
 @dataclass(frozen=True)
-class ApexStart:
+class ApexStart(Checked):
     """How a run begins at an apex.
 
     Attributes:
@@ -42,13 +44,14 @@ class ApexStart:
         automaton: that the gait's stride is of.
     """
 
-    state: Array
+    state: Pair
     gait: Gait
     swing: SwingOptions
     pitch: float = 0.0
     automaton: Automaton = AUTOMATON
 
 
+@checked
 def apex_pose(robot: PlanarBiped, start: ApexStart) -> Pose:
     """The pose at an apex, with both feet where the references of their swings are.
 

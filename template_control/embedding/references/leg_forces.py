@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
 from template_control.slip.similarity import tuned
 
@@ -14,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class UnloadOptions:
+class UnloadOptions(Checked):
     """Largest normal force of a foot that is about to lift off: near the template's.
 
     Attributes:
@@ -23,8 +25,8 @@ class UnloadOptions:
         floor: of the weight. It leaves a foot no load to lift off with, and the QP some room.
     """
 
-    share: float = tuned(1.3)
-    floor: float = tuned(0.025)
+    share: NotNegative = tuned(1.3)
+    floor: NotNegative = tuned(0.025)
 
     def cap(self, template_force: float, weight: float) -> float:
         """Largest normal force that the foot may carry [N].

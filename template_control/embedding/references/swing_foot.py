@@ -15,6 +15,8 @@ from math import isfinite, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.compiled import compiled
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, tuned
 
@@ -22,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class SwingOptions:
+class SwingOptions(Checked):
     """Shape of the swing.
 
     Attributes:
@@ -41,14 +43,14 @@ class SwingOptions:
             that goes straight hits its stop with tens of kilonewtons.
     """
 
-    clearance: float = tuned(0.05, LENGTH)
-    rise: float = tuned(0.5)
-    descent: float | None = tuned(None, TIME)
-    landing_speed: float = tuned(0.2, SPEED)
-    horizon: float = tuned(0.02, TIME)
-    early: float = tuned(0.01, TIME)
-    drop_acceleration: float = tuned(10.0, ACCELERATION)
-    leg_share: float = tuned(0.98)
+    clearance: NotNegative = tuned(0.05, LENGTH)
+    rise: Share = tuned(0.5)
+    descent: NotNegative | None = tuned(None, TIME)
+    landing_speed: NotNegative = tuned(0.2, SPEED)
+    horizon: Positive = tuned(0.02, TIME)
+    early: NotNegative = tuned(0.01, TIME)
+    drop_acceleration: Positive = tuned(10.0, ACCELERATION)
+    leg_share: Share = tuned(0.98)
 
 
 @compiled

@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.embedding.phases import Clock
 from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Reset
@@ -29,7 +31,7 @@ _NEWTON = 12
 
 
 @dataclass(frozen=True)
-class PathOptions:
+class PathOptions(Checked):
     """How the robot's place on a path is looked for.
 
     Attributes:
@@ -39,8 +41,8 @@ class PathOptions:
             too long.
     """
 
-    overrun: float = tuned(0.02, TIME)
-    leap: float = tuned(0.05, TIME)
+    overrun: NotNegative = tuned(0.02, TIME)
+    leap: Positive = tuned(0.05, TIME)
 
 
 class Curve(NamedTuple):

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind, Slot
 from template_control.slip.control.design import (
@@ -42,6 +43,7 @@ class Controller:
 
     design: ClassVar[Design]
 
+    @checked
     def __init__(
         self,
         parameters: SlipParameters,
@@ -120,6 +122,7 @@ class ActiveRunning(Controller):
 
     design = ACTIVE_RUNNING
 
+    @checked
     def __init__(
         self,
         parameters: SlipParameters,
@@ -152,6 +155,7 @@ class ModifiedWalking(Controller):
 
     design = MODIFIED_WALKING
 
+    @checked
     def __init__(
         self,
         parameters: SlipParameters,
@@ -199,6 +203,7 @@ class WalkToRun(Controller):
 
     design = WALK_TO_RUN
 
+    @checked
     def __init__(
         self,
         parameters: SlipParameters,

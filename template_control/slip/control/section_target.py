@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.control.controllers import Controller
 from template_control.slip.maps.section import VLO, Section
@@ -20,6 +21,7 @@ TargetedPolicy = Callable[[Array, float], Array]
 VARIED = ("energy", "height", "speed")
 
 
+@checked
 def section_target(
     parameters: SlipParameters, section: Section, quantities: Mapping[str, float]
 ) -> Array:
@@ -60,6 +62,7 @@ def section_target(
     return section.of([0.0, y, speed, 0.0])
 
 
+@checked
 def targeted(
     controller: Controller,
     parameters: SlipParameters,

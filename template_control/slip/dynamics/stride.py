@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
@@ -97,6 +98,7 @@ class Stride:
         return [self.node_names[int(i)] for i in self.meta[row, 2]]
 
 
+@checked
 def controls(
     touchdown_angle: float, k_sc: float, k_sd: float, k_sc_wr: float = 0.0, k_sd_wr: float = 0.0
 ) -> Array:
@@ -187,8 +189,12 @@ class StrideSimulator:
 
         Raises:
             ParameterError: for NaN or a wrong shape.
-            KeyError: if there is no node ``start``.
+            ParameterError: if there is no node ``start``.
         """
+        if start not in self.automaton.index:
+            raise ParameterError(
+                f"there is no node {start!r}: give one of {', '.join(self.automaton.index)}"
+            )
         w, names = self._scratch, self._names
         x = finite("state", state, 4)
         c = finite("toes", toes, 2)
@@ -226,6 +232,7 @@ class StrideSimulator:
         )
 
 
+@checked
 def simulate_stride(
     parameters: SlipParameters,
     start: str,
@@ -249,7 +256,6 @@ def simulate_stride(
         automaton: that the stride is of.
 
     Raises:
-        ParameterError: for NaN or a wrong shape.
-        KeyError: if there is no node ``start``.
+        ParameterError: for NaN, a wrong shape, or if there is no node ``start``.
     """
     return StrideSimulator(parameters, automaton, max_time).run(start, state, u, toes)

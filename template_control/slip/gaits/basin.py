@@ -7,12 +7,16 @@ downward) and energy E, the stance spring's included.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Range, Shape
 from template_control.compiled import compiled, inner
-from template_control.slip.automaton.vocabulary import Outcome
+from template_control.errors import ParameterError
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.section import VLO
@@ -22,6 +26,8 @@ from template_control.slip.parameters import SlipParameters
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+_MOST = 100_000  # steps
+_Number = Annotated[int, Range(1, 1000)]
 _SECTION = int(Outcome.SECTION)
 _WINDOW = 5
 _THERE = 0.01  # as near as this, it need not come nearer
@@ -29,6 +35,29 @@ _SHRINKS = 0.95  # of the distance half-way must be left at most: no other gait,
 _HEIGHT, _ANGLE = 0.01, np.radians(1.0)  # what counts as equally far, per l0 and in angle
 
 
+def _for_each(name: str, rows: Array, count: int) -> Array:
+    """One row, or ``count`` of them, as ``count`` rows."""
+    if rows.ndim > 2 or (rows.ndim == 2 and len(rows) != count):
+        raise ParameterError(f"{name} has shape {rows.shape}: give one row, or {count} of them")
+    return np.ascontiguousarray(np.broadcast_to(rows, (count, rows.shape[-1])))
+
+
+def _together(**arrays: ArrayLike) -> list[Array]:
+    """Arrays by name that broadcast.
+
+    Raises:
+        ParameterError: naming them and their shapes, if they do not.
+    """
+    found = [np.asarray(array, dtype=float) for array in arrays.values()]
+    try:
+        np.broadcast_shapes(*(array.shape for array in found))
+    except ValueError:
+        shapes = ", ".join(f"{k} {a.shape}" for k, a in zip(arrays, found, strict=True))
+        raise ParameterError(f"shapes do not go together: {shapes}; give as many of each") from None
+    return found
+
+
+@checked
 def vlo_state(parameters: SlipParameters, y: ArrayLike, phi: ArrayLike, energy: ArrayLike) -> Array:
     """VLO states from height, direction of the velocity and energy; shapes broadcast.
 
@@ -41,12 +70,13 @@ def vlo_state(parameters: SlipParameters, y: ArrayLike, phi: ArrayLike, energy: 
     Returns:
         (..., 3) dx/dt, y, dy/dt; the speeds are NaN where the energy does not suffice.
     """
-    y, phi, energy = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (y, phi, energy)))
+    y, phi, energy = np.broadcast_arrays(*_together(y=y, phi=phi, energy=energy))
     v = VLO.speed(parameters, y, energy)
     return np.stack((v * np.cos(phi), y, -v * np.sin(phi)), axis=-1)
 
 
-def velocity_angle(z: Array) -> Array:
+@checked
+def velocity_angle(z: Annotated[Array, Shape((..., 3), finite=False)]) -> Array:
     """phi of VLO states (..., 3), positive downward [rad]."""
     return np.asarray(-np.arctan2(z[..., 2], z[..., 0]))
 
@@ -115,8 +145,13 @@ class StepsToFall:
     last: Array
 
 
+@checked
 def steps_to_fall(
-    parameters: SlipParameters, z: Array, controls: Array, goal: Array, limit: int = 50
+    parameters: SlipParameters,
+    z: Annotated[Array, Shape((None, 3), finite=False)],
+    controls: Annotated[Array, Shape((..., NUM_SLOTS))],
+    goal: Annotated[Array, Shape((..., 2))],
+    limit: Annotated[int, Range(1, _MOST)] = 50,
 ) -> StepsToFall:
     """Walk passively from many states.
 
@@ -132,21 +167,22 @@ def steps_to_fall(
     steps, converges = _many(
         stride_kernel(parameters, "w"),
         states,
-        np.ascontiguousarray(np.broadcast_to(controls, (count, np.shape(controls)[-1]))),
-        np.ascontiguousarray(np.broadcast_to(goal, (count, 2))),
+        _for_each("controls", controls, count),
+        _for_each("goal", goal, count),
         limit,
         new_scratch(),
     )
     return StepsToFall(steps, converges, states)
 
 
+@checked
 def margin(
     parameters: SlipParameters,
-    controls: Array,
+    controls: Annotated[Array, Shape((NUM_SLOTS,))],
     goal: tuple[float, float],
     energy: float,
-    largest: float = 0.05,
-    counts: tuple[int, int] = (50, 32),
+    largest: Annotated[float, Range(0.0, 1.0, above=True)] = 0.05,
+    counts: tuple[_Number, _Number] = (50, 32),
 ) -> float:
     """Radius of the largest disc around a gait from which walking converges to it.
 

@@ -13,6 +13,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Count, Vector
 from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.control.section_target import VARIED, TargetedPolicy
@@ -47,6 +49,7 @@ class ControlledFamily(Branch):
     free: tuple[str, ...] = ("target",)
     noise = _NOISE
 
+    @checked
     def __init__(self, step: ReturnMap, policy: TargetedPolicy, varied: str) -> None:
         if varied not in VARIED:
             raise ParameterError(
@@ -123,8 +126,9 @@ def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisatio
     return linear, linear.state_jacobian + linear.control_jacobian @ slope, u
 
 
+@checked
 def controlled_fixed_point(
-    step: ReturnMap, policy: Policy, start: Array, iterations: int = 30
+    step: ReturnMap, policy: Policy, start: Vector, iterations: Count = 30
 ) -> tuple[Array, NDArray[np.complex128]]:
     """Find where a controlled stride settles: Newton's method on z = P(z, u(z)).
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from template_control.checks.checked import checked
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Phase
@@ -10,6 +11,7 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import section_of
 
 
+@checked
 def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
     """Share of a stride's duration in which no foot is on the ground.
 

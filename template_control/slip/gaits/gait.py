@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
+from itertools import pairwise
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Positive, Shape, Triple
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot
@@ -24,6 +28,7 @@ WALKING_SLOTS = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
 """Controls of a walking step: alpha, kappa_1, kappa_2."""
 
 _SCAN = 120
+_LEVEL, _HEIGHT = 0, 1  # places in what a stride misses
 
 
 class Gait(Protocol):
@@ -59,7 +64,7 @@ class Gait(Protocol):
 
 
 @dataclass(frozen=True)
-class WalkingGait:
+class WalkingGait(Checked):
     """A passive symmetric walking gait.
 
     Attributes:
@@ -73,10 +78,10 @@ class WalkingGait:
 
     name: str
     parameters: SlipParameters
-    vlo: Array
-    controls: Array
+    vlo: Triple
+    controls: Annotated[Array, Shape((5,))]
     step_length: float
-    step_duration: float
+    step_duration: Positive
 
     def __repr__(self) -> str:
         angle = np.degrees(self.controls[Slot.TOUCHDOWN_ANGLE])
@@ -125,10 +130,28 @@ def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingG
     return WalkingGait(name, parameters, z, u, float(stride.state[0]), stride.duration)
 
 
-def _returns(step: ReturnMap, z: Array, u: Array) -> float:
-    """Vertical speed at the next VLO, NaN where there is none; zero for a symmetric gait."""
+def _misses(step: ReturnMap, z: Array, u: Array) -> tuple[float, float]:
+    """What dy/dt and y of the next VLO are over those of ``z``; NaN where there is no next."""
     z_next, outcome = step.step(z, u)
-    return float(z_next[2]) if outcome is Outcome.SECTION else np.nan
+    if outcome is not Outcome.SECTION:
+        return np.nan, np.nan
+    return float(z_next[2]), float(z_next[1] - z[1])
+
+
+def root(
+    function: Callable[[float], float], ends: tuple[float, float], xtol: float, rtol: float
+) -> float | None:
+    """Where a function is zero between two numbers; None if it is NaN somewhere there.
+
+    Args:
+        function: of different signs at both ends.
+        ends: the two numbers.
+        xtol, rtol: how near, absolute and relative.
+    """
+    try:
+        return float(brentq(function, *ends, xtol=xtol, rtol=rtol))
+    except ValueError:
+        return None
 
 
 def _symmetric_roots(
@@ -136,25 +159,39 @@ def _symmetric_roots(
     make: Callable[[float], tuple[Array, Array]],
     values: Array,
 ) -> list[tuple[Array, Array]]:
-    """All (z, u) = make(value) on the grid ``values`` that return to themselves."""
+    """All (z, u) = make(value) on the grid ``values`` that return to themselves.
+
+    dy/dt at the next VLO is zero for a symmetric gait, and for strides that only return to a
+    level flight. Where one of these is next to the gait, both roots may lie between two values
+    of the grid, and there is no change of sign. The height then tells: it returns for the gait
+    only.
+    """
     step = ReturnMap(parameters)
 
-    def residual(value: float) -> float:
-        return _returns(step, *make(value))
+    def miss(which: int, value: float) -> float:
+        return _misses(step, *make(value))[which]
 
-    found = []
-    samples = [residual(v) for v in values]
-    for lo, hi, f_lo, f_hi in zip(values, values[1:], samples, samples[1:], strict=False):
-        if not (np.isfinite(f_lo) and np.isfinite(f_hi)) or f_lo * f_hi > 0.0:
-            continue
-        z, u = make(brentq(residual, lo, hi, xtol=1e-14, rtol=1e-14))
-        z_next, outcome = step.step(z, u)
-        # A vertical speed that returns to zero need not be the symmetric step.
-        if outcome is Outcome.SECTION and np.max(np.abs(z_next - z)) < 1e-6:
-            found.append((z, u))
-    return found
+    samples = np.array([_misses(step, *make(v)) for v in values])
+    for which in (_LEVEL, _HEIGHT):
+        found = []
+        misses = samples[:, which]
+        for ends, (f_lo, f_hi) in zip(pairwise(values), pairwise(misses), strict=True):
+            if not (np.isfinite(f_lo) and np.isfinite(f_hi)) or f_lo * f_hi > 0.0:
+                continue
+            value = root(partial(miss, which), ends, 1e-14, 1e-14)
+            if value is None:
+                continue
+            z, u = make(value)
+            z_next, outcome = step.step(z, u)
+            # A vertical speed that returns to zero need not be the symmetric step.
+            if outcome is Outcome.SECTION and np.max(np.abs(z_next - z)) < 1e-6:
+                found.append((z, u))
+        if found:
+            return found
+    return []
 
 
+@checked
 def gait_at(
     parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
 ) -> WalkingGait:
@@ -183,6 +220,7 @@ def gait_at(
     return _gait(name, parameters, *roots[0])
 
 
+@checked
 def gait_from_energy(
     parameters: SlipParameters, height: float, energy: float, name: str = "paper"
 ) -> WalkingGait:
@@ -210,59 +248,3 @@ def gait_from_energy(
     if not roots:
         raise GaitError(f"no walking gait with VLO height {height:g} m and energy {energy:g} J")
     return _gait(name, parameters, *roots[-1])
-
-
-def _nominal_angle(mean_speed: float, rest_length: float, gravity: float) -> float:
-    """Touchdown angle [rad] at which a mean speed is walked: steeper when slower.
-
-    66 deg from 1.1 m/s up and 68 deg at 0.9 m/s (for l0 = 1 m), where the steps are long
-    enough in time for a swing leg to follow.
-    """
-    dimensionless = mean_speed / np.sqrt(gravity * rest_length)
-    return float(np.radians(np.interp(dimensionless, [0.255, 0.287, 0.351], [69.0, 68.0, 66.0])))
-
-
-def gait_for_speed(
-    parameters: SlipParameters,
-    mean_speed: float,
-    name: str = "walk",
-    touchdown_angle: float | None = None,
-) -> WalkingGait:
-    """The symmetric gait with a given mean forward speed.
-
-    Args:
-        parameters: the template; both legs have its stiffness k0.
-        mean_speed: step length over step duration [m/s].
-        name: of the gait.
-        touchdown_angle: alpha, from the ground to the leg [rad]; None: the usual one at this speed.
-
-    Raises:
-        GaitError: if there is none, or the speed is not positive.
-    """
-    p = parameters
-    if not (np.isfinite(mean_speed) and mean_speed > 0.0):
-        raise GaitError(f"speed is {mean_speed!r} m/s: give a positive number")
-    unit = np.sqrt(p.gravity * p.rest_length)
-    angle = touchdown_angle
-    if angle is None:
-        angle = _nominal_angle(mean_speed, p.rest_length, p.gravity)
-
-    def surplus(vlo_speed: float) -> float:
-        try:
-            return gait_at(p, angle, vlo_speed, name).mean_speed - mean_speed
-        except GaitError:
-            return np.nan
-
-    # The mean speed grows with the speed at VLO; find two neighbours around the wanted one.
-    speeds = unit * np.linspace(0.2, 0.45, 26)
-    values = np.array([surplus(s) for s in speeds])
-    for lo, hi, f_lo, f_hi in zip(speeds, speeds[1:], values, values[1:], strict=False):
-        if f_lo <= 0.0 <= f_hi:
-            return gait_at(p, angle, float(brentq(surplus, lo, hi, xtol=1e-10)), name)
-    reachable = values[np.isfinite(values)] + mean_speed
-    hint = (
-        f"between {reachable.min():.2f} and {reachable.max():.2f} m/s"
-        if reachable.size
-        else "another"
-    )
-    raise GaitError(f"no walking gait at a mean speed of {mean_speed:g} m/s: give one {hint}")

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
 from template_control.slip.gaits.branch import (
@@ -43,6 +44,7 @@ class Family(Branch):
         ParameterError: if ``fixed`` is anything else.
     """
 
+    @checked
     def __init__(self, parameters: SlipParameters, stride: str, fixed: Mapping[str, float]) -> None:
         if stride not in ("w", "r"):
             raise ParameterError(f"stride is {stride!r}: periodic gaits are 'w' or 'r'")

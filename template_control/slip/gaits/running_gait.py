@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Positive
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
@@ -75,6 +77,7 @@ class RunningGait:
         return float(APEX.energy(self.parameters, self.apex))
 
 
+@checked
 def running_speeds(parameters: SlipParameters) -> tuple[float, float]:
     """Slowest and fastest dx/dt at apex of the family [m/s]."""
     unit = np.sqrt(parameters.gravity * parameters.rest_length)
@@ -99,11 +102,12 @@ def suited_stiffness(relative_speed: float) -> float:
     return float(1.65 + (48.8 - 14.3 * relative_speed) * relative_speed)
 
 
+@checked
 def running_gait(
     parameters: SlipParameters,
     speed: float,
-    apex_height: float | None = None,
-    leg_stiffness: float | None = None,
+    apex_height: Positive | None = None,
+    leg_stiffness: Positive | None = None,
     name: str = "run",
 ) -> RunningGait:
     """The symmetric gait with a given speed at apex.
@@ -175,8 +179,14 @@ class RunningFamily:
         gait: the planner's own.
     """
 
+    @checked
     def __init__(self, gait: RunningGait) -> None:
         self._known = [gait]
+
+    def reset(self) -> RunningGait:
+        """Forget all gaits but the planner's own, which is returned."""
+        del self._known[1:]
+        return self._known[0]
 
     def at(self, speed: float) -> RunningGait:
         """The gait with this speed at apex, or the nearest there is.

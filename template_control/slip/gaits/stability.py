@@ -7,6 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.slip.maps.return_map import Linearisation
 
 Array = NDArray[np.float64]
@@ -52,6 +53,7 @@ def shell_eigenvalues(jacobian: Array, energy_gradient: Array) -> ComplexArray:
     return np.linalg.eigvals(shell.T @ jacobian @ shell).astype(np.complex128)
 
 
+@checked
 def closed_loop_eigenvalues(linear: Linearisation, gain: Array) -> ComplexArray:
     """Eigenvalues of z' = P(z, u_s - K (z - z_s)).
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import GaitError
 from template_control.slip.gaits.gait import WalkingGait, gait_at
 from template_control.slip.parameters import SlipParameters
@@ -16,12 +17,14 @@ _ANGLES = (70.0, 69.5, 68.0, 66.0, 66.0)  # [deg]
 _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 
 
+@checked
 def speed_range(parameters: SlipParameters) -> tuple[float, float]:
     """Slowest and fastest dx/dt at VLO of the family [m/s]."""
     unit = np.sqrt(parameters.gravity * parameters.rest_length)
     return float(_SPEEDS[0] * unit), float(_SPEEDS[-1] * unit)
 
 
+@checked
 def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
     """The family's gait with this speed at VLO.
 
@@ -53,8 +56,14 @@ class WalkingFamily:
         gait: the planner's own; its target is its VLO state.
     """
 
+    @checked
     def __init__(self, gait: WalkingGait) -> None:
         self._known = [gait]
+
+    def reset(self) -> WalkingGait:
+        """Forget all gaits but the planner's own, which is returned."""
+        del self._known[1:]
+        return self._known[0]
 
     def towards(self, present: WalkingGait, target: Array | None) -> tuple[WalkingGait, bool]:
         """The gait with the target's speed at VLO, or the nearest there is.

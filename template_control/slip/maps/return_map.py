@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
@@ -82,6 +83,7 @@ class ReturnMap:
         ParameterError: if there is no such stride.
     """
 
+    @checked
     def __init__(
         self,
         parameters: SlipParameters,

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
@@ -116,6 +117,7 @@ class SteadyRoute:
             of a wrong shape or with a number that is not finite.
     """
 
+    @checked
     def __init__(
         self,
         parameters: SlipParameters,
@@ -236,6 +238,7 @@ class ScenarioRoute:
         apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
     """
 
+    @checked
     def __init__(
         self, scenario: Scenario, apex_height: Callable[[float], float] | None = None
     ) -> None:

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Slot
@@ -25,13 +26,12 @@ from template_control.slip.dynamics.stride import Stride, StrideSimulator, contr
 from template_control.slip.maps.section import APEX, PADDED, VLO, section_of
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.route import ScenarioRoute, StrideGoal
-from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.scenario.scenario import MOST_STRIDES, Scenario
 
 Array = NDArray[np.float64]
 
 _SAMPLES = 40  # a stride
 _STRIDES = ("w", "wr", "r", "rw")
-_LIMIT = 10_000
 
 
 @dataclass
@@ -100,6 +100,7 @@ class _Controllers:
         return solution
 
 
+@checked
 def simulate_scenario(
     scenario: Scenario, progress: Callable[[float], None] | None = None
 ) -> ScenarioRecord:
@@ -121,10 +122,13 @@ def simulate_scenario(
     log, now, failure = _Log(p.rest_length), 0.0, ""
     section, state = route.section, route.section.state(route.start)
     log.arrive(now, state)
-    while len(log.goals) < _LIMIT:
+    while True:
         z = section.of(state)
         goal = route.next(section, z, now)
         if goal is None:
+            break
+        if len(log.goals) == MOST_STRIDES:
+            failure = f"stopped in segment {goal.segment + 1}, after {MOST_STRIDES} strides"
             break
         begin = time.perf_counter()
         try:

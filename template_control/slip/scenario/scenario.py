@@ -6,18 +6,25 @@ import math
 import tomllib
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
-from template_control.errors import ScenarioError
+from template_control.checks.checked import Checked, checked
+from template_control.errors import ScenarioError, TemplateControlError
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.parameters import SlipParameters
 
 Gait = Literal["walk", "run"]
 Walking = Literal["modified", "active"]
 
+MOST_STRIDES = 10_000
+"""How many strides a scenario may have."""
+_LONGEST = 3600.0  # [s] of a scenario
+_FASTEST = 100.0  # [m/s]
+_HARDEST = 100.0  # [m/s^2]
+
 
 @dataclass(frozen=True)
-class Segment:
+class Segment(Checked):
     """A stretch of the profile; it ends with whichever of its ends comes first.
 
     Attributes:
@@ -29,7 +36,12 @@ class Segment:
             too if the profile slows down [m/s].
         duration: [s].
         steps: number of strides after the transition.
+
+    Raises:
+        ScenarioError: if a value is of a wrong type.
     """
+
+    _error = ScenarioError
 
     gait: Gait
     speed: float | None = None
@@ -40,7 +52,7 @@ class Segment:
 
 
 @dataclass(frozen=True)
-class Scenario:
+class Scenario(Checked):
     """What the template is to do, from a VLO on; the defaults are Table IV's.
 
     Attributes:
@@ -58,6 +70,8 @@ class Scenario:
         ScenarioError: naming the first thing that is wrong.
     """
 
+    _error = ScenarioError
+
     segments: tuple[Segment, ...]
     parameters: SlipParameters = field(default_factory=SlipParameters)
     map_kind: MapKind = MapKind.PAPER
@@ -69,6 +83,7 @@ class Scenario:
     name: str = "scenario"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _check(self)
 
     def on(self, parameters: SlipParameters) -> Scenario:
@@ -92,15 +107,10 @@ class Scenario:
         return frozenset(segment.gait for segment in self.segments)
 
 
-def _number(where: str, value: Any, low: float = -math.inf, high: float = math.inf) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ScenarioError(f"{where} is {value!r}: give a number")
-    if not (math.isfinite(value) and low < value < high):
+def _number(where: str, value: float, low: float, high: float) -> None:
+    if not low < value < high:
         between = f"over {low:g}" if math.isinf(high) else f"between {low:g} and {high:g}"
-        raise ScenarioError(
-            f"{where} is {value:g}: give a finite number"
-            + ("" if math.isinf(low) else f" {between}")
-        )
+        raise ScenarioError(f"{where} is {value:g}: give a finite number {between}")
 
 
 def _choice(where: str, value: Any, choices: tuple[Any, ...]) -> None:
@@ -111,33 +121,59 @@ def _choice(where: str, value: Any, choices: tuple[Any, ...]) -> None:
 def _check(scenario: Scenario) -> None:
     s = scenario
     length = s.parameters.rest_length
-    _choice("walking", s.walking, get_args(Walking))
     _number("touchdown_angle", s.touchdown_angle, 0.0, 90.0)
-    for name, values, size in (("start", s.start, 3), ("vlo", s.vlo, 2)):
-        if len(values) != size:
-            raise ScenarioError(f"{name} has {len(values)} numbers: give {size}")
-        for value in values:
-            _number(name, value)
-    _number("start speed", s.start[0], 0.0)
+    _number("start speed", s.start[0], 0.0, _FASTEST)
+    for name, speed in (("start", s.start[2]), ("vlo", s.vlo[1])):
+        _number(f"{name} dy/dt", speed, -_FASTEST, _FASTEST)
     for name, height in (("start height", s.start[1]), ("vlo height", s.vlo[0])):
         _number(name, height, 0.0, length)
-    _number("apex_height", s.apex_height, 0.0)
+    _number("apex_height", s.apex_height, 0.0, 100.0 * length)
     if not s.segments:
         raise ScenarioError("the scenario has no segments: give at least one [[segment]]")
-    if s.segments[0].gait != "walk" or s.segments[0].speed is None:
-        raise ScenarioError("segment 1 must walk at a given speed: the start is a VLO")
     for i, segment in enumerate(s.segments, 1):
         _check_segment(f"segment {i}", segment)
+    if s.segments[0].gait != "walk" or s.segments[0].speed is None:
+        raise ScenarioError("segment 1 must walk at a given speed: the start is a VLO")
+    _check_profile(s.segments)
+
+
+def _check_profile(segments: tuple[Segment, ...]) -> None:
+    """Check that every segment ends, and the whole scenario within an hour.
+
+    Where a segment ends after some steps, nobody knows how fast the next one begins.
+    """
+    total, speed = 0.0, None
+    for i, segment in enumerate(segments, 1):
+        if segment.speed is not None:
+            speed = segment.speed
+        ends = [] if segment.duration is None else [segment.duration]
+        until, rate = segment.until_speed, segment.acceleration
+        if until is not None and speed is not None:
+            ends.append((until - speed) / rate)
+            if ends[-1] < 0.0:
+                raise ScenarioError(
+                    f"segment {i} begins at {speed:g} m/s and never gets to until_speed {until:g}"
+                    f" with an acceleration of {rate:g}: give the other sign"
+                )
+        total += min(ends, default=0.0)
+        if total > _LONGEST:
+            raise ScenarioError(
+                f"segment {i} ends after {total:g} s: give a scenario of at most {_LONGEST:g} s"
+            )
+        known = speed is not None and segment.steps is None and ends
+        speed = max(speed + rate * min(ends), 0.0) if known and speed is not None else None
+    strides = sum(segment.steps or 0 for segment in segments)
+    if strides > MOST_STRIDES:
+        raise ScenarioError(f"the segments have {strides} steps: give at most {MOST_STRIDES}")
 
 
 def _check_segment(where: str, segment: Segment) -> None:
-    _choice(f"{where} gait", segment.gait, get_args(Gait))
-    _number(f"{where} acceleration", segment.acceleration)
-    for name in ("speed", "until_speed", "duration"):
+    _number(f"{where} acceleration", segment.acceleration, -_HARDEST, _HARDEST)
+    for name, most in (("speed", _FASTEST), ("until_speed", _FASTEST), ("duration", math.inf)):
         value = getattr(segment, name)
         if value is not None:
-            _number(f"{where} {name}", value, 0.0)
-    if segment.steps is not None and (not isinstance(segment.steps, int) or segment.steps < 1):
+            _number(f"{where} {name}", value, 0.0, most)
+    if segment.steps is not None and segment.steps < 1:
         raise ScenarioError(f"{where} steps is {segment.steps!r}: give a whole number from 1")
     if segment.until_speed is None and segment.duration is None and segment.steps is None:
         raise ScenarioError(f"{where} never ends: give it until_speed, duration or steps")
@@ -145,6 +181,7 @@ def _check_segment(where: str, segment: Segment) -> None:
         raise ScenarioError(f"{where} has until_speed but no acceleration: give one")
 
 
+@checked
 def example_one(
     map_kind: MapKind = MapKind.PAPER, steps_after: int = 20, acceleration: float = 1.05
 ) -> Scenario:
@@ -172,6 +209,7 @@ def example_one(
     )
 
 
+@checked
 def load_scenario(path: str | Path) -> Scenario:
     """Read a scenario from a TOML file with the attributes' names as keys.
 
@@ -186,12 +224,12 @@ def load_scenario(path: str | Path) -> Scenario:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ScenarioError(f"cannot read {path}: {error.strerror}; give a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # of the parser, of UTF-8, of dates, of numbers
         raise ScenarioError(f"{path} is no TOML: {error}") from None
     try:
         return _scenario(data)
-    except ValueError as error:
-        raise ScenarioError(f"{path}: {error}") from None
+    except TemplateControlError as error:
+        raise ScenarioError(f"{path}: {error}".replace("Scenario.", "")) from None
 
 
 def _scenario(data: dict[str, Any]) -> Scenario:
@@ -202,11 +240,6 @@ def _scenario(data: dict[str, Any]) -> Scenario:
         names = {kind.name.lower(): kind for kind in MapKind}
         _choice("map", data["map"], tuple(names))
         arguments["map_kind"] = names[data["map"]]
-    for name in ("start", "vlo"):
-        if name in data:
-            if not isinstance(data[name], list):
-                raise ScenarioError(f"{name} is {data[name]!r}: give a list of numbers")
-            arguments[name] = tuple(data[name])
     if "parameters" in data:
         _known_keys("[parameters]", data["parameters"], {f.name for f in fields(SlipParameters)})
         arguments["parameters"] = SlipParameters(**data["parameters"])
@@ -218,7 +251,16 @@ def _scenario(data: dict[str, Any]) -> Scenario:
         for f in fields(Segment):
             if f.default is MISSING and f.name not in segment:
                 raise ScenarioError(f"segment {i} has no {f.name}: give one")
-    return Scenario(segments=tuple(Segment(**segment) for segment in segments), **arguments)
+    return Scenario(
+        segments=tuple(_segment(i, table) for i, table in enumerate(segments, 1)), **arguments
+    )
+
+
+def _segment(number: int, table: dict[str, Any]) -> Segment:
+    try:
+        return Segment(**table)
+    except ScenarioError as error:
+        raise ScenarioError(str(error).replace("Segment.", f"segment {number} ")) from None
 
 
 def _known_keys(where: str, table: Any, known: set[str]) -> None:

@@ -23,7 +23,7 @@ from template_control.view.replay.playback import (
     spring,
     template_legs,
 )
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class _Stage:
             axes.plot([], [], color=color, linewidth=4, label=f"{name} leg, its ground force")
         axes.legend(loc="upper left", fontsize=7, frameon=False)
         self.title = axes.set_title(" ", fontsize=9, loc="right")
-        axes.set_title(str(record.metadata["robot"]), fontsize=9, loc="left")
+        axes.set_title(as_text(record.metadata["robot"]), fontsize=9, loc="left")
 
         # Once: a layout that follows the tick labels would make the picture tremble.
         self.show(0)

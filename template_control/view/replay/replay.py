@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from template_control.checks.checked import checked
 from template_control.run.record import Record
 from template_control.view.replay.film import write_film
 from template_control.view.replay.playback import playback
@@ -20,6 +21,7 @@ FPS = 30.0
 GIF_FPS, GIF_SECONDS = 20.0, 4.0
 
 
+@checked
 def replay(
     record: Record,
     *,
@@ -50,6 +52,7 @@ def replay(
     return ReplayServer(scene_commands(frames))
 
 
+@checked
 def save_html(
     record: Record,
     path: str | Path,
@@ -79,6 +82,7 @@ def save_html(
     return write_page(Path(path), title, scene_commands(frames))
 
 
+@checked
 def save_film(
     record: Record,
     path: str | Path,

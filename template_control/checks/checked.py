@@ -1,0 +1,94 @@
+"""What a user gives, checked against the types that fields and parameters declare.
+
+A dataclass that inherits :class:`Checked`, and a function decorated with :func:`checked`, take
+what fits their annotations and refuse the rest in one line. The annotation says the range too::
+
+    @dataclass(frozen=True)
+    class Options(Checked):
+        steps: Count | None = None
+        friction: Positive = 0.7
+        start: tuple[float, float, float] = (1.1, 0.98, 0.0)
+
+Arrays and lists are welcome where a tuple is declared, and NumPy's numbers where a number is;
+they become tuples and plain numbers. A number is finite, if its range does not say otherwise.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import cache, wraps
+from itertools import chain, repeat
+from types import SimpleNamespace
+from typing import Any, ClassVar, ParamSpec, TypeVar, get_type_hints
+
+from template_control.checks.fitting import check
+from template_control.errors import ParameterError, TemplateControlError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_POSITIONAL = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+
+
+class Checked:
+    """Base of frozen dataclasses whose fields are checked when one is made.
+
+    A subclass with a ``__post_init__`` of its own calls this one first.
+    """
+
+    _error: ClassVar[type[TemplateControlError]] = ParameterError
+
+    def __post_init__(self) -> None:
+        kind: Any = type(self)
+        for name, hint in _field_hints(kind).items():
+            value = getattr(self, name)
+            found = check(f"{kind.__name__}.{name}", value, hint, self._error)
+            if found is not value:
+                object.__setattr__(self, name, found)
+
+
+@cache
+def _field_hints(kind: Any) -> dict[str, Any]:
+    hints = get_type_hints(kind, include_extras=True)
+    return {name: hints[name] for name in kind.__dataclass_fields__}
+
+
+def checked(function: Callable[P, T]) -> Callable[P, T]:
+    """Let a function check its arguments against its annotations.
+
+    What does not fit is a :class:`~.errors.ParameterError`; a wrong number of arguments stays
+    a TypeError.
+    """
+    parameters = inspect.signature(function).parameters.values()
+    positional = [p.name for p in parameters if p.kind in _POSITIONAL]
+    rest, named = (
+        next((p.name for p in parameters if p.kind is kind), None)
+        for kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    )
+    owner, _, name = function.__qualname__.rpartition(".")
+    called = owner if name == "__init__" else name
+
+    @cache
+    def hints() -> dict[str, Any]:
+        # Not before the first call: a module that is being imported knows not all its names.
+        wanted = {k: v for k, v in function.__annotations__.items() if k != "return"}
+        holder = SimpleNamespace(__annotations__=wanted)
+        return get_type_hints(holder, function.__globals__, include_extras=True)
+
+    def fitting(key: str, value: Any, declared: str | None) -> Any:
+        found = hints()
+        if declared not in found:  # self; or one too many, which Python tells
+            return value
+        return check(f"{called}: {key}", value, found[declared])
+
+    @wraps(function)
+    def with_checks(*args: P.args, **kwargs: P.kwargs) -> T:
+        # Not by Signature.bind, which takes as long as the check.
+        keys = chain(positional, repeat(rest))
+        good = [fitting(str(k), v, k) for k, v in zip(keys, args, strict=False)]
+        known = hints()
+        also = {k: fitting(k, v, k if k in known else named) for k, v in kwargs.items()}
+        return function(*good, **also)
+
+    return with_checks

@@ -1,0 +1,330 @@
+"""Fits a value to an annotation, or says what would fit."""
+
+from __future__ import annotations
+
+import inspect
+import types
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import Enum
+from functools import cache, partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from template_control.checks.ranges import Range, Rising, Shape
+from template_control.errors import ParameterError, TemplateControlError
+
+_ANY_NUMBER = Range()
+_LONGEST = 60  # characters of a value that a message shows
+
+
+class _Refused(Exception):
+    """A value does not fit; its text says what would."""
+
+
+def check(
+    where: str, value: Any, hint: Any, error: type[TemplateControlError] = ParameterError
+) -> Any:
+    """A value as its annotation wants it.
+
+    Args:
+        where: names the value in a message.
+        value: what was given.
+        hint: the annotation, maybe ``Annotated`` with a :class:`Range` or a :class:`Shape`.
+        error: to raise.
+
+    Returns:
+        The value; tuples for lists and arrays, plain numbers for NumPy's.
+
+    Raises:
+        TemplateControlError: of the class ``error``, saying what would fit.
+    """
+    try:
+        return _fit(value, hint)
+    except _Refused as refused:
+        raise error(f"{where} is {shown(value)}: give {refused}") from None
+
+
+def shown(value: Any) -> str:
+    """A value for a message, on one line and not long."""
+    try:
+        text = f"{value:g}" if isinstance(value, float) else repr(value)
+    except Exception:  # a stranger's __repr__ may do anything
+        text = f"a {type(value).__name__}"
+    text = " ".join(text.split())
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+_PLANS: dict[int, tuple[Any, Callable[[Any], Any]]] = {}
+"""How to fit a value to an annotation, by the annotation's identity; to hash one takes long."""
+
+
+def _fit(value: Any, hint: Any) -> Any:
+    """See :func:`check`; raises :class:`_Refused`."""
+    known = _PLANS.get(id(hint))
+    if known is None:
+        known = _PLANS[id(hint)] = hint, _plan(hint)  # held here, its identity stays its own
+    return known[1](value)
+
+
+def _plan(hint: Any) -> Callable[[Any], Any]:
+    origin, args = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return partial(_annotated, inner=args[0], extras=args[1:])
+    if hint in _SIMPLE:
+        return _SIMPLE[hint]
+    if origin in (Union, types.UnionType):
+        return partial(_one_of, hints=args)
+    if origin in (list, Sequence):
+        hint, origin = types.GenericAlias(tuple, (args[0], ...)), tuple
+    if origin in _COMPOUND:
+        return partial(_COMPOUND[origin], hint=hint)
+    if isinstance(hint, type):
+        return partial(_instance, kind=hint)
+    return _as_is
+
+
+def _annotated(value: Any, inner: Any, extras: tuple[Any, ...]) -> Any:
+    for extra in extras:
+        if isinstance(extra, Range):
+            return _number(value, extra, whole=inner is int)
+        if isinstance(extra, Shape):
+            array = _fit(value, inner)
+            if not extra.holds(array.shape) or (extra.finite and not np.isfinite(array).all()):
+                raise _Refused(extra.words)
+            return array
+        if isinstance(extra, Rising):
+            low, high = _fit(value, inner)
+            if not low < high:
+                raise _Refused("two numbers, the smaller one first")
+            return low, high
+    return _fit(value, inner)
+
+
+def _number(value: Any, within: Range, whole: bool = False) -> Any:
+    what = "whole number" if whole else "number"
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    kinds: tuple[type, ...] = (int, np.integer)
+    if not whole:
+        kinds = (*kinds, float, np.floating)
+    fits = isinstance(value, kinds) and not isinstance(value, bool | np.bool_)
+    if not fits:
+        raise _Refused(within.words(what))
+    try:
+        number = int(value) if whole else float(value)
+    except OverflowError:
+        raise _Refused(within.words(what)) from None
+    if not within.holds(number):
+        raise _Refused(within.words(what))
+    # A member of an enumeration stays one.
+    kept = isinstance(value, Enum) or type(value) is type(number)
+    return value if kept else number
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise _Refused("True or False")
+    return bool(value)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise _Refused("a text")
+    return value
+
+
+def _path(value: Any) -> Path:
+    if not isinstance(value, Path):
+        raise _Refused("a path")
+    return value
+
+
+def _none(value: Any) -> None:
+    if value is not None:
+        raise _Refused("None")
+
+
+def _as_is(value: Any) -> Any:
+    return value
+
+
+_SIMPLE: dict[Any, Callable[[Any], Any]] = {
+    Any: _as_is,
+    object: _as_is,
+    float: lambda value: _number(value, _ANY_NUMBER),
+    int: lambda value: _number(value, _ANY_NUMBER, whole=True),
+    bool: _truth,
+    str: _text,
+    Path: _path,
+    type(None): _none,
+    ArrayLike: lambda value: _array(value, NDArray[np.float64]),
+}
+
+
+def _one_of(value: Any, hints: tuple[Any, ...]) -> Any:
+    if value is None and type(None) in hints:
+        return None
+    others = [hint for hint in hints if hint is not type(None)]
+    reasons = []
+    for hint in others:
+        try:
+            return _fit(value, hint)
+        except _Refused as refused:
+            reasons.append(str(refused))
+    if type(None) in hints:
+        reasons.append("None")
+    raise _Refused(" or ".join(dict.fromkeys(reasons)))
+
+
+def _items(value: Any, hint: Any) -> list[Any]:
+    """Entries of a sequence; an array's rows become lists."""
+    if isinstance(value, np.ndarray) and value.ndim > 0:
+        return list(value.tolist())
+    if isinstance(value, str | bytes) or not isinstance(value, Sequence):
+        raise _Refused(_words(hint))
+    return list(value)
+
+
+def _tuple(value: Any, hint: Any) -> tuple[Any, ...]:
+    hints = get_args(hint)
+    many = len(hints) == 2 and hints[1] is Ellipsis
+    items = _items(value, hint)
+    if not many and len(items) != len(hints):
+        raise _Refused(_words(hint))
+    each = [hints[0]] * len(items) if many else hints
+    try:
+        found = tuple(_fit(item, h) for item, h in zip(items, each, strict=True))
+    except _Refused as refused:
+        raise _Refused(f"{_words(hint)}; each {refused}" if many else _words(hint)) from None
+    unchanged = isinstance(value, tuple) and all(a is b for a, b in zip(found, value, strict=True))
+    return value if unchanged else found
+
+
+def _literal(value: Any, hint: Any) -> Any:
+    if not any(type(value) is type(x) and value == x for x in get_args(hint)):
+        raise _Refused(_words(hint))
+    return value
+
+
+def _mapping(value: Any, hint: Any) -> Any:
+    if not isinstance(value, Mapping):
+        raise _Refused(_words(hint))
+    key_hint, value_hint = get_args(hint)
+    found = {}
+    for key, entry in value.items():
+        try:
+            fitted = _fit(key, key_hint)
+        except _Refused as refused:
+            raise _Refused(f"{_words(hint)}; each key {refused}") from None
+        try:
+            found[fitted] = _fit(entry, value_hint)
+        except _Refused as refused:
+            text = f"{key} is {shown(entry)}, which should be {refused}"
+            raise _Refused(f"{_words(hint)}; {text}") from None
+    same = all(found.get(key) is entry for key, entry in value.items())
+    return value if same else found
+
+
+def _array(value: Any, hint: Any) -> Any:
+    wanted = get_args(get_args(hint)[1])
+    kind = wanted[0] if wanted else np.float64
+    if not isinstance(kind, type):
+        kind = np.float64
+    try:
+        found = np.asarray(value)
+        numbers = found.dtype.kind in "biufc"
+        found = found.astype(kind, copy=False) if numbers else found
+    except (TypeError, ValueError, OverflowError):
+        numbers = False
+    if not numbers:
+        raise _Refused("an array of numbers")
+    return found
+
+
+def _called(value: Any, hint: Any) -> Any:
+    if not callable(value):
+        raise _Refused("a function")
+    return value
+
+
+def _iterable(value: Any, hint: Any) -> Any:
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        raise _Refused("a list")
+    return value
+
+
+_COMPOUND: dict[Any, Callable[..., Any]] = {
+    Literal: _literal,
+    tuple: _tuple,
+    Mapping: _mapping,
+    dict: _mapping,
+    np.ndarray: _array,
+    Callable: _called,
+    Iterable: _iterable,
+}
+
+
+def _instance(value: Any, kind: type) -> Any:
+    if getattr(kind, "_is_protocol", False):
+        missing = [name for name in _members(kind) if not _has(value, name)]
+        if missing or isinstance(value, type):
+            raise _Refused(_words(kind))
+        return value
+    if not isinstance(value, kind):
+        raise _Refused(_words(kind))
+    return value
+
+
+def _has(value: Any, name: str) -> bool:
+    return inspect.getattr_static(value, name, _has) is not _has or hasattr(value, name)
+
+
+@cache
+def _members(kind: type) -> tuple[str, ...]:
+    """Names that a protocol asks for."""
+    names = [
+        name
+        for part in kind.__mro__
+        if getattr(part, "_is_protocol", False)
+        for name in (*vars(part), *vars(part).get("__annotations__", ()))
+        if not name.startswith("_")
+    ]
+    return tuple(dict.fromkeys(names))
+
+
+def _words(hint: Any) -> str:
+    """What fits an annotation, for a message."""
+    origin, args = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        return "one of " + ", ".join(repr(x) for x in args)
+    if origin is Annotated:
+        return next(
+            (
+                extra.words("whole number" if args[0] is int else "number")
+                for extra in args[1:]
+                if isinstance(extra, Range)
+            ),
+            _words(args[0]),
+        )
+    if origin is tuple:
+        if len(args) == 2 and args[1] is Ellipsis:
+            return "a tuple"
+        each = list(dict.fromkeys(_words(x) for x in args))
+        if len(each) == 1:
+            return f"{len(args)} times {each[0]}"
+        return ", ".join(each)
+    if origin in (list, Sequence):
+        return "a list"
+    if origin in (Mapping, dict):
+        return "a mapping"
+    if hint is float:
+        return _ANY_NUMBER.words("number")
+    if hint is int:
+        return "a whole number"
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return f"a {hint.__name__}: " + ", ".join(str(member) for member in hint)
+    name = getattr(hint, "__name__", str(hint))
+    return f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"

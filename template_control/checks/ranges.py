@@ -1,0 +1,97 @@
+"""Which numbers and arrays a field or a parameter takes, for its annotation."""
+
+from __future__ import annotations
+
+import math
+from types import EllipsisType
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Range(NamedTuple):
+    """Which numbers are taken.
+
+    Attributes:
+        low, high: ends of the range, both taken.
+        above: whether ``low`` itself is refused.
+        below: whether ``high`` itself is refused.
+        endless: whether inf is taken, where it is an end.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    above: bool = False
+    below: bool = False
+    endless: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Whether a number is in the range."""
+        if isinstance(value, float) and not math.isfinite(value):
+            return self.endless and value in (self.low, self.high)
+        over = value > self.low if self.above else value >= self.low
+        return over and (value < self.high if self.below else value <= self.high)
+
+    def words(self, what: str) -> str:
+        """Of numbers in the range, for a message; ``what`` is "number" or "whole number"."""
+        low, high = math.isfinite(self.low), math.isfinite(self.high)
+        if not low and not high:
+            return f"a finite {what}" if what == "number" else f"a {what}"
+        if self.low == 0.0 and self.above and not high:
+            return f"a positive {what}"
+        if not high:
+            return f"a {what} {'above' if self.above else 'from'} {self.low:g}" + (
+                "" if self.above else " up"
+            )
+        if not low:
+            return f"a {what} {'below' if self.below else 'up to'} {self.high:g}"
+        first = f"above {self.low:g}" if self.above else f"from {self.low:g}"
+        to = "to" if not self.above else "and up to"
+        last = f"and below {self.high:g}" if self.below else f"{to} {self.high:g}"
+        return f"a {what} {first} {last}"
+
+
+class Shape(NamedTuple):
+    """Size of an array of numbers along its axes; None stands for any.
+
+    Attributes:
+        sizes: one an axis; an Ellipsis at the beginning stands for any axes.
+        finite: whether NaN and inf are refused.
+    """
+
+    sizes: tuple[int | EllipsisType | None, ...]
+    finite: bool = True
+
+    def holds(self, shape: tuple[int, ...]) -> bool:
+        """Whether an array's shape is this one."""
+        sizes = self.sizes
+        if sizes[:1] == (...,):
+            sizes, shape = sizes[1:], shape[max(len(shape) - len(sizes) + 1, 0) :]
+        return len(shape) == len(sizes) and all(
+            wanted in (None, size) for wanted, size in zip(sizes, shape, strict=True)
+        )
+
+    @property
+    def words(self) -> str:
+        """Of such an array, for a message."""
+        names: dict[object, str] = {None: "n", ...: "..."}
+        sizes = " by ".join(str(names.get(size, size)) for size in self.sizes)
+        return f"an array of {sizes} {'finite ' if self.finite else ''}numbers"
+
+
+class Rising(NamedTuple):
+    """Two numbers, the second greater than the first."""
+
+
+Array = NDArray[np.float64]
+Positive = Annotated[float, Range(0.0, above=True)]
+NotNegative = Annotated[float, Range(0.0)]
+Share = Annotated[float, Range(0.0, 1.0)]
+Angle = Annotated[float, Range(0.0, math.pi / 2.0, above=True, below=True)]
+Count = Annotated[int, Range(1)]
+Index = Annotated[int, Range(0)]
+Interval = Annotated[tuple[float, float], Rising()]
+Vector = Annotated[Array, Shape((None,))]
+Pair = Annotated[Array, Shape((2,))]
+Triple = Annotated[Array, Shape((3,))]

@@ -1,0 +1,52 @@
+"""A user's names are printed and drawn as they are: brackets, dollars and colons order nothing."""
+
+from dataclasses import replace
+
+import pytest
+
+import template_control as tc
+from template_control.cli.main import main
+from template_control.cli.report.run_table import print_table
+from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.scenario import Scenario, Segment
+from template_control.view import save_scenario_figures
+from template_control.view.figures import FIGURES
+
+NAMES = ("[/nope]", "[bold]x", ":bus:", "$x^{", "50 % [link=x]", r"a\b[/]")
+TOML = 'name = {}\n[[segment]]\ngait = "walk"\nspeed = 1.1\nsteps = 1\n'
+
+
+def renamed(record, name):
+    return replace(record, metadata={**record.metadata, "robot": name})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scenario_s_name_is_printed_as_it_is(name, tmp_path, capsys):
+    path = tmp_path / "s.toml"
+    path.write_text(TOML.format("'" + name + "'"))
+    assert main(["slip", str(path), "--no-figures", "--output", str(tmp_path)]) == 0
+    assert f"{name}, paper map" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_robot_s_name_is_printed_as_it_is(name, short_walk, capsys):
+    figures = tc.run.summarise(renamed(short_walk, name), f"{name}.npz")
+    print_table(figures)
+    out = capsys.readouterr().out
+    assert f"{name}, gait walk" in out
+    assert f"{name}.npz" in out
+
+
+def test_a_folder_s_name_is_printed_as_it_is(tmp_path, capsys):
+    assert main(["gaits", "--output", str(tmp_path / "[b]"), "--no-figures"]) == 0
+    assert main(["automaton", "--output", str(tmp_path / "[/b].png")]) == 0
+    assert "[/b].png" in capsys.readouterr().out.replace("\n", "")
+
+
+@pytest.mark.slow(seconds=40)
+def test_names_are_drawn_as_they_are(short_walk, tmp_path):
+    for name in ("$x^{", r"\frac$", "a\nb"):
+        for draw in FIGURES.values():
+            draw(renamed(short_walk, name)).savefig(tmp_path / "a.png", dpi=20)
+    record = simulate_scenario(Scenario((Segment("walk", speed=1.1, steps=2),), name="$x^{"))
+    assert save_scenario_figures(record, tmp_path)

@@ -1,0 +1,84 @@
+"""A run begins afresh with what an earlier one used, and shares nothing with one that goes on."""
+
+import threading
+from functools import partial
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.embedding.planners.transition import RUN_TO_WALK, TransitionPlanner
+from template_control.errors import ParameterError
+from template_control.slip.gaits.running_gait import running_gait
+from template_control.slip.gaits.walking_family import walking_gait
+
+OPTIONS = tc.SimulationOptions(steps=3, record_every=10)
+
+
+@pytest.mark.parametrize("kind", [tc.LqrPlanner, tc.ModifiedPlanner])
+def test_a_planner_forgets_the_gaits_of_an_earlier_run(kind, default_gait):
+    planner, fresh = kind(default_gait), kind(default_gait)
+    z = default_gait.vlo * [1.01, 1.0, 1.0]
+    first = planner.decide(z)
+    other = walking_gait(default_gait.parameters, 0.95)
+    planner.observe(planner.decide(z, other.vlo), other.vlo + 0.01)
+    assert planner.gait.vlo[0] == pytest.approx(0.95)
+    planner.reset()
+    assert planner.gait is default_gait
+    for again in (planner.decide(z), fresh.decide(z)):
+        np.testing.assert_array_equal(again.controls, first.controls)
+        np.testing.assert_array_equal(again.predicted, first.predicted)
+
+
+def test_running_and_transition_planners_forget_the_gaits_of_an_earlier_run():
+    slow, fast = (running_gait(tc.SlipParameters(), speed) for speed in (3.0, 3.5))
+    planner, fresh = tc.RunningPlanner(slow), tc.RunningPlanner(slow)
+    z = slow.apex * [1.01, 1.0]
+    planner.observe(planner.decide(z, fast.apex), z)
+    assert planner.gait.apex[0] == 3.5
+    planner.reset()
+    assert planner.gait is slow
+    again, first = planner.decide(z), fresh.decide(z)
+    np.testing.assert_array_equal(again.controls, first.controls)
+    np.testing.assert_array_equal(again.predicted, first.predicted)
+
+    walk = partial(walking_gait, tc.SlipParameters())
+    landing = TransitionPlanner("rw", planner, lambda speed: walk(min(speed, 1.2)), RUN_TO_WALK)
+    own = landing.gait
+    landing.decide(z, walk(0.95).vlo)
+    assert landing.gait is not own
+    landing.reset()
+    assert landing.gait is own
+
+
+def test_a_second_run_of_one_robot_and_planner_is_as_the_first(robot, default_gait):
+    planner = tc.LqrPlanner(default_gait)
+    first, second = (tc.simulate(robot, planner, OPTIONS) for _ in range(2))
+    for name in ("time", "q", "torque", "section_state", "section_controls"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+@pytest.mark.parametrize("shared", ["robot", "planner"])
+def test_a_robot_or_planner_in_use_is_refused_to_another_thread(shared, default_gait):
+    own = {"robot": tc.load_robot("five-link"), "planner": tc.LqrPlanner(default_gait)}
+    other = {"robot": tc.load_robot("five-link"), "planner": tc.LqrPlanner(default_gait)}
+    other[shared] = own[shared]
+    told = []
+
+    def meanwhile(done):
+        def second():
+            try:
+                tc.simulate(other["robot"], other["planner"], OPTIONS)
+            except ParameterError as error:
+                told.append(str(error))
+
+        thread = threading.Thread(target=second)
+        thread.start()
+        thread.join()
+
+    record = tc.simulate(own["robot"], own["planner"], OPTIONS, meanwhile)
+    assert record.steps == 3
+    assert len(told) == 3
+    assert all("is in use by another run" in line for line in told)
+    # The run has given them back.
+    assert tc.simulate(other["robot"], other["planner"], OPTIONS).steps == 3
