@@ -273,8 +273,7 @@ class RunConfig(Checked):
             return Ready(robot, gait, None, {gait.stride: self._planner(gait)})
         route = robot_route(robot, self.scenario)
         walk = walking_gait(route.parameters, float(route.start[0]))
-        planners = default_planners(route)
-        return Ready(robot, walk, route, {**planners, walk.stride: self._planner(walk)})
+        return Ready(robot, walk, route, default_planners(route, self._planner(walk)))
 
     def _planner(self, gait: WalkingGait | RunningGait) -> Planner:
         if isinstance(self.planner, OwnPlanner):

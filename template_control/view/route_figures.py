@@ -89,8 +89,9 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
     for axes in (speed, stiffness, torque):
         shade(axes, record, _WHOLE)
         _mark_transitions(axes, record)
-    for axes in (speed, path, stiffness, torque):
-        axes.legend(loc="upper left", fontsize=7, ncols=4)
+    path.legend(loc="center right", fontsize=7, ncols=3)
+    for axes in (speed, stiffness, torque):
+        axes.legend(loc="upper right", fontsize=7, ncols=2)
     name = as_text(record.metadata["robot"])
     speed.set_title(f"{name} through its scenario (single stance shaded)")
     return figure

@@ -9,7 +9,7 @@ import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.planners.planner import Planners
+from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
 from template_control.embedding.planners.transition import (
     RUN_TO_WALK,
@@ -40,13 +40,14 @@ def _keeping_up(scenario: Scenario) -> RunningOptions:
 
 
 @checked
-def default_planners(route: Route) -> Planners:
+def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 
     That is walking steps for a route that begins at VLO, and running ones for one at an apex.
 
     Args:
         route: whose template and first target they are for.
+        walking: plans the walking steps instead of the library's own planner.
 
     Raises:
         GaitError: if there is no gait at the speed the route begins with.
@@ -59,7 +60,7 @@ def default_planners(route: Route) -> Planners:
 
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
-    walk = LqrPlanner(walking_gait(p, speed))
+    walk = walking or LqrPlanner(walking_gait(p, speed))
     options = _keeping_up(route.scenario) if isinstance(route, ScenarioRoute) else None
     run = RunningPlanner(runs(slowest), options)
     return {
