@@ -7,10 +7,11 @@ import pytest
 import template_control as tc
 from template_control.cli.main import main
 from template_control.cli.report.run_table import print_table
+from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment
 from template_control.view import save_scenario_figures
-from template_control.view.figures import FIGURES
+from template_control.view.figures import FIGURES, figures_of
 
 NAMES = ("[/nope]", "[bold]x", ":bus:", "$x^{", "50 % [link=x]", r"a\b[/]")
 TOML = 'name = {}\n[[segment]]\ngait = "walk"\nspeed = 1.1\nsteps = 1\n'
@@ -45,8 +46,13 @@ def test_a_folder_s_name_is_printed_as_it_is(tmp_path, capsys):
 
 @pytest.mark.slow(seconds=40)
 def test_names_are_drawn_as_they_are(short_walk, tmp_path):
+    robot = tc.load_robot("runner")
+    planner = tc.RunningPlanner(running_gait(tc.template_for(robot), 3.0))
+    short_run = tc.simulate(robot, planner, tc.SimulationOptions(steps=3))
+    assert figures_of(short_run) == FIGURES
     for name in ("$x^{", r"\frac$", "a\nb"):
-        for draw in FIGURES.values():
-            draw(renamed(short_walk, name)).savefig(tmp_path / "a.png", dpi=20)
+        for record in (renamed(short_walk, name), renamed(short_run, name)):
+            for draw in figures_of(record).values():
+                draw(record).savefig(tmp_path / "a.png", dpi=20)
     record = simulate_scenario(Scenario((Segment("walk", speed=1.1, steps=2),), name="$x^{"))
     assert save_scenario_figures(record, tmp_path)

@@ -209,6 +209,7 @@ def figures_of(record: Record) -> dict[str, Callable[[Record], Figure]]:
     return {name: draw for name, draw in FIGURES.items() if draw is not apex_return}
 
 
+@checked
 def plot(record: Record, figure: str = "stick_diagram") -> Figure:
     """Draw one of the :data:`FIGURES` of a run.
 
