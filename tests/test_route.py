@@ -145,3 +145,42 @@ def test_gaits_of_a_scenario():
     assert example_one().gaits == {"walk", "run"}
     only = replace(example_one(), segments=(Segment("walk", speed=1.1, steps=2),))
     assert only.gaits == {"walk"}
+
+
+def test_each_stride_knows_the_next_of_another_kind():
+    route = ScenarioRoute(
+        scenario(
+            Segment("walk", 1.1, steps=1),
+            Segment("walk", 1.0, steps=1),
+            Segment("run", 2.0, steps=1),
+            Segment("run", 3.0, steps=1),
+            Segment("walk", 1.1, steps=1),
+        )
+    )
+    kinds, section = [], route.section
+    for now in np.arange(9) * 0.5:
+        goal = route.next(section, WALK[: section.dimension], now)
+        if goal is None:
+            break
+        kinds.append((goal.stride, goal.then))
+        section = section_of(AUTOMATON.sections(STRIDE_START[goal.stride])[1])
+    assert kinds == [
+        ("w", "wr"),
+        ("w", "wr"),
+        ("wr", "r"),
+        ("r", "rw"),
+        ("r", "rw"),
+        ("rw", "w"),
+        ("w", None),
+    ]
+    assert SteadyRoute(P, "w", WALK).next(VLO, WALK, 0.0).then is None
+
+
+def test_the_apex_height_may_depend_on_the_speed():
+    segments = (Segment("walk", 1.1, steps=1), Segment("run", 2.0, acceleration=1.0, steps=3))
+    route = ScenarioRoute(scenario(*segments), lambda speed: 1.0 - 0.01 * speed)
+    np.testing.assert_allclose(route.next(VLO, WALK, 0.0).target, [1.1, 0.98, 0.0])
+    np.testing.assert_allclose(route.next(VLO, WALK, 0.5).target, [2.0, 0.98])
+    goal = route.next(APEX, APEX_STATE, 1.0)
+    assert goal.wanted_speed > 2.3
+    np.testing.assert_allclose(goal.target, [goal.wanted_speed, 1.0 - 0.01 * goal.wanted_speed])

@@ -9,6 +9,7 @@ from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.flight import flight_share
 from template_control.slip.gaits.running_gait import RunningFamily, running_gait, running_speeds
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
@@ -87,3 +88,10 @@ def test_a_family_knows_its_gait_and_the_nearest():
     assert family.at(3.0) is own
     assert family.at(2.5) is family.at(2.5)
     assert family.at(9.0).apex[0] == running_speeds(P)[1]
+
+
+def test_flight_is_what_the_nodes_without_a_foot_take(paper_gait):
+    for speed in (1.3, 3.0, 4.9):
+        gait = running_gait(P, speed)
+        assert flight_share(gait) == pytest.approx(gait.flight_share, abs=1e-9)
+    assert flight_share(paper_gait) == 0.0

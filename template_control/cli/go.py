@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         _print(figures)
     if kept.interrupted():
         return INTERRUPTED
-    return 0 if figures["completed"] else 1
+    return 1 if kept.record.fell else 0
 
 
 def summarise_route(record: Record, template: ScenarioRecord, path: str | None) -> dict[str, Any]:

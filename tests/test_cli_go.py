@@ -1,0 +1,215 @@
+"""``template-control go`` as a user meets it, and the figures of a scenario."""
+
+import json
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from template_control.cli.go import summarise_route
+from template_control.cli.main import main
+from template_control.cli.report import kept
+from template_control.run.record import Record
+from template_control.slip.scenario.record import ScenarioRecord
+from template_control.view.route_figures import (
+    route_figure,
+    save_route_figures,
+    transition_energies,
+)
+
+KEYS = {
+    "robot", "completed", "fell", "fall_reason", "duration", "top_speed", "speed_error_rms",
+    "strides", "joint_torque", "joint_speed", "qp_failures", "template", "record",
+}  # fmt: skip
+SCENARIO = """
+map = "exact"
+start = [1.1, 0.978, 0.0]
+vlo = [0.978, 0.0]
+[[segment]]
+gait = "walk"
+speed = 1.1
+steps = 1
+[[segment]]
+gait = "run"
+speed = 1.3
+steps = 2
+[[segment]]
+gait = "walk"
+speed = 1.1
+steps = 1
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scenario") / "short.toml"
+    path.write_text(SCENARIO)
+    return path
+
+
+@pytest.fixture(scope="module")
+def gone(scenario, tmp_path_factory):
+    """Folder of the five-link robot's way through the short scenario."""
+    folder = tmp_path_factory.mktemp("gone")
+    assert main(["go", str(scenario), "--no-figures", "--output", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def record(gone):
+    return Record.load(gone / "run.npz")
+
+
+@pytest.fixture(scope="module")
+def template(gone):
+    return ScenarioRecord.load(gone / "template.npz")
+
+
+def test_the_run_repeats_and_json_has_what_it_promises(gone, record, tmp_path, capfd):
+    words = ["go", "--config", str(gone / "run.toml"), "--json", "--no-figures", "--output"]
+    assert main([*words, str(tmp_path)]) == 0
+    figures = json.loads(capfd.readouterr().out)
+    assert set(figures) >= KEYS
+    assert figures["completed"]
+    assert figures["strides"] == {"walking": 2, "walk to run": 1, "running": 2, "run to walk": 1}
+    assert set(figures["template"]) == {"completed", "top_speed", "speed_error_rms"}
+    assert figures["record"] == str(tmp_path / "run.npz")
+    again = Record.load(tmp_path / "run.npz")
+    np.testing.assert_array_equal(again.section_state, record.section_state)
+
+
+def test_the_robot_does_what_its_template_does(record, template):
+    assert template.completed
+    assert record.metadata["fall_reason"] == ""
+    assert record.solved.all()
+    limit = np.array(record.metadata["torque_limit"])
+    assert np.all(np.abs(record.torque) <= limit)
+    assert [record.metadata["strides"][i] for i in record.stride[:-1]] == list(template.strides)
+    names = [record.metadata["sections"][i] for i in record.section]
+    assert names == ["VLO", "VLO", "APEX", "APEX", "APEX", "VLO", "VLO"]
+
+
+def test_what_is_told_is_in_the_records(record, template):
+    figures = summarise_route(record, template, None)
+    assert figures["record"] is None
+    assert figures["top_speed"] == record.section_state[:, 0].max()
+    wanted = np.array([1.1, 1.3, 1.3, 1.3, 1.1, 1.1])
+    error = record.section_state[1:, 0] - wanted
+    assert figures["speed_error_rms"] == pytest.approx(np.sqrt(np.mean(error**2)))
+    other = template.section_state[1:, 0] - wanted
+    assert figures["template"]["speed_error_rms"] == pytest.approx(np.sqrt(np.mean(other**2)))
+
+
+def test_the_table_has_both_beside_each_other(scenario, tmp_path, capfd):
+    words = ["go", str(scenario), "--steps", "1", "--no-figures", "--output", str(tmp_path)]
+    assert main(words) == 0, "it did as many strides as it was to"
+    out = capfd.readouterr().out
+    for text in ("robot", "template", "top speed", "strides, run to walk", "rad/s", "QP failures"):
+        assert text in out
+
+
+def changed(scenario, tmp_path, old, new):
+    path = tmp_path / "changed.toml"
+    path.write_text(scenario.read_text().replace(old, new))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("speed = 1.3", "speed = 6.5", "segment 2 wants to run at 6.5 m/s: five-link can run from"),
+        ("speed = 1.3", "speed = 0.9", "segment 2 wants to run at 0.9 m/s: five-link can run from"),
+        ('"run"', '"trot"', "trot"),
+        ("start = [1.1", "start = [0.2", "the start has 0.2 m/s at VLO"),
+    ],
+)
+def test_what_the_robot_cannot_follow_is_refused(scenario, tmp_path, refused, old, new, told):
+    path = changed(scenario, tmp_path, old, new)
+    assert told in refused(["go", str(path), "--output", str(tmp_path / "out")])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([], "no scenario is given: name a file, such as examples/example_one.toml"),
+        (["missing.toml"], "cannot read missing.toml"),
+        (["page.md"], "page.md is no TOML"),
+        (["other.toml"], "unknown key 'colour'"),
+    ],
+)
+def test_a_file_that_is_no_scenario_is_refused(arguments, told, tmp_path, monkeypatch, refused):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "page.md").write_text("# A page\n\nwith text")
+    (tmp_path / "other.toml").write_text('colour = "red"\n')
+    assert told in refused(["go", *arguments, "--output", "out"])
+
+
+def test_ctrl_c_keeps_the_run_and_its_template(scenario, tmp_path, capfd, monkeypatch):
+    @contextmanager
+    def impatient(*_):
+        def advance(done):
+            if done == 2:
+                raise KeyboardInterrupt
+
+        yield advance
+
+    monkeypatch.setattr(kept, "progress_bar", impatient)
+    assert main(["go", str(scenario), "--json", "--no-figures", "--output", str(tmp_path)]) == 130
+    told = capfd.readouterr()
+    assert not json.loads(told.out)["completed"]
+    assert f"interrupted: the run up to here is in {tmp_path / 'run.npz'}" in told.err
+    assert Record.load(tmp_path / "run.npz").steps == 2
+
+
+def test_a_fall_exits_with_one_and_keeps_the_run(scenario, tmp_path, capfd):
+    words = ["--torque-scale", "0.3", "--json", "--no-figures", "--output", str(tmp_path)]
+    assert main(["go", str(scenario), *words]) == 1
+    figures = json.loads(capfd.readouterr().out)
+    assert figures["fell"]
+    assert not figures["completed"]
+    assert Record.load(tmp_path / "run.npz").fell
+
+
+def test_a_scenario_that_runs_is_not_walked(scenario, tmp_path, refused):
+    line = refused(["walk", "--scenario", str(scenario), "--output", str(tmp_path)])
+    assert "segment 2 is to run: give the scenario to template-control go" in line
+
+
+def test_the_figure_shows_what_was_recorded(record, template):
+    speed, path, stiffness, torque = route_figure(record, template).axes
+    shown = {line.get_label(): line for line in speed.lines}
+    np.testing.assert_array_equal(shown["robot"].get_ydata(), record.com_velocity[:, 0])
+    np.testing.assert_array_equal(shown["the template alone"].get_ydata(), template.state[:, 2])
+    holds = next(line for line in path.lines if line.get_label() == "footholds").get_xdata()
+    # Two steps, the transition's, two running strides, and that which walks again, with the last
+    # step's. None is counted twice.
+    assert 6 <= len(holds) <= 8
+    assert np.all(np.diff(np.sort(holds)) > 0.3)
+    for line in stiffness.lines:
+        carried = line.get_ydata()[np.isfinite(line.get_ydata())]
+        assert len(carried) > 100
+        assert np.all((carried > 1.0) & (carried < 80.0)), "kN/m"
+    flies = np.array(record.metadata["phases"])[record.node] == "F"
+    rear = stiffness.lines[0].get_ydata()
+    assert np.isnan(rear[flies]).all(), "no leg carries in flight"
+    np.testing.assert_array_equal(torque.lines[0].get_ydata(), record.torque[:, 0])
+
+
+def test_energies_are_shown_around_both_transitions(record):
+    panels = transition_energies(record).axes
+    assert [axes.get_title() for axes in panels] == ["walk to run", "run to walk"]
+    for axes in panels:
+        assert all(line.get_ydata()[0] == 0.0 for line in axes.lines)
+
+
+def test_the_files_are_not_empty_and_a_walk_has_no_transitions(
+    record, template, short_walk, tmp_path
+):
+    paths = save_route_figures(record, template, tmp_path)
+    assert [path.stem for path in paths] == ["scenario", "transitions"]
+    for path in paths:
+        picture = imread(path)[..., :3]
+        assert np.mean(picture.min(axis=2) < 0.8) > 0.005, f"{path} is empty"
+    (only,) = save_route_figures(short_walk, template, tmp_path)
+    assert only.stem == "scenario"

@@ -1,0 +1,73 @@
+"""Robots walk, run and walk on in PyBullet, within their motors' torques."""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.scenario import load_scenario
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def go(example, name, **options):
+    """A robot's way through an example."""
+    scenario = load_scenario(EXAMPLES / example)
+    return tc.simulate(tc.load_robot(name), scenario, tc.SimulationOptions(**options))
+
+
+def strides(record):
+    return [record.metadata["strides"][i] for i in record.stride[:-1]]
+
+
+def check(record):
+    """Went to the end within its torques."""
+    assert record.metadata["fall_reason"] == ""
+    assert record.metadata["arrived"]
+    assert record.solved.all()
+    assert np.all(np.abs(record.torque) <= record.metadata["torque_limit"])
+
+
+def settled(record):
+    """Walks as is wanted, after both transitions."""
+    error = record.section_state[-5:] - record.section_target[-6:-1]
+    assert np.all(np.abs(error[:, 0]) < 0.06), "of 1.1 m/s"
+    assert np.all(np.abs(error[:, 1]) < 8e-3)
+
+
+@pytest.mark.slow(seconds=20)
+@pytest.mark.parametrize("friction", [0.7, 0.5])
+def test_five_link_walks_runs_at_three_metres_a_second_and_walks(friction):
+    record = go("walk_run_walk.toml", "five-link", plant=tc.PlantOptions(friction=friction))
+    check(record)
+    kinds = strides(record)
+    runs = kinds.count("r")
+    assert kinds == ["w"] * 8 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * 15
+    assert runs > 25
+    speed = record.section_state[:, 0]
+    assert speed.max() > 2.85, "it comes to 3 m/s behind the profile"
+    assert speed.max() < 3.05
+    assert speed[9] == pytest.approx(1.3, abs=0.05), "the transition hits its first apex"
+    share = record.metadata["summary"]["saturated_share"]
+    assert share < 0.01
+    settled(record)
+
+
+@pytest.mark.slow(seconds=25)
+def test_runner_goes_through_example_one_as_its_template_does():
+    record = go("example_one.toml", "runner")
+    check(record)
+    template = simulate_scenario(load_scenario(EXAMPLES / "example_one.toml"))
+    assert template.completed
+    kinds = Counter(strides(record))
+    assert kinds["wr"] == kinds["rw"] == 1
+    # The last segment's twenty steps, and those of the first 0.8 s.
+    assert 21 <= kinds["w"] <= 23
+    speed = record.section_state[:, 0]
+    assert speed.max() > 4.9
+    error = speed[1:] - record.section_target[:-1, 0]
+    assert np.sqrt(np.mean(error**2)) < 0.15
+    settled(record)
