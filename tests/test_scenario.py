@@ -162,6 +162,23 @@ def test_slip_command(tmp_path, capfd):
 LONG = {"fig12": 90, "fig8": 40, "fig13": 40, "fig9": 30, "fig10": 3, "fig5": 3}
 
 
+@pytest.mark.slow(seconds=30)
+def test_example_one_on_a_robot(tmp_path, capfd):
+    asked = ["reproduce", "fig10", "--robot", "runner", "--output", str(tmp_path), "--json"]
+    assert main(asked) == 0
+    data = json.loads(capfd.readouterr().out)
+    assert data["completed"] and data["walking_steps_after"] == 20
+    assert data["top_speed"] == pytest.approx(5.0, abs=0.05)
+    assert data["speed_error_rms"] <= 0.15
+    assert data["qp_failures"] == 0
+    assert {Path(path).stem for path in data["figures"]} == {"fig10_scenario", "fig10_transitions"}
+
+
+def test_a_robot_goes_with_example_one_only(capfd):
+    assert main(["reproduce", "table3", "--robot", "runner"]) == 2
+    assert "--robot goes with fig10 only" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize(
     "name",
     [

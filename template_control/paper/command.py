@@ -14,12 +14,19 @@ from template_control.storage import Files, writable
 from template_control.terminal import plain_console
 from template_control.view.figure_file import save_figure
 
+_ON_A_ROBOT = "fig10"
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's description and options."""
     parser.description = "Compute a table or figure of the paper again and print ours beside it."
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(REPRODUCTIONS)}")
+    parser.add_argument(
+        "--robot",
+        metavar="NAME|URDF",
+        help="of fig10: Example I on this robot, such as runner, its template beside it",
+    )
     parser.add_argument(
         "--output", type=Path, default=Path("runs/reproduce"), help="folder for the figures"
     )
@@ -39,9 +46,11 @@ def run(options: argparse.Namespace) -> int:
         raise ParameterError(
             f"no reproduction {options.name!r}: give one of {', '.join(REPRODUCTIONS)}"
         )
+    if options.robot is not None and options.name != _ON_A_ROBOT:
+        raise ParameterError(f"--robot goes with {_ON_A_ROBOT} only: leave it out")
     folder = None if options.no_figures else writable(options.output)
     with plain_console(stderr=True).status(f"computing {options.name}"):
-        result = REPRODUCTIONS[options.name]()
+        result = REPRODUCTIONS[options.name]() if options.robot is None else _on(options.robot)
     files, paths = Files(), []
     if folder is not None:
         paths = files.write(lambda: _save(result, folder)) or []
@@ -51,6 +60,13 @@ def run(options: argparse.Namespace) -> int:
         _print(result, paths)
     files.tell()
     return 0
+
+
+def _on(robot: str) -> Reproduction:
+    # Here, because the other reproductions need no robot.
+    from template_control.paper.example_one import fig10_on
+
+    return fig10_on(robot)
 
 
 def _save(result: Reproduction, folder: Path) -> list[Path]:

@@ -142,9 +142,22 @@ def transition_energies(record: Record) -> Figure:
     return figure
 
 
+def route_figures(record: Record, template: ScenarioRecord) -> dict[str, Figure]:
+    """The figures by name; a run without transitions has none of their energies.
+
+    Args:
+        record: the robot's run.
+        template: the same scenario on the robot's template.
+    """
+    figures = {"scenario": route_figure(record, template)}
+    if _transitions(record):
+        figures["transitions"] = transition_energies(record)
+    return figures
+
+
 @checked
 def save_route_figures(record: Record, template: ScenarioRecord, folder: str | Path) -> list[Path]:
-    """Write the figures as PNG; a run without transitions has no figure of their energies.
+    """Write the :func:`route_figures` as PNG.
 
     Args:
         record: the robot's run.
@@ -154,10 +167,7 @@ def save_route_figures(record: Record, template: ScenarioRecord, folder: str | P
     Returns:
         The paths of the files.
     """
-    figures = {"scenario": route_figure(record, template)}
-    if _transitions(record):
-        figures["transitions"] = transition_energies(record)
     paths = []
-    for name, figure in figures.items():
+    for name, figure in route_figures(record, template).items():
         paths.append(save_figure(figure, Path(folder) / f"{name}.png"))
     return paths
