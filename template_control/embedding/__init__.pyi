@@ -14,9 +14,12 @@ from .planners.lqr import LqrPlanner as LqrPlanner
 from .planners.modified import ModifiedOptions as ModifiedOptions
 from .planners.modified import ModifiedPlanner as ModifiedPlanner
 from .planners.planner import Decision as Decision
+from .planners.planner import LandingPlanner as LandingPlanner
 from .planners.planner import Planner as Planner
 from .planners.running import RunningOptions as RunningOptions
 from .planners.running import RunningPlanner as RunningPlanner
+from .planners.transition import TransitionOptions as TransitionOptions
+from .planners.transition import TransitionPlanner as TransitionPlanner
 from .references.apex_pose import ApexStart as ApexStart
 from .references.apex_pose import apex_pose as apex_pose
 from .references.leg_forces import UnloadOptions as UnloadOptions
