@@ -167,7 +167,8 @@ def test_example_one_on_a_robot(tmp_path, capfd):
     asked = ["reproduce", "fig10", "--robot", "runner", "--output", str(tmp_path), "--json"]
     assert main(asked) == 0
     data = json.loads(capfd.readouterr().out)
-    assert data["completed"] and data["walking_steps_after"] == 20
+    assert data["completed"]
+    assert data["walking_steps_after"] == 20
     assert data["top_speed"] == pytest.approx(5.0, abs=0.05)
     assert data["speed_error_rms"] <= 0.15
     assert data["qp_failures"] == 0
