@@ -41,7 +41,9 @@ def settled(record):
 @pytest.mark.slow(seconds=20)
 @pytest.mark.parametrize("friction", [0.7, 0.5])
 def test_five_link_walks_runs_at_three_metres_a_second_and_walks(friction):
-    record = go("walk_run_walk.toml", "five-link", plant=tc.PlantOptions(friction=friction))
+    ground = tc.PlantOptions(friction=friction)
+    known = tc.EmbeddingOptions(friction=friction)
+    record = go("walk_run_walk.toml", "five-link", plant=ground, embedding=known)
     check(record)
     kinds = strides(record)
     runs = kinds.count("r")
