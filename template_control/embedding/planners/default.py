@@ -23,7 +23,8 @@ from template_control.slip.scenario.route import Route, ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.similarity import REFERENCE
 
-_STRIDE = 0.95  # duration of a running stride over sqrt(l0 / g)
+# A slow stride lasts 1.3 sqrt(l0 / g); a run that is behind its profile must be able to catch up.
+_STRIDE = 1.9
 _GENTLE = 0.05  # of g: up to this acceleration moderate controls keep up
 
 

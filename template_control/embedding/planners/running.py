@@ -64,7 +64,7 @@ class RunningOptions(Checked):
 
 
 AGILE = RunningOptions(change=(0.03, 0.3, 0.3), stiffness_range=(0.4, 2.5), pace=0.45)
-"""For accelerations of a tenth of g and more: the legs change their stiffness further."""
+"""For great accelerations: the legs change their stiffness further."""
 
 
 class RunningPlanner:
