@@ -50,11 +50,12 @@ def test_five_link_walks_runs_at_three_metres_a_second_and_walks(friction):
     assert kinds == ["w"] * 8 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * 15
     assert runs > 25
     speed = record.section_state[:, 0]
-    assert speed.max() > 2.85, "it comes to 3 m/s behind the profile"
-    assert speed.max() < 3.05
+    assert speed.max() == pytest.approx(3.0, abs=0.03)
+    error = speed[1:] - record.section_target[:-1, 0]
+    assert np.sqrt(np.mean(error**2)) < 0.06, "it keeps up with +-0.35 m/s^2"
     assert speed[9] == pytest.approx(1.3, abs=0.05), "the transition hits its first apex"
     share = record.metadata["summary"]["saturated_share"]
-    assert share < 0.01
+    assert share < 0.025
     settled(record)
 
 
