@@ -37,6 +37,10 @@ class Stranger:
     def __repr__(self):
         raise RuntimeError("no")
 
+    def _repr_pretty_(self, printer, cycle):
+        """As Hypothesis tells it, so that an example that fails can be told at all."""
+        printer.text("Stranger()")
+
 
 numbers = st.one_of(
     st.integers(-3, 3),

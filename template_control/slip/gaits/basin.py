@@ -149,7 +149,7 @@ class StepsToFall:
 def steps_to_fall(
     parameters: SlipParameters,
     z: Annotated[Array, Shape((None, 3), finite=False)],
-    controls: Annotated[Array, Shape((..., NUM_SLOTS))],
+    controls: Annotated[Array, Shape((..., NUM_SLOTS), finite=False)],
     goal: Annotated[Array, Shape((..., 2))],
     limit: Annotated[int, Range(1, _MOST)] = 50,
 ) -> StepsToFall:
@@ -158,7 +158,7 @@ def steps_to_fall(
     Args:
         parameters: the template.
         z: (n, 3) VLO states; NaN counts as no step.
-        controls: (n, NUM_SLOTS), or one (NUM_SLOTS,) for all.
+        controls: (n, NUM_SLOTS), or one (NUM_SLOTS,) for all; NaN counts as no step.
         goal: (n, 2) or (2,) y [m] and phi [rad] of the gait each should come to.
         limit: steps to take.
     """
