@@ -11,6 +11,7 @@ from template_control.paper.reproduction import Reproduction
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.library import load_robot
 from template_control.run.simulation import simulate
+from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind, Slot
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
@@ -126,16 +127,15 @@ def fig10_on(robot_name: str) -> Reproduction:
     with stdout_to_stderr():
         record = simulate(robot, route)
     template = simulate_scenario(route.scenario)
-    figures, m = record.metadata["summary"], record.metadata
+    figures, m = summarise(record, None), record.metadata
     names = [m["strides"][i] for i in record.stride]
-    error = record.section_state[1:, 0] - record.section_target[:-1, 0]
     torque, speed = figures["joint_torque"], figures["joint_speed"]
     data = {
         "robot": robot.name,
         "completed": m["arrived"],
-        "fall_reason": m["fall_reason"] or None,
+        "fall_reason": figures["fall_reason"],
         "top_speed": float(record.section_state[:, 0].max()),
-        "speed_error_rms": float(np.sqrt(np.mean(error**2))),
+        "speed_error_rms": figures["speed_error_rms"],
         "walking_steps_after": int(np.argmax([name != "w" for name in names[-2::-1]])),
         "joint_torque": torque,
         "joint_speed": speed,

@@ -45,6 +45,7 @@ class TransitionOptions(Checked):
         top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the foot
             would touch down at once.
         again: change of each, a share, that counts as 1 when a foot has landed.
+        again_bounds: of the stiffnesses when a foot has landed, as shares of those chosen before.
         rounds: Gauss-Newton steps.
 
     Raises:
@@ -58,6 +59,7 @@ class TransitionOptions(Checked):
     tolerance: tuple[Positive, Positive, Positive] = tuned((0.05, 0.01, 0.1), SPEED, LENGTH, SPEED)
     top_margin: NotNegative = tuned(0.005)
     again: Positive = tuned(0.3)
+    again_bounds: Interval = tuned((0.5, 2.0))
     rounds: Index = tuned(6)
 
     def __post_init__(self) -> None:
@@ -140,9 +142,8 @@ class TransitionPlanner:
         o, controls = self.options, decision.controls
         stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE]
         base = controls[stiff]
-        prior = Prior(
-            controls.copy(), stiff, base, o.again * base, 0.5 * base, 2.0 * base, o.rounds
-        )
+        lower, upper = (share * base for share in o.again_bounds)
+        prior = Prior(controls.copy(), stiff, base, o.again * base, lower, upper, o.rounds)
         tolerance = np.array(o.tolerance)[: len(target)]
         u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
         return self._decision(u, end, target)

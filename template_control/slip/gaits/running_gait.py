@@ -13,8 +13,9 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
+from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.gaits.flight import flying
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
@@ -146,10 +147,7 @@ def running_gait(
         )
     u = controls(angle, leg_stiffness, leg_stiffness)
     stride = simulate_stride(p, STRIDE_START["r"], APEX.state(z), u)
-    stance = stride.time_of(Event.REAR_LIFTOFF) - stride.time_of(Event.TOUCHDOWN)
-    return RunningGait(
-        name, p, z, u, float(stride.state[0]), stride.duration, 1.0 - stance / stride.duration
-    )
+    return RunningGait(name, p, z, u, float(stride.state[0]), stride.duration, flying(stride))
 
 
 def _symmetric_angle(parameters: SlipParameters, z: Array, stiffness: float) -> float | None:
