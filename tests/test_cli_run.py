@@ -68,6 +68,11 @@ def test_apex_and_speed_are_those_asked_for(tmp_path):
     np.testing.assert_allclose(target, [2.2, 0.985, 0.0])
 
 
+def test_a_wrong_apex_is_named_as_the_option_is(tmp_path, refused):
+    told = refused(["run", "--apex", "nan", "--output", str(tmp_path / "out")])
+    assert "--apex is nan: give a number" in told
+
+
 def test_a_run_is_repeated_by_its_file(ran, record, tmp_path):
     words = ["run", "--config", str(ran / "run.toml"), "--no-figures", "--output", str(tmp_path)]
     assert main(words) == 0

@@ -16,7 +16,14 @@ from template_control.slip.scenario.scenario import Scenario, load_scenario
 
 _PLANNERS = {options.kind: options for options in (LqrOptions, ModifiedOptions)}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)}
-_RANGES = {"speed": (0.01, 10.0), "touchdown_angle": (1.0, 89.0), "apex_height": (0.01, 10.0)}
+_GIVEN = {
+    "name": "gait",
+    "speed": "speed",
+    "touchdown_angle": "touchdown_angle",
+    "apex_height": "apex",
+}
+"""By the field of a :class:`GaitChoice`, the option that sets it."""
+_RANGES = {"speed": (0.01, 10.0), "touchdown_angle": (1.0, 89.0), "apex": (0.01, 10.0)}
 
 
 def add_gait_options(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +63,6 @@ def add_running_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--apex",
-        dest="apex_height",
         type=float,
         metavar="M",
         help="height of the apex; one that suits the speed if not given",
@@ -90,8 +96,7 @@ def gait_choice(options: argparse.Namespace, base: GaitChoice) -> GaitChoice:
         ParameterError: if a number is out of its range, or the options do not go together.
     """
     check_ranges(options, _RANGES)
-    given = {name: getattr(options, name, None) for name in ("name", *_RANGES)}
-    given["name"] = getattr(options, "gait", None)
+    given = {field: getattr(options, name, None) for field, name in _GIVEN.items()}
     return replace(base, **{name: value for name, value in given.items() if value is not None})
 
 
