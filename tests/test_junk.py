@@ -7,7 +7,7 @@ import warnings
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from junk import command_lines, files, junk, numbers, parameters, targets
+from junk import Stranger, command_lines, files, junk, numbers, parameters, targets
 
 from template_control.cli.main import main
 from template_control.errors import TemplateControlError
@@ -33,6 +33,20 @@ def one_call(data, folder):
     with warnings.catch_warnings(), contextlib.suppress(TemplateControlError):
         warnings.simplefilter("ignore")
         function(**{**good, **bad})
+
+
+def test_a_stranger_for_every_parameter(tmp_path):
+    """Each parameter of all that is public refuses, or leaves alone, what cannot be printed."""
+    missed = []
+    for function, good in targets(tmp_path).items():
+        for name in parameters(function, good):
+            try:
+                function(**{**good, name: Stranger()})
+            except TemplateControlError:
+                pass
+            except Exception as error:
+                missed.append(f"{function.__qualname__}: {name}: {type(error).__name__}: {error}")
+    assert not missed, missed
 
 
 @given(data=st.data())

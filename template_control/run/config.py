@@ -17,7 +17,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from template_control import settings, storage
-from template_control.checks.checked import Checked
+from template_control.checks.checked import Checked, checked
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
@@ -290,6 +290,7 @@ class RunConfig(Checked):
         assert isinstance(self.planner, LqrOptions)
         return LqrPlanner(gait, self.planner)
 
+    @checked
     def save(self, path: str | Path) -> Path:
         """Write it as TOML, every number included.
 
@@ -300,6 +301,7 @@ class RunConfig(Checked):
         return storage.write_text(path, _HEAD + settings.text(settings.to_table(self)))
 
     @classmethod
+    @checked
     def load(cls, path: str | Path) -> RunConfig:
         """Read what :meth:`save` wrote, or a file that has only some of its keys.
 

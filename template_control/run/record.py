@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control import storage
+from template_control.checks.checked import checked
 from template_control.run.data_frame import to_dataframe
 from template_control.run.old_record import from_walk
 
@@ -195,6 +196,7 @@ class Record:
         # A run knows no view. The root knows every room, and is asked when somebody wants to see.
         return importlib.import_module("template_control").plot(self, figure)
 
+    @checked
     def save(self, path: str | Path) -> Path:
         """Write the run as an ``.npz``, compressed unless Ctrl-C ended it: somebody waits then.
 
@@ -204,6 +206,7 @@ class Record:
         return storage.save(self, path, FORMAT, quick=bool(self.metadata.get("interrupted")))
 
     @classmethod
+    @checked
     def load(cls, path: str | Path) -> Record:
         """Read a run that :meth:`save` wrote, now or in an earlier version.
 

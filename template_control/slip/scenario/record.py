@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control import storage
+from template_control.checks.checked import checked
 
 Array = NDArray[np.float64]
 
@@ -133,11 +134,13 @@ class ScenarioRecord:
         )
         return float(np.corrcoef(forward, gravity)[0, 1])
 
+    @checked
     def save(self, path: str | Path) -> Path:
         """Write it; see :func:`~template_control.storage.save`."""
         return storage.save(self, path, FORMAT)
 
     @classmethod
+    @checked
     def load(cls, path: str | Path) -> ScenarioRecord:
         """Read it; see :func:`~template_control.storage.load`."""
         return storage.load(cls, path, FORMAT, _LAYOUT)
