@@ -108,7 +108,8 @@ def targets(folder):
     """By name, what is called and arguments that are good."""
     held = {"height": 0.98, "stiffness": 16.5e3}
     options = (
-        tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.MujocoOptions, tc.PlantOptions, tc.SensorOptions,
+        tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.MujocoOptions, tc.PlantOptions,
+        tc.SensorOptions,
         tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
         embedding.LoadOptions,
         embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,

@@ -149,7 +149,7 @@ def test_without_the_package_it_says_what_to_install(robot, monkeypatch):
 
 
 def test_a_contact_quicker_than_mujoco_takes_is_refused():
-    with pytest.raises(ParameterError, match="at least two time steps, 0.002 s"):
+    with pytest.raises(ParameterError, match=r"at least two time steps, 0\.002 s"):
         tc.MujocoOptions(contact_time=1e-3)
 
 
