@@ -292,6 +292,9 @@ class EmbeddingController:
         learnt = Learnt(self.load.factor, self.trim.acceleration, self.lean.correction)
         node = self.planning.decide(section, s, self.time, learnt)
         self._enter(node.name)
+        if len({report.goal.stride for report in self.reports[-2:]}) > 1:
+            # A walk after a run stands up; one that leant had other drifts.
+            self.trim.forget()
         self.lean.aim(self.reports[-1].goal)
         self.trim.expect(self.planning.path if self.station.trimmed else None, self.planner.gait)
         self._on_new_path()
