@@ -19,6 +19,7 @@ from template_control.checks.ranges import NotNegative, Positive, Range, Share, 
 from template_control.embedding.planners.planner import (
     Ahead,
     Decision,
+    JoiningPlanner,
     LandingPlanner,
     Planner,
     Planners,
@@ -34,11 +35,13 @@ from template_control.embedding.sensing import Sensed
 from template_control.embedding.touchdown import flown_angle, free_controls
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.breaking import RUN_ON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.catching import BreakingRoute
 from template_control.slip.scenario.route import Route, StrideGoal
 from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 
@@ -111,6 +114,8 @@ class StridePlanning:
         self.reaching = False
         self.arrived = False
         self._planned_at = 0.0
+        self._whole = True
+        self._broken = False
         self._passed = 0  # so many of the path's events are over
         self._feet = (0, 1)  # rear and front leg's at the start of the path
         self._simulator = StrideSimulator(route.parameters, automaton)
@@ -181,6 +186,7 @@ class StridePlanning:
         if goal is None:
             # The last stride goes on until whoever drives the robot ends the run.
             self.arrived, goal = True, self.reports[-1].goal
+        self._broken = False
         decision, start = self._plan(section, z, goal)
         seconds = time.perf_counter() - begin
         node = self.automaton.start(goal.stride)
@@ -202,6 +208,8 @@ class StridePlanning:
         if start is not z:
             state[:4] = section.state(start, state[0])
         self._follow(node, state, sensed, now)
+        if not decision.lasting and not self.arrived:
+            return self._break(node, sensed, now)
         return node
 
     def _plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
@@ -244,6 +252,7 @@ class StridePlanning:
         start = node.name
         first = self._simulator.run(start, state, u, toes)
         strides = [first]
+        self._whole = True
         # The next foothold must be known when the swing begins, before the next section. Where
         # no foot stands, the second one's is still further.
         more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
@@ -255,10 +264,12 @@ class StridePlanning:
             z = section.of(last.state)
             goal = self.route.ahead(section, z, at) or report.goal
             ahead = self.planner_of(goal).decide(z, goal.target)
+            self._whole = self._whole and ahead.lasting
             start = self.automaton.start(goal.stride).name
             toes = (float(last.toes[0]), float(last.toes[1]))
             strides.append(self._simulator.run(start, last.state, ahead.controls, toes))
             more -= 1
+        self._whole = self._whole and all(stride.completed for stride in strides)
         self.path = join(strides, self.options.path)
         self._feet = sensed.feet
         self._planned_at = now
@@ -297,6 +308,56 @@ class StridePlanning:
             return end.of(stride.state), stride.outcome
 
         return ahead
+
+    def _break(self, node: Node, sensed: Sensed, now: float) -> Node:
+        """Break into another stride where the present one cannot go on.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            now: time [s].
+
+        Returns:
+            The node that the robot is in then, with the path from there; ``node`` where the route
+            knows no other stride that the template completes.
+        """
+        report, route = self.reports[-1], self.route
+        if not isinstance(route, BreakingRoute):
+            return node
+        goal = route.instead(report.goal, float(sensed.state[2]))
+        if goal is None:
+            return node
+        planner = self.planner_of(goal)
+        if not isinstance(planner, JoiningPlanner):
+            return node
+        names = [node.name] if report.goal.stride == goal.stride else RUN_ON.get(node.name, ())
+        best: tuple[float, Node, Decision] | None = None
+        for name in names:
+            other = self.automaton.node(name)
+            left = max(self.due(Event.TOUCHDOWN), 0.0)
+            change = self.options.agility * min(left, self.options.foresight) ** 2
+            free = free_controls(self.automaton, other)
+            if other.edge(Event.TOUCHDOWN) is not None:
+                free = [int(Slot.TOUCHDOWN_ANGLE), *free]
+            decision = planner.join(
+                self._ahead(other, sensed), report.decision.controls, goal.target, free, change
+            )
+            if decision.feasible:
+                end = decision.predicted[: len(goal.target)]
+                cost = float(np.sum(((end - goal.target) / [0.05, 0.01]) ** 2))
+                if best is None or cost < best[0]:
+                    best = cost, other, decision
+        if best is None:
+            return node
+        _, other, decision = best
+        end = section_of(self.automaton.sections(other.name)[1])
+        self.reports[-1] = replace(
+            report, goal=goal, target=end.padded(goal.target), decision=decision
+        )
+        route.take(goal)
+        self._broken = True
+        self.follow(other, sensed, now)
+        return other
 
     def due(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
@@ -357,7 +418,7 @@ class StridePlanning:
             and now - self._planned_at > o.interval
         )
 
-    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> None:
+    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.
 
         Args:
@@ -365,9 +426,17 @@ class StridePlanning:
             sensed: the robot's state.
             phase_time: time along the path [s].
             now: time [s].
+
+        Returns:
+            The node that the robot is in then.
         """
         report = self.reports[-1]
-        if node.name == self.automaton.starts[report.goal.stride]:
+        if self._broken:
+            other = self._break(node, sensed, now)
+            if self._planned_at == now:
+                return other
+        lasting = True
+        if not self._broken and node.name == self.automaton.starts[report.goal.stride]:
             z = self._back_to_section(node, report, sensed)
             if z is not None:
                 left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
@@ -377,7 +446,11 @@ class StridePlanning:
                     z, report.goal.target, (angle - change, angle + change)
                 )
                 self.reports[-1] = replace(report, decision=decision)
+                lasting = decision.lasting
         self.follow(node, sensed, now)
+        if lasting and self._whole:
+            return node
+        return self._break(node, sensed, now)
 
     def _back_to_section(self, node: Node, report: SectionReport, sensed: Sensed) -> Array | None:
         """The section state from which the template would have come to where the robot is.

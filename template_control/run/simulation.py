@@ -192,6 +192,7 @@ def _loop(
     q, v, forces = np.zeros(robot.nv), np.zeros(robot.nv), np.zeros((2, 2))
     threshold = o.falls.contact_force * robot.mass * robot.gravity
     done, tick = 0, 0
+    begun: list[tuple[float, float]] = []
     while done < last and not planning.arrived:
         now = tick * dt
         plant.read(q, v)
@@ -204,7 +205,10 @@ def _loop(
         seconds = time.perf_counter() - start
         if sensors.noisy:
             robot.update(q, v)  # what is recorded is true
-        push = _push(o.pushes, controller, now)
+        if len(begun) < len(controller.reports):
+            # A step that changes into another stride keeps its pushes where they were.
+            begun.append((controller.reports[-1].time, controller.planner.gait.step_duration))
+        push = _push(o.pushes, begun, now)
         recorder.tick(Truth(now, q, v, forces, push), solution, seconds)
         reason = _fallen(plant, controller, q, o, now)
         if reason:
@@ -246,13 +250,16 @@ def _tell(report: SectionReport, number: int) -> None:
         _LOG.info("%.3f s, step %d: the planner left its own law", report.time, number)
 
 
-def _push(pushes: tuple[Push, ...], controller: EmbeddingController, now: float) -> float:
-    """Force of the pushes that act at time ``now`` [N]."""
+def _push(pushes: tuple[Push, ...], begun: list[tuple[float, float]], now: float) -> float:
+    """Force of the pushes that act at time ``now`` [N].
+
+    ``begun`` holds when each step began, and the duration of its gait's steps [s].
+    """
     total = 0.0
     for push in pushes:
-        if push.step < len(controller.reports):
-            duration = controller.planner.gait.step_duration
-            begin = controller.reports[push.step].time + push.phase * duration
+        if push.step < len(begun):
+            time, duration = begun[push.step]
+            begin = time + push.phase * duration
             if begin <= now < begin + push.duration:
                 total += push.impulse / push.duration
     return total

@@ -104,5 +104,23 @@ class LandingPlanner(Planner, Protocol):
         """
 
 
+@runtime_checkable
+class JoiningPlanner(LandingPlanner, Protocol):
+    """A planner of a stride that can be broken into within another one."""
+
+    def join(
+        self, ahead: Ahead, controls: Array, target: Array, free: Sequence[int], turn: float
+    ) -> Decision:
+        """Controls for a stride from where the robot is.
+
+        Args:
+            ahead: where it leads.
+            controls: (5,) u of the stride that is left.
+            target: (m,) state wanted at the section where the stride ends.
+            free: slots of the controls that it depends on.
+            turn: how far the touchdown angle can still change [rad].
+        """
+
+
 Planners = Mapping[str, Planner]
 """A planner for each kind of stride, by that kind's key in an automaton's ``starts``."""

@@ -148,6 +148,28 @@ class TransitionPlanner:
         u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
         return self._decision(u, end, target)
 
+    def join(
+        self, ahead: Ahead, controls: Array, target: Array, free: Sequence[int], turn: float
+    ) -> Decision:
+        """See :meth:`~.planner.JoiningPlanner.join`."""
+        o, p = self.options, self._before.gait.parameters
+        unit = p.mass * p.gravity / p.rest_length
+        own = dict(zip((int(slot) for slot in o.slots), np.array(o.base) * unit, strict=True))
+        slots = [s for s in free if s in own or s == Slot.TOUCHDOWN_ANGLE]
+        u = controls.copy()
+        for slot, value in own.items():
+            u[slot] = value
+        turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
+        base = u[slots]
+        low, high = o.again_bounds
+        lower = np.where(turns, base - turn, low * base)
+        upper = np.where(turns, base + turn, high * base)
+        change = np.where(turns, 0.05, o.again * base)
+        prior = Prior(u, slots, base, change, lower, upper, o.rounds)
+        tolerance = np.array(o.tolerance)[: len(target)]
+        u, end = solve_stride(FromHere(ahead, slots), target, prior, tolerance)
+        return self._decision(u, end, target)
+
     def _decision(self, u: Array, end: Array | None, wanted: Array) -> Decision:
         predicted = self._map.sections[1].padded(wanted if end is None else end)
         return Decision(u, predicted, end is not None, end is not None, False)
