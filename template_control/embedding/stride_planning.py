@@ -47,6 +47,8 @@ from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 
 Array = NDArray[np.float64]
 
+import os
+DEBUG = os.environ.get("DEB")
 _TOUCHDOWN = int(Event.TOUCHDOWN)
 
 
@@ -209,7 +211,7 @@ class StridePlanning:
             state[:4] = section.state(start, state[0])
         self._follow(node, state, sensed, now)
         if not decision.lasting and not self.arrived:
-            return self._break(node, sensed, now)
+            return self._break(node, sensed, 0.0, now)
         return node
 
     def _plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
@@ -309,7 +311,7 @@ class StridePlanning:
 
         return ahead
 
-    def _break(self, node: Node, sensed: Sensed, now: float) -> Node:
+    def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Break into another stride where the present one cannot go on.
 
         Args:
@@ -330,18 +332,20 @@ class StridePlanning:
         planner = self.planner_of(goal)
         if not isinstance(planner, JoiningPlanner):
             return node
-        names = [node.name] if report.goal.stride == goal.stride else RUN_ON.get(node.name, ())
+        names = RUN_ON.get(node.name, ())
         best: tuple[float, Node, Decision] | None = None
         for name in names:
             other = self.automaton.node(name)
-            left = max(self.due(Event.TOUCHDOWN), 0.0)
-            change = self.options.agility * min(left, self.options.foresight) ** 2
+            left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
+            change = min(self.options.agility * min(left, self.options.foresight) ** 2, 0.15)
             free = free_controls(self.automaton, other)
             if other.edge(Event.TOUCHDOWN) is not None:
                 free = [int(Slot.TOUCHDOWN_ANGLE), *free]
             decision = planner.join(
                 self._ahead(other, sensed), report.decision.controls, goal.target, free, change
             )
+            if DEBUG:
+                print(f"  {now:.3f} {node.name}->{name} v {sensed.state[2:4].round(2)} goal {goal.target.round(2)}", decision.feasible, decision.predicted.round(3), np.degrees(decision.controls[0]).round(1), (decision.controls[1:]/1e3).round(1))
             if decision.feasible:
                 end = decision.predicted[: len(goal.target)]
                 cost = float(np.sum(((end - goal.target) / [0.05, 0.01]) ** 2))
@@ -432,7 +436,7 @@ class StridePlanning:
         """
         report = self.reports[-1]
         if self._broken:
-            other = self._break(node, sensed, now)
+            other = self._break(node, sensed, phase_time, now)
             if self._planned_at == now:
                 return other
         lasting = True
@@ -450,7 +454,7 @@ class StridePlanning:
         self.follow(node, sensed, now)
         if lasting and self._whole:
             return node
-        return self._break(node, sensed, now)
+        return self._break(node, sensed, 0.0, now)
 
     def _back_to_section(self, node: Node, report: SectionReport, sensed: Sensed) -> Array | None:
         """The section state from which the template would have come to where the robot is.
