@@ -415,6 +415,8 @@ class StridePlanning:
             now: time [s].
         """
         o = self.options
+        if self._broken and not self._whole and now - self._planned_at > o.interval:
+            return True
         return (
             not self.reaching
             and abs(deviation) > o.speed
