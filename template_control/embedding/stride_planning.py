@@ -337,7 +337,7 @@ class StridePlanning:
         for name in names:
             other = self.automaton.node(name)
             left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
-            change = min(self.options.agility * min(left, self.options.foresight) ** 2, 0.15)
+            change = min(self.options.agility * min(left, self.options.foresight) ** 2, 0.25)
             free = free_controls(self.automaton, other)
             if other.edge(Event.TOUCHDOWN) is not None:
                 free = [int(Slot.TOUCHDOWN_ANGLE), *free]

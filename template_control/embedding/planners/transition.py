@@ -164,6 +164,9 @@ class TransitionPlanner:
         low, high = o.again_bounds
         lower = np.where(turns, base - turn, low * base)
         upper = np.where(turns, base + turn, high * base)
+        import os
+        u0=base.copy()
+        base=np.where(turns, np.clip(np.radians(float(os.environ.get("A0","75"))),lower,upper), base)
         change = np.where(turns, 0.05, o.again * base)
         prior = Prior(u, slots, base, change, lower, upper, o.rounds)
         tolerance = np.array(o.tolerance)[: len(target)]

@@ -110,7 +110,8 @@ class CatchingRoute:
         self._runs = True
 
     def _run(self, stride: str, speed: float) -> StrideGoal:
-        wanted = min(max(speed - self.options.brake, self._slowest), self._fastest)
+        brake = 0.0 if stride == "wr" else self.options.brake
+        wanted = min(max(speed - brake, self._slowest), self._fastest)
         height = suited_height(wanted / self._unit) * self.parameters.rest_length
         then = "rw" if stride == "r" else "r"
         return StrideGoal(stride, np.array([wanted, height]), wanted, then=then)
