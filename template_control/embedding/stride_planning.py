@@ -18,8 +18,9 @@ from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, Range, Share, Triple
 from template_control.embedding.planners.planner import (
     Ahead,
+    BreakingPlanner,
     Decision,
-    JoiningPlanner,
+    Free,
     LandingPlanner,
     Planner,
     Planners,
@@ -47,8 +48,6 @@ from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 
 Array = NDArray[np.float64]
 
-import os
-DEBUG = os.environ.get("DEB")
 _TOUCHDOWN = int(Event.TOUCHDOWN)
 
 
@@ -314,14 +313,11 @@ class StridePlanning:
     def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Break into another stride where the present one cannot go on.
 
-        Args:
-            node: of the automaton, the robot's.
-            sensed: the robot's state.
-            now: time [s].
+        Arguments as for :meth:`reconsider`.
 
         Returns:
             The node that the robot is in then, with the path from there; ``node`` where the route
-            knows no other stride that the template completes.
+            knows no other stride, or the template does not complete it.
         """
         report, route = self.reports[-1], self.route
         if not isinstance(route, BreakingRoute):
@@ -329,39 +325,31 @@ class StridePlanning:
         goal = route.instead(report.goal, float(sensed.state[2]))
         if goal is None:
             return node
-        planner = self.planner_of(goal)
-        if not isinstance(planner, JoiningPlanner):
+        planner, name = self.planner_of(goal), node.name
+        if goal.stride != report.goal.stride:
+            name = RUN_ON.get(name, "")
+        if name not in self.automaton.index or not isinstance(planner, BreakingPlanner):
             return node
-        names = RUN_ON.get(node.name, ())
-        best: tuple[float, Node, Decision] | None = None
-        for name in names:
-            other = self.automaton.node(name)
-            left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
-            change = min(self.options.agility * min(left, self.options.foresight) ** 2, 0.25)
-            free = free_controls(self.automaton, other)
-            if other.edge(Event.TOUCHDOWN) is not None:
-                free = [int(Slot.TOUCHDOWN_ANGLE), *free]
-            decision = planner.join(
-                self._ahead(other, sensed), report.decision.controls, goal.target, free, change
-            )
-            if DEBUG:
-                print(f"  {now:.3f} {node.name}->{name} v {sensed.state[2:4].round(2)} goal {goal.target.round(2)}", decision.feasible, decision.predicted.round(3), np.degrees(decision.controls[0]).round(1), (decision.controls[1:]/1e3).round(1))
-            if decision.feasible:
-                end = decision.predicted[: len(goal.target)]
-                cost = float(np.sum(((end - goal.target) / [0.05, 0.01]) ** 2))
-                if best is None or cost < best[0]:
-                    best = cost, other, decision
-        if best is None:
+        other = self.automaton.node(name)
+        slots = free_controls(self.automaton, other)
+        if other.edge(Event.TOUCHDOWN) is not None:
+            slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
+        free = Free(slots, self._turn(phase_time))
+        ahead = self._ahead(other, sensed)
+        decision = planner.break_into(ahead, report.decision.controls, goal.target, free)
+        if not decision.feasible:
             return node
-        _, other, decision = best
-        end = section_of(self.automaton.sections(other.name)[1])
-        self.reports[-1] = replace(
-            report, goal=goal, target=end.padded(goal.target), decision=decision
-        )
-        route.take(goal)
+        target = section_of(self.automaton.sections(name)[1]).padded(goal.target)
+        self.reports[-1] = replace(report, goal=goal, target=target, decision=decision)
         self._broken = True
+        route.take(goal)
         self.follow(other, sensed, now)
         return other
+
+    def _turn(self, phase_time: float) -> float:
+        """How far the swing foot can still change the touchdown angle [rad]."""
+        left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
+        return self.options.agility * min(left, self.options.foresight) ** 2
 
     def due(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
@@ -409,20 +397,18 @@ class StridePlanning:
     def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
         """Whether a disturbance has carried the robot away from its path.
 
+        Where the robot has broken into a stride, a path that leads nowhere is one as well.
+
         Args:
             deviation: of the forward speed from the path's [m/s].
             phase_time: time along the path [s].
             now: time [s].
         """
         o = self.options
-        if self._broken and not self._whole and now - self._planned_at > o.interval:
-            return True
-        return (
-            not self.reaching
-            and abs(deviation) > o.speed
-            and phase_time > o.interval
-            and now - self._planned_at > o.interval
-        )
+        if self.reaching or now - self._planned_at <= o.interval:
+            return False
+        lost = self._broken and not self._whole
+        return lost or (abs(deviation) > o.speed and phase_time > o.interval)
 
     def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.
@@ -439,14 +425,14 @@ class StridePlanning:
         report = self.reports[-1]
         if self._broken:
             other = self._break(node, sensed, phase_time, now)
-            if self._planned_at == now:
-                return other
+            if self._planned_at < now:
+                self.follow(node, sensed, now)
+            return other
         lasting = True
-        if not self._broken and node.name == self.automaton.starts[report.goal.stride]:
+        if node.name == self.automaton.starts[report.goal.stride]:
             z = self._back_to_section(node, report, sensed)
             if z is not None:
-                left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
-                change = self.options.agility * min(left, self.options.foresight) ** 2
+                change = self._turn(phase_time)
                 angle = float(report.decision.controls[Slot.TOUCHDOWN_ANGLE])
                 decision = self.planner.decide(
                     z, report.goal.target, (angle - change, angle + change)
@@ -454,9 +440,7 @@ class StridePlanning:
                 self.reports[-1] = replace(report, decision=decision)
                 lasting = decision.lasting
         self.follow(node, sensed, now)
-        if lasting and self._whole:
-            return node
-        return self._break(node, sensed, 0.0, now)
+        return node if lasting and self._whole else self._break(node, sensed, 0.0, now)
 
     def _back_to_section(self, node: Node, report: SectionReport, sensed: Sensed) -> Array | None:
         """The section state from which the template would have come to where the robot is.

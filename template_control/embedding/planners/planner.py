@@ -83,6 +83,19 @@ class Ahead(Protocol):
         """(m,) state at the section where it ends, and how it ends, with (5,) controls ``u``."""
 
 
+@dataclass(frozen=True)
+class Free:
+    """What of the controls can still be chosen within a stride.
+
+    Attributes:
+        slots: that the rest of the stride depends on.
+        turn: how far the touchdown angle can still be changed [rad].
+    """
+
+    slots: Sequence[int]
+    turn: float
+
+
 @runtime_checkable
 class LandingPlanner(Planner, Protocol):
     """A planner that knows how to choose again where a foot has landed.
@@ -105,20 +118,17 @@ class LandingPlanner(Planner, Protocol):
 
 
 @runtime_checkable
-class JoiningPlanner(LandingPlanner, Protocol):
-    """A planner of a stride that can be broken into within another one."""
+class BreakingPlanner(Planner, Protocol):
+    """A planner of a stride that the robot can break into within another one."""
 
-    def join(
-        self, ahead: Ahead, controls: Array, target: Array, free: Sequence[int], turn: float
-    ) -> Decision:
-        """Controls for a stride from where the robot is.
+    def break_into(self, ahead: Ahead, controls: Array, target: Array, free: Free) -> Decision:
+        """Controls for a stride from within.
 
         Args:
             ahead: where it leads.
             controls: (5,) u of the stride that is left.
             target: (m,) state wanted at the section where the stride ends.
-            free: slots of the controls that it depends on.
-            turn: how far the touchdown angle can still change [rad].
+            free: what of u can still be chosen.
         """
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-RUN_ON: Mapping[str, tuple[str, ...]] = {
-    "SS_av^w": ("SS_av^wr",),
-    "DS_sc^w": ("DS_sc^wr",),
-    "DS_sd^w": ("DS_sd^wr",),
-    "SS_bv^w": ("SS_av^wr",),
-    **{name:(name,) for name in ("SS_av^wr","F_aa^wr","DS_sc^wr","DS_sd^wr","SS_sc^wr","SS_sd^wr")}
+RUN_ON: Mapping[str, str] = {
+    "SS_av^w": "SS_av^wr",
+    "DS_sc^w": "DS_sc^wr",
+    "DS_sd^w": "DS_sd^wr",
+    "SS_bv^w": "SS_av^wr",
 }
+"""By a walking node: where the walk-to-run stride goes on from there.
+
+In single stance the other foot lands next, whether VLO is past or not.
+"""

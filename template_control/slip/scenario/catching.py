@@ -18,106 +18,106 @@ from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
 
+_WALKS, _BREAKS, _RUNS, _SLOWS = "w", "wr", "r", "rw"
+
 
 @dataclass(frozen=True)
 class CatchOptions(Checked):
-    """How a run that catches a walk goes.
+    """When a run that catches a walk is over.
 
     Attributes:
-        brake: the speed aimed at is this far below the present one [m/s].
-        walkable: at an apex with at most this speed the robot walks again [m/s].
+        walkable: at an apex with at most this speed the robot walks again.
+        slow: dx/dt at apex that the run slows down to; less than ``walkable``, as no run settles
+            on its speed exactly.
     """
 
-    brake: Positive = tuned(0.2, SPEED)
     walkable: Positive = tuned(1.45, SPEED)
+    slow: Positive = tuned(1.35, SPEED)
 
 
 @runtime_checkable
 class BreakingRoute(Route, Protocol):
-    """A route that knows another way where a stride cannot be completed."""
+    """A route that knows another way where a stride cannot go on."""
 
     def instead(self, goal: StrideGoal, speed: float) -> StrideGoal | None:
-        """Another stride than ``goal``'s, that the robot can break into within it.
+        """What the robot can break into within a stride; the route does not go on.
 
         Args:
-            goal: what the route asked for.
+            goal: of that stride.
             speed: dx/dt now [m/s].
 
         Returns:
-            None where there is none.
+            None where there is nothing.
         """
 
     def take(self, goal: StrideGoal) -> None:
-        """The robot has broken into ``goal``."""
+        """The robot has broken into ``goal``, which :meth:`instead` has named."""
 
 
 class CatchingRoute:
-    """Follows another route; where the walk cannot go on the robot runs until it is slow.
+    """Follows another route; where its walk cannot go on, the robot runs until it is slow.
 
     Args:
         route: that is followed.
-        options: how the run goes.
+        options: when the run is over.
     """
 
     @checked
     def __init__(self, route: Route, options: CatchOptions | None = None) -> None:
-        self.inner = route
+        self.followed = route
         self.parameters: SlipParameters = route.parameters
         self.section: Section = route.section
         self.start: Array = route.start
         self.options = scaled(options or CatchOptions(), Scale.of(route.parameters))
-        self._slowest, self._fastest = running_speeds(route.parameters)
-        self._unit = float(np.sqrt(self.parameters.gravity * self.parameters.rest_length))
         self._walk: StrideGoal | None = None
-        self._runs = False
+        self._caught = False
 
     @property
     def endless(self) -> bool:
         """See :class:`~.route.Route`."""
-        return self.inner.endless
+        return self.followed.endless
 
     def reset(self) -> None:
-        """See :meth:`~.route.Route.reset`."""
-        self.inner.reset()
-        self._walk, self._runs = None, False
+        """See :class:`~.route.Route`."""
+        self.followed.reset()
+        self._walk, self._caught = None, False
 
     def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
         """See :meth:`~.route.Route.next`."""
-        if self._runs and section == APEX:
-            return self._run_on(float(z[0]))
-        self._runs = False
-        goal = self.inner.next(section, z, now)
-        if goal is not None and goal.stride == "w":
-            self._walk = goal
+        on = self._run_on(section, z)
+        if on is not None:
+            return on
+        self._caught = False
+        goal = self.followed.next(section, z, now)
+        self._walk = goal if goal is not None and goal.stride == _WALKS else None
         return goal
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
         """See :meth:`~.route.Route.ahead`."""
-        if self._runs and section == APEX:
-            return self._run_on(float(z[0]))
-        return self.inner.ahead(section, z, now)
+        return self._run_on(section, z) or self.followed.ahead(section, z, now)
 
     def instead(self, goal: StrideGoal, speed: float) -> StrideGoal | None:
-        """See :class:`BreakingRoute`."""
-        if goal.stride not in ("w", "wr") or self._walk is None or speed < self._slowest:
+        """See :meth:`BreakingRoute.instead`: a run, for a walk that is fast enough for it."""
+        slowest, fastest = running_speeds(self.parameters)
+        breaks = goal.stride == _WALKS or (self._caught and goal.stride == _BREAKS)
+        if not breaks or speed < slowest:
             return None
-        if goal.stride == "wr" and not self._runs:
-            return None
-        return self._run("wr", speed)
+        return self._run(_BREAKS, min(speed, fastest), _RUNS)
 
     def take(self, goal: StrideGoal) -> None:
-        """See :class:`BreakingRoute`."""
-        self._runs = True
+        """See :meth:`BreakingRoute.take`."""
+        self._caught = True
 
-    def _run(self, stride: str, speed: float) -> StrideGoal:
-        brake = 0.0 if stride == "wr" else self.options.brake
-        wanted = min(max(speed - brake, self._slowest), self._fastest)
-        height = suited_height(wanted / self._unit) * self.parameters.rest_length
-        then = "rw" if stride == "r" else "r"
-        return StrideGoal(stride, np.array([wanted, height]), wanted, then=then)
+    def _run_on(self, section: Section, z: Array) -> StrideGoal | None:
+        """The stride that begins at an apex of the run that catches a walk."""
+        if not self._caught or section is not APEX or self._walk is None:
+            return None
+        if z[0] > self.options.walkable:
+            return self._run(_RUNS, self.options.slow, _SLOWS)
+        return replace(self._walk, stride=_SLOWS, then=_WALKS)
 
-    def _run_on(self, speed: float) -> StrideGoal:
-        assert self._walk is not None
-        if speed > self.options.walkable:
-            return self._run("r", speed)
-        return replace(self._walk, stride="rw", then="w")
+    def _run(self, stride: str, speed: float, then: str) -> StrideGoal:
+        p = self.parameters
+        relative = speed / float(np.sqrt(p.gravity * p.rest_length))
+        target = np.array([speed, suited_height(relative) * p.rest_length])
+        return StrideGoal(stride, target, speed, then=then)
