@@ -117,6 +117,7 @@ class StridePlanning:
         self._planned_at = 0.0
         self._whole = True
         self._broken = False
+        self._excess = 0.0  # speed at the stride's section less the wanted, and what came on top
         self._passed = 0  # so many of the path's events are over
         self._feet = (0, 1)  # rear and front leg's at the start of the path
         self._simulator = StrideSimulator(route.parameters, automaton)
@@ -188,6 +189,7 @@ class StridePlanning:
             # The last stride goes on until whoever drives the robot ends the run.
             self.arrived, goal = True, self.reports[-1].goal
         self._broken = False
+        self._excess = float(z[0] - goal.target[0])
         decision, start = self._plan(section, z, goal)
         seconds = time.perf_counter() - begin
         node = self.automaton.start(goal.stride)
@@ -322,7 +324,7 @@ class StridePlanning:
         report, route = self.reports[-1], self.route
         if not isinstance(route, BreakingRoute):
             return node
-        goal = route.instead(report.goal, float(sensed.state[2]))
+        goal = route.instead(report.goal, float(sensed.state[2]), self._excess)
         if goal is None:
             return node
         planner, name = self.planner_of(goal), node.name
@@ -407,8 +409,10 @@ class StridePlanning:
         o = self.options
         if self.reaching or now - self._planned_at <= o.interval:
             return False
-        lost = self._broken and not self._whole
-        return lost or (abs(deviation) > o.speed and phase_time > o.interval)
+        if abs(deviation) > o.speed and phase_time > o.interval:
+            self._excess += deviation
+            return True
+        return self._broken and not self._whole
 
     def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.

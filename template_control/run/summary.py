@@ -38,6 +38,12 @@ def _sections(record: Record) -> dict[str, Any]:
     }
 
 
+def _strides(record: Record) -> dict[str, int]:
+    """How many strides of each kind were completed."""
+    names = [record.metadata["strides"][i] for i in record.stride[:-1]]
+    return {name: names.count(name) for name in dict.fromkeys(names)}
+
+
 def _flight_share(record: Record) -> dict[str, float | None]:
     """Share of the time without a foot on the ground, of the robot and of its gait."""
     touching = record.contact_force[:, :, 1] > 0.0
@@ -80,7 +86,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         path: where it was saved; None where it was not.
 
     Returns:
-        robot, gait, steps, fell, fall_reason, duration, mean_speed, vlo_target and
+        robot, gait, steps, strides (count by kind), fell, fall_reason, duration, mean_speed, vlo_target and
         vlo_mean_last_50 (speed, height, vertical_speed), or where the run ends at an apex
         apex_target and apex_mean_last_50 (speed, height), speed_error_rms (of dx/dt where
         strides end, against their targets), com_error_rms and com_error_max (x, y, while a foot is
@@ -99,6 +105,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "robot": m["robot"],
         "gait": m["gait"],
         "steps": record.steps,
+        "strides": _strides(record),
         "fell": record.fell,
         "fall_reason": m["fall_reason"] or None,
         "duration": duration,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Positive
+from template_control.checks.ranges import NotNegative, Positive
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.maps.section import APEX, Section
 from template_control.slip.parameters import SlipParameters
@@ -23,14 +23,16 @@ _WALKS, _BREAKS, _RUNS, _SLOWS = "w", "wr", "r", "rw"
 
 @dataclass(frozen=True)
 class CatchOptions(Checked):
-    """When a run that catches a walk is over.
+    """When a run catches a walk, and when it is over.
 
     Attributes:
+        excess: a walk that is faster than wanted by less than this is left to its planner.
         walkable: at an apex with at most this speed the robot walks again.
         slow: dx/dt at apex that the run slows down to; less than ``walkable``, as no run settles
             on its speed exactly.
     """
 
+    excess: NotNegative = tuned(0.42, SPEED)
     walkable: Positive = tuned(1.45, SPEED)
     slow: Positive = tuned(1.35, SPEED)
 
@@ -39,12 +41,14 @@ class CatchOptions(Checked):
 class BreakingRoute(Route, Protocol):
     """A route that knows another way where a stride cannot go on."""
 
-    def instead(self, goal: StrideGoal, speed: float) -> StrideGoal | None:
+    def instead(self, goal: StrideGoal, speed: float, excess: float) -> StrideGoal | None:
         """What the robot can break into within a stride; the route does not go on.
 
         Args:
             goal: of that stride.
             speed: dx/dt now [m/s].
+            excess: by which the robot is faster than wanted [m/s]: dx/dt at the section less the
+                target's, and what disturbances have added since.
 
         Returns:
             None where there is nothing.
@@ -96,11 +100,12 @@ class CatchingRoute:
         """See :meth:`~.route.Route.ahead`."""
         return self._run_on(section, z) or self.followed.ahead(section, z, now)
 
-    def instead(self, goal: StrideGoal, speed: float) -> StrideGoal | None:
+    def instead(self, goal: StrideGoal, speed: float, excess: float) -> StrideGoal | None:
         """See :meth:`BreakingRoute.instead`: a run, for a walk that is fast enough for it."""
         slowest, fastest = running_speeds(self.parameters)
-        breaks = goal.stride == _WALKS or (self._caught and goal.stride == _BREAKS)
-        if not breaks or speed < slowest:
+        walks = goal.stride == _WALKS and excess >= self.options.excess
+        on = self._caught and goal.stride == _BREAKS
+        if speed < slowest or not (walks or on):
             return None
         return self._run(_BREAKS, min(speed, fastest), _RUNS)
 
