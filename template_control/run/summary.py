@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,9 @@ from template_control.slip.maps.section import section_of
 
 Array = NDArray[np.float64]
 
+
+STRIDES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
+"""The kinds of stride in words."""
 
 _STATE = ("speed", "height", "vertical_speed")
 _LAST = 50  # strides that a gait is judged by
@@ -38,10 +42,14 @@ def _sections(record: Record) -> dict[str, Any]:
     }
 
 
-def _strides(record: Record) -> dict[str, int]:
-    """How many strides of each kind were completed."""
-    names = [record.metadata["strides"][i] for i in record.stride[:-1]]
-    return {name: names.count(name) for name in dict.fromkeys(names)}
+def completed_strides(record: Record) -> dict[str, int]:
+    """How many strides of each kind a run completed, the kinds in words.
+
+    Args:
+        record: the run.
+    """
+    kinds = Counter(record.metadata["strides"][i] for i in record.stride[:-1])
+    return {STRIDES.get(kind, kind): count for kind, count in kinds.items()}
 
 
 def _flight_share(record: Record) -> dict[str, float | None]:
@@ -86,9 +94,9 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         path: where it was saved; None where it was not.
 
     Returns:
-        robot, gait, steps, strides (count by kind), fell, fall_reason, duration, mean_speed, vlo_target and
-        vlo_mean_last_50 (speed, height, vertical_speed), or where the run ends at an apex
-        apex_target and apex_mean_last_50 (speed, height), speed_error_rms (of dx/dt where
+        robot, gait, steps, strides (count by kind), fell, fall_reason, duration, mean_speed,
+        vlo_target and vlo_mean_last_50 (speed, height, vertical_speed), or where the run ends at
+        an apex apex_target and apex_mean_last_50 (speed, height), speed_error_rms (of dx/dt where
         strides end, against their targets), com_error_rms and com_error_max (x, y, while a foot is
         to stand), com_error_flight_rms (x, y; None without flight), joint_torque (per joint peak,
         rms, limit), joint_speed (per joint peak, limit), saturated_share, qp_failures,
@@ -105,7 +113,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "robot": m["robot"],
         "gait": m["gait"],
         "steps": record.steps,
-        "strides": _strides(record),
+        "strides": completed_strides(record),
         "fell": record.fell,
         "fall_reason": m["fall_reason"] or None,
         "duration": duration,
