@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +24,11 @@ from template_control.cli.report.output import INTERRUPTED
 from template_control.cli.report.run_table import nearest_text
 from template_control.errors import ParameterError
 from template_control.run.record import Record
-from template_control.run.summary import summarise
+from template_control.run.summary import STRIDES, summarise
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.terminal import plain_console
 
-_NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
 _FROM_THE_RUN = (
     "robot", "fell", "fall_reason", "duration", "speed_error_rms", "nearest_speed_taken",
     "joint_torque", "joint_speed", "saturated_share", "qp_failures", "real_time_factor",
@@ -94,13 +92,12 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
         path: where the run was saved; None if it was not.
     """
     run = summarise(record, path)
-    kinds = Counter(record.metadata["strides"][i] for i in record.stride[:-1])
     error = template.section_state[1:, 0] - template.wanted_speed
     return {
         **{name: run[name] for name in _FROM_THE_RUN},
         "completed": bool(record.metadata["arrived"]),
         "top_speed": float(record.section_state[:, 0].max()),
-        "strides": {name: kinds.get(kind, 0) for kind, name in _NAMES.items()},
+        "strides": {name: run["strides"].get(name, 0) for name in STRIDES.values()},
         "template": {
             "completed": template.completed,
             "top_speed": float(template.section_state[:, 0].max()),

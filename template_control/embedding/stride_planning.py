@@ -18,7 +18,9 @@ from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, Range, Share, Triple
 from template_control.embedding.planners.planner import (
     Ahead,
+    BreakingPlanner,
     Decision,
+    Free,
     LandingPlanner,
     Planner,
     Planners,
@@ -34,11 +36,13 @@ from template_control.embedding.sensing import Sensed
 from template_control.embedding.touchdown import flown_angle, free_controls
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.breaking import RUN_ON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.catching import BreakingRoute
 from template_control.slip.scenario.route import Route, StrideGoal
 from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 
@@ -111,6 +115,9 @@ class StridePlanning:
         self.reaching = False
         self.arrived = False
         self._planned_at = 0.0
+        self._whole = True
+        self._broken = False
+        self._excess = 0.0  # speed at the stride's section less the wanted, and what came on top
         self._passed = 0  # so many of the path's events are over
         self._feet = (0, 1)  # rear and front leg's at the start of the path
         self._simulator = StrideSimulator(route.parameters, automaton)
@@ -181,6 +188,8 @@ class StridePlanning:
         if goal is None:
             # The last stride goes on until whoever drives the robot ends the run.
             self.arrived, goal = True, self.reports[-1].goal
+        self._broken = False
+        self._excess = float(z[0] - goal.target[0])
         decision, start = self._plan(section, z, goal)
         seconds = time.perf_counter() - begin
         node = self.automaton.start(goal.stride)
@@ -202,6 +211,8 @@ class StridePlanning:
         if start is not z:
             state[:4] = section.state(start, state[0])
         self._follow(node, state, sensed, now)
+        if not decision.lasting and not self.arrived:
+            return self._break(node, sensed, 0.0, now)
         return node
 
     def _plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
@@ -244,6 +255,7 @@ class StridePlanning:
         start = node.name
         first = self._simulator.run(start, state, u, toes)
         strides = [first]
+        self._whole = True
         # The next foothold must be known when the swing begins, before the next section. Where
         # no foot stands, the second one's is still further.
         more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
@@ -255,10 +267,12 @@ class StridePlanning:
             z = section.of(last.state)
             goal = self.route.ahead(section, z, at) or report.goal
             ahead = self.planner_of(goal).decide(z, goal.target)
+            self._whole = self._whole and ahead.lasting
             start = self.automaton.start(goal.stride).name
             toes = (float(last.toes[0]), float(last.toes[1]))
             strides.append(self._simulator.run(start, last.state, ahead.controls, toes))
             more -= 1
+        self._whole = self._whole and all(stride.completed for stride in strides)
         self.path = join(strides, self.options.path)
         self._feet = sensed.feet
         self._planned_at = now
@@ -302,6 +316,47 @@ class StridePlanning:
             return end.of(stride.state), stride.outcome
 
         return ahead
+
+    def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
+        """Break into another stride where the present one cannot go on.
+
+        Arguments as for :meth:`reconsider`.
+
+        Returns:
+            The node that the robot is in then, with the path from there; ``node`` where the route
+            knows no other stride, or the template does not complete it.
+        """
+        report, route = self.reports[-1], self.route
+        if not isinstance(route, BreakingRoute):
+            return node
+        goal = route.instead(report.goal, float(sensed.state[2]), self._excess)
+        if goal is None:
+            return node
+        planner, name = self.planner_of(goal), node.name
+        if goal.stride != report.goal.stride:
+            name = RUN_ON.get(name, "")
+        if name not in self.automaton.index or not isinstance(planner, BreakingPlanner):
+            return node
+        other = self.automaton.node(name)
+        slots = free_controls(self.automaton, other)
+        if other.edge(Event.TOUCHDOWN) is not None:
+            slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
+        free = Free(slots, self._turn(phase_time))
+        ahead = self._ahead(other, sensed)
+        decision = planner.break_into(ahead, report.decision.controls, goal.target, free)
+        if not decision.feasible:
+            return node
+        target = section_of(self.automaton.sections(name)[1]).padded(goal.target)
+        self.reports[-1] = replace(report, goal=goal, target=target, decision=decision)
+        self._broken = True
+        route.take(goal)
+        self.follow(other, sensed, now)
+        return other
+
+    def _turn(self, phase_time: float) -> float:
+        """How far the swing foot can still change the touchdown angle [rad]."""
+        left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
+        return self.options.agility * min(left, self.options.foresight) ** 2
 
     def due(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
@@ -349,20 +404,22 @@ class StridePlanning:
     def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
         """Whether a disturbance has carried the robot away from its path.
 
+        Where the robot has broken into a stride, a path that leads nowhere is one as well.
+
         Args:
             deviation: of the forward speed from the path's [m/s].
             phase_time: time along the path [s].
             now: time [s].
         """
         o = self.options
-        return (
-            not self.reaching
-            and abs(deviation) > o.speed
-            and phase_time > o.interval
-            and now - self._planned_at > o.interval
-        )
+        if self.reaching or now - self._planned_at <= o.interval:
+            return False
+        if abs(deviation) > o.speed and phase_time > o.interval:
+            self._excess += deviation
+            return True
+        return self._broken and not self._whole
 
-    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> None:
+    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.
 
         From then on the stiffnesses of what is left are, to a planner that has ``land``.
@@ -372,19 +429,29 @@ class StridePlanning:
             sensed: the robot's state.
             phase_time: time along the path [s].
             now: time [s].
+
+        Returns:
+            The node that the robot is in then.
         """
         report, planner = self.reports[-1], self.planner
+        if self._broken:
+            other = self._break(node, sensed, phase_time, now)
+            if self._planned_at < now:
+                self.follow(node, sensed, now)
+            return other
+        lasting = True
         if node.name == self.automaton.starts[report.goal.stride]:
             z = self._back_to_section(node, report, sensed)
             if z is not None:
-                left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
-                change = self.options.agility * min(left, self.options.foresight) ** 2
+                change = self._turn(phase_time)
                 angle = float(report.decision.controls[Slot.TOUCHDOWN_ANGLE])
                 decision = planner.decide(z, report.goal.target, (angle - change, angle + change))
                 self.reports[-1] = replace(report, decision=decision)
+                lasting = decision.lasting
         elif isinstance(planner, LandingPlanner):
             self._choose_again(planner, node, sensed)
         self.follow(node, sensed, now)
+        return node if lasting and self._whole else self._break(node, sensed, 0.0, now)
 
     def _back_to_section(self, node: Node, report: SectionReport, sensed: Sensed) -> Array | None:
         """The section state from which the template would have come to where the robot is.
