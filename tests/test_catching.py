@@ -183,7 +183,7 @@ def kinds(record):
     return [record.metadata["strides"][i] for i in record.stride[:-1]]
 
 
-@pytest.mark.slow(seconds=30)
+@pytest.mark.slow(seconds=15)
 @pytest.mark.parametrize(("name", "phase"), [("runner", 0.3), ("five-link", 0.7)])
 def test_a_robot_that_is_pushed_too_hard_runs_and_walks_on(name, phase):
     robot = tc.load_robot(name)

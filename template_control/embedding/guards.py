@@ -97,7 +97,7 @@ class RobotGuards:
         if stretch > self.options.overstretch * self.parameters.rest_length:
             return True
         if stretch > 0.0 and due == np.inf:
-            return True
+            return True  # the template's leg would not push any more
         angle = self.options.liftoff_angle
         if angle is None:
             return due <= 0.0

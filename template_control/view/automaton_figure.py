@@ -39,6 +39,7 @@ _INK, _SECTION, _CHOICE, _PANEL = "#3a3f45", "#b3202a", "#8a9099", "#f9f9f7"
 # Lengths in drawing units; _INCH inches each.
 _INCH, _NODE, _PITCH, _ROW, _PAD = 0.58, 0.66, 2.85, 3.5, 1.2
 _TITLE, _GAP = 0.35, 0.12
+_AROUND = 0.95  # height of an arrow that goes around nodes
 _FONT = 11.0
 _SAMPLES = np.linspace(0.0, 1.0, 41)
 
@@ -168,6 +169,16 @@ def _route(start: Array, end: Array, bend: float, outward: Array) -> Array:
     return np.array([start + rim * aims[0], control, end + rim * aims[1]])
 
 
+def _hides(a: str, b: str, centre: dict[str, Array]) -> bool:
+    """Whether the straight line from ``a`` to ``b`` passes through another node."""
+    span = centre[b] - centre[a]
+    others = np.array([point - centre[a] for name, point in centre.items() if name not in (a, b)])
+    if a == b or not others.size:
+        return False
+    share = np.clip(others @ span / (span @ span), 0.0, 1.0)
+    return bool(np.any(np.linalg.norm(others - share[:, None] * span, axis=1) < _NODE))
+
+
 def _along(arrow: Array, t: Array) -> tuple[Array, Array]:
     """Points of ``arrow`` and unit vectors to its left, each (n, 2), at ``t`` in [0, 1]."""
     a, b, c = arrow
@@ -238,10 +249,13 @@ def _draw_edges(
     """Arrows first, then each label where it hides least."""
     edges = list(successions(automaton))
     pairs = [(a, b) for a, b, _ in edges]
-    arrows = []
+    arrows, around = [], 0
     for i, (a, b, edge) in enumerate(edges):
         same = pairs[:i].count((a, b))
         bend = 0.18 * (same + (a != b and (b, a) in pairs))
+        if _hides(a, b, centre):
+            around += 1
+            bend += (-1) ** around * 2.0 * _AROUND / np.linalg.norm(centre[b] - centre[a])
         gait = [centre[n] for n in gaits(automaton)[automaton.node(a).gait]]
         # A gait of one node has its own loop face the middle, where there is room.
         away = centre[a] - np.mean(gait, axis=0) - 1e-9 * centre[a]
