@@ -226,7 +226,7 @@ def changed(name, *edges):
         (
             changed("F_aa^h", *(Edge(event, "F_aa^h") for event in Event)),
             {},
-            rf"node F_aa\^h has 10 edges: give it at most {MAX_EDGES}",
+            rf"node F_aa\^h has 11 edges: give it at most {MAX_EDGES}",
         ),
         ((*HOP.nodes, HOP.nodes[0]), {}, r"two nodes are called F_aa\^h"),
     ],

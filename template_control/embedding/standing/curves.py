@@ -1,0 +1,155 @@
+"""Curves of the CoM between two feet on the ground: to rest, or to where the rear foot lifts off.
+
+Of the quintics tried, that is taken which keeps the centre of pressure between the feet and the
+legs within their reach, and of those the quickest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.references.timed import Quintic, derivatives, quintics
+from template_control.embedding.standing.options import StandingOptions
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+_SAMPLES = np.linspace(0.0, 1.0, 21)
+_PEAK = 10.0 / np.sqrt(3.0)  # acceleration of a quintic from rest to rest, over distance / time^2
+
+
+class Found(NamedTuple):
+    """The best curve found.
+
+    Attributes:
+        pieces: in order.
+        excess: by how far the centre of pressure leaves the feet, or a leg its reach [m].
+        cost: excess beyond the slack, and time [m].
+    """
+
+    pieces: tuple[Quintic, ...]
+    excess: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class BetweenFeet:
+    """Both feet on the ground.
+
+    Attributes:
+        toes: x of the rear and the front one [m].
+        parameters: the template.
+        options: tuning, for that template.
+    """
+
+    toes: tuple[float, float]
+    parameters: SlipParameters
+    options: StandingOptions
+
+    @property
+    def spacing(self) -> float:
+        """Of the feet [m]."""
+        return self.toes[1] - self.toes[0]
+
+    def place(self, share: float) -> float:
+        """x at a share of the spacing [m]."""
+        return self.toes[0] + share * self.spacing
+
+    def at_rest(self, x: float) -> Array:
+        """(2, 3) x and y, each position, velocity and acceleration, at rest over ``x``."""
+        return np.array([[x, 0.0, 0.0], [self.options.height, 0.0, 0.0]])
+
+    def excess(self, coefficients: Array, durations: Array) -> Array:
+        """By how far curves leave the feet or their legs' reach (n,) [m].
+
+        Args:
+            coefficients: (n, 2, 6) of x and y.
+            durations: (n,) [s].
+        """
+        times = durations[:, None, None] * _SAMPLES
+        found = derivatives(coefficients[:, :, None, :], times)
+        (x, ax), (y, ay) = ((found[:, axis, :, 0], found[:, axis, :, 2]) for axis in (0, 1))
+        p = x - y * ax / (self.parameters.gravity + ay)
+        rear, front = self.toes
+        low, high = min(rear, front), max(rear, front)
+        outside = np.maximum(low - p, p - high)
+        reach = self.options.reach * self.parameters.rest_length
+        far = np.maximum(np.hypot(x - rear, y), np.hypot(x - front, y)) - reach
+        return np.asarray(np.maximum(outside, far).max(axis=1).clip(0.0))
+
+    def best(self, start: Array, ends: Array) -> tuple[Found, int]:
+        """The best quintic to one of several ends, and the end's number.
+
+        Args:
+            start: (2, 3) x and y, each position, velocity and acceleration.
+            ends: (n, 2, 3) the same.
+        """
+        o = self.options
+        durations = np.linspace(*o.durations, o.trials[0])
+        many = np.repeat(ends, len(durations), axis=0)
+        each = np.tile(durations, len(ends))
+        curves = quintics(start, many, each)
+        excess = self.excess(curves, each)
+        cost = np.maximum(excess - o.slack, 0.0) + o.pace * each
+        i = int(np.argmin(cost))
+        found = Found((Quintic(curves[i], float(each[i])),), float(excess[i]), float(cost[i]))
+        return found, i // len(durations)
+
+    def to_rest(self, start: Array) -> Found:
+        """To rest where the centre of pressure allows, then to the place to stand.
+
+        Args:
+            start: (2, 3) x and y, each position, velocity and acceleration.
+        """
+        o = self.options
+        margin = min(o.margin, 0.5 * abs(self.spacing))
+        low, high = min(self.toes) + margin, max(self.toes) - margin
+        wanted = self.place(o.place)
+        places = np.append(np.linspace(low, high, o.trials[1]), wanted)
+        stop, i = self.best(start, np.array([self.at_rest(x) for x in places]))
+        there, _ = self.best(start, self.at_rest(wanted)[None])
+        if there.cost <= stop.cost + o.pace * o.durations[1]:
+            return there
+        return self._joined(stop, self._shift(places[i], wanted))
+
+    def to_liftoff(self, start: Array, ends: Array, shifts: bool) -> tuple[Found, int]:
+        """To one of several states in which the rear foot lifts off.
+
+        Args:
+            start: (2, 3) x and y, each position, velocity and acceleration.
+            ends: (n, 2, 3) the same.
+            shifts: whether the CoM may first move back, and rest there.
+
+        Returns:
+            What was found, and the number of the end.
+        """
+        found, number = self.best(start, ends)
+        if not shifts or found.excess <= self.options.slack:
+            return found, number
+        for share in self.options.shifts:
+            place = self.place(share)
+            back, _ = self.best(start, self.at_rest(place)[None])
+            away, i = self.best(self.at_rest(place), ends)
+            joined = self._joined(back, away)
+            if joined.cost < found.cost:
+                found, number = joined, i
+        return found, number
+
+    def _shift(self, start: float, end: float) -> Found:
+        """From rest to rest [m], within half of what the centre of pressure allows."""
+        room = 0.5 * min(abs(end - toe) for toe in self.toes) + self.options.slack
+        height = self.options.height / self.parameters.gravity
+        time = max(np.sqrt(_PEAK * abs(end - start) * height / room), self.options.durations[0])
+        curve = quintics(self.at_rest(start), self.at_rest(end), np.array(time))
+        return Found((Quintic(curve, float(time)),), 0.0, self.options.pace * float(time))
+
+    def _joined(self, first: Found, second: Found) -> Found:
+        return Found(
+            first.pieces + second.pieces,
+            max(first.excess, second.excess),
+            first.cost + second.cost,
+        )

@@ -1,0 +1,57 @@
+"""Tuning of standing, of starting to walk and of stopping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Angle, Count, Interval, NotNegative, Positive, Share
+from template_control.slip.similarity import LENGTH, TIME, tuned
+
+
+@dataclass(frozen=True)
+class StandingOptions(Checked):
+    """How a robot stands, and which curves of the CoM it may follow between its feet.
+
+    Attributes:
+        height: of the CoM over the ground [m].
+        spacing: of the feet where a run begins [m].
+        place: of the CoM between the feet, as a share of their spacing from the rear one.
+        beat: a stand is planned anew, and the route asked, after this time [s].
+        shifts: places, as shares of the spacing, from which a start may set off.
+        durations: shortest and longest quintic [s].
+        trials: number of durations tried between them, and of rest places.
+        slack: the centre of pressure may be this far outside the feet [m]; the QP keeps it
+            inside, and the CoM a little off its curve.
+        margin: a rest place is this far from either foot [m].
+        reach: longest way from a foot on the ground to the CoM, over l0.
+        pace: a second more of a curve counts as this much excess [m/s].
+        short: shortest and longest last way of the CoM in single stance before VLO [s].
+        vault: stiffness of the leg that slowly passes under the CoM, k l0 / (m g).
+        slowest: speed at VLO of the slowest step, over sqrt(g l0).
+        steps: shortest and longest step [m].
+        closing: the feet should stand this far apart where a walk ends [m].
+        narrow: a metre further apart counts as this much excess.
+        angles: touchdown angles tried, and the flattest [rad].
+        stiffness: least and greatest of the leg before touchdown, over k0.
+    """
+
+    height: Positive = tuned(0.97, LENGTH)
+    spacing: Positive = tuned(0.3, LENGTH)
+    place: Share = tuned(0.5)
+    beat: Positive = tuned(0.5, TIME)
+    shifts: tuple[Share, ...] = tuned((0.05, 0.15, 0.25, 0.35, 0.45))
+    durations: Interval = tuned((0.3, 1.2), TIME)
+    trials: tuple[Count, Count] = tuned((10, 9))
+    slack: NotNegative = tuned(0.005, LENGTH)
+    margin: NotNegative = tuned(0.01, LENGTH)
+    reach: Positive = tuned(1.0)
+    pace: NotNegative = tuned(0.002, LENGTH)
+    short: Interval = tuned((0.03, 0.4), TIME)
+    vault: Positive = tuned(64.0)
+    slowest: Positive = tuned(0.05)
+    steps: Interval = tuned((0.15, 0.55), LENGTH)
+    closing: Positive = tuned(0.25, LENGTH)
+    narrow: NotNegative = tuned(0.02)
+    angles: tuple[Count, Angle] = tuned((12, 1.08))
+    stiffness: Interval = tuned((0.8, 4.0))

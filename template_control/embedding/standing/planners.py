@@ -1,0 +1,228 @@
+"""Planners of standing, of starting to walk, of changing a walk's speed and of stopping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.references.timed import Quintic, chained, timed_stride
+from template_control.embedding.standing.curves import BetweenFeet, Found
+from template_control.embedding.standing.options import StandingOptions
+from template_control.embedding.standing.vaults import Touchdown, Vault, Vaults, controls_of
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.dynamics.stride import Stride
+from template_control.slip.maps.section import PADDED, REST
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale, scaled
+
+Array = NDArray[np.float64]
+
+_STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
+
+
+@dataclass(frozen=True)
+class StandingGait:
+    """To stand still, as a gait: a stride that returns to its state.
+
+    Attributes:
+        parameters: the template.
+        state: (3,) dx/dt, y, dy/dt at rest.
+        controls: (5,) zero: no spring carries.
+        step_duration: of a beat [s].
+        step_length: 0 [m].
+        stride: its kind.
+        name: for tables and records.
+    """
+
+    parameters: SlipParameters
+    state: Array
+    controls: Array
+    step_duration: float
+    step_length: float = 0.0
+    stride: str = "s"
+    name: str = "standing"
+
+    @classmethod
+    def of(cls, parameters: SlipParameters, options: StandingOptions) -> StandingGait:
+        """The stand that ``options``, for that template, tell."""
+        state = np.array([0.0, options.height, 0.0])
+        return cls(parameters, state, controls_of(0.0, 0.0, 0.0), options.beat)
+
+
+class _Curves:
+    """What the planners here have in common: they learn nothing, and plan curves.
+
+    Args:
+        vaults: passes over a leg.
+        automaton: of the strides.
+    """
+
+    def __init__(self, vaults: Vaults, automaton: Automaton = AUTOMATON) -> None:
+        self.parameters, self.options = vaults.parameters, vaults.options
+        self.vaults, self.automaton = vaults, automaton
+        self.gait = StandingGait.of(self.parameters, self.options)
+        self.offset: Array = np.zeros(PADDED)
+
+    def reset(self) -> None:
+        """See :class:`~.planner.Planner`."""
+
+    def observe(self, decision: Decision, z: Array) -> None:
+        """See :meth:`~.planner.Planner.observe`."""
+
+    def _between(self, toes: tuple[float, float]) -> BetweenFeet:
+        return BetweenFeet(toes, self.parameters, self.options)
+
+    def _fits(self, found: Found) -> bool:
+        return found.excess <= self.options.slack
+
+    def _away(
+        self, feet: BetweenFeet, start: Array, speeds: list[float], shifts: bool
+    ) -> tuple[Found, Vault, Array]:
+        """To a liftoff from which VLO is reached, with the first speed that there is a curve to.
+
+        Args:
+            feet: on the ground.
+            start: (2, 3) x and y, each position, velocity, acceleration.
+            speeds: at VLO [m/s], the best first.
+            shifts: whether the CoM may first move back.
+
+        Returns:
+            The curve, the VLO, and the (2, 3) state at liftoff.
+        """
+
+        def to(speed: float) -> tuple[Found, Vault, Array]:
+            vault = self.vaults.at(speed)
+            ends = self.vaults.approach(vault, feet.toes[1])
+            found, i = feet.to_liftoff(start, ends, shifts)
+            return found, vault, ends[i]
+
+        best = to(speeds[0])
+        if self._fits(best[0]):
+            return best
+        # The further from the best speed, the sooner there is a curve.
+        low, high = 0, len(speeds) - 1
+        last = to(speeds[high])
+        if not self._fits(last[0]):
+            return min((best, last), key=lambda each: each[0].cost)
+        while high - low > 1:
+            middle = (low + high) // 2
+            found = to(speeds[middle])
+            if self._fits(found[0]):
+                high, last = middle, found
+            else:
+                low = middle
+        return last
+
+    def _leaving(
+        self, node: str, feet: BetweenFeet, way: tuple[Found, Vault, Array], u: Array
+    ) -> tuple[Array, Stride]:
+        """Controls and stride of a curve to a liftoff, and on to VLO."""
+        found, vault, liftoff = way
+        controls = u.copy()
+        controls[Slot.K_SD] = vault.stiffness
+        first = timed_stride(self.automaton, node, found.pieces, feet.toes)
+        state = liftoff[:, :2].T.ravel()
+        second = self.vaults.arriving(first.node, state, controls, first.toes)
+        return controls, chained(first, second)
+
+
+class StandPlanner(_Curves):
+    """Stands: the CoM comes to rest between the feet, and stays there."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`."""
+        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :class:`~.planner.CurvePlanner`."""
+        found = self._between(toes).to_rest(start)
+        pieces = [*found.pieces]
+        left = self.options.beat - sum(piece.duration for piece in pieces)
+        if left > 0.0:
+            still = np.zeros_like(pieces[-1].coefficients)
+            still[:, 0] = pieces[-1].end()[:, 0]
+            pieces.append(Quintic(still, left))
+        stride = timed_stride(self.automaton, node, pieces, toes)
+        return replace(decision, feasible=self._fits(found)), stride
+
+
+class StartPlanner(_Curves):
+    """Starts to walk: back, and forward to where the rear foot lifts off."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`."""
+        wanted = self.gait.state if target is None else target
+        return Decision(controls_of(_STEEP, 0.0, 0.0), np.array(wanted), True, True, False)
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :class:`~.planner.CurvePlanner`."""
+        feet = self._between(toes)
+        speeds = self.vaults.between(float(decision.predicted[0]), 0.0)
+        way = self._away(feet, start, speeds, True)
+        controls, stride = self._leaving(node, feet, way, decision.controls)
+        return replace(decision, controls=controls, feasible=self._fits(way[0])), stride
+
+
+class StopPlanner(StandPlanner):
+    """Makes the last step, and comes to rest."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`: the step after which the CoM comes to rest best."""
+        o, k = self.options, self.vaults.passing(z)
+
+        def cost(step: Touchdown) -> float:
+            found = self._between(step.toes).to_rest(step.state)
+            return found.cost + o.narrow * abs(step.toes[1] - o.closing)
+
+        steps = self.vaults.touchdowns(z, k, angles)
+        angle = min(steps, key=cost).angle if steps else _STEEP
+        u = controls_of(angle, k, k)
+        return Decision(u, REST.padded(self.gait.state), bool(steps), True, False)
+
+
+class ChangePlanner(_Curves):
+    """Makes a step to another speed."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`: the step after which the speed can be had best."""
+        wanted = float(z[0] if target is None else target[0])
+        k = self.vaults.passing(z)
+        vault = self.vaults.at(self.vaults.between(wanted, wanted)[0])
+
+        def cost(step: Touchdown) -> float:
+            feet = self._between(step.toes)
+            ends = self.vaults.approach(vault, step.toes[1])
+            return feet.to_liftoff(step.state, ends, False)[0].cost
+
+        steps = self.vaults.touchdowns(z, k, angles)
+        angle = min(steps, key=cost).angle if steps else _STEEP
+        predicted = vault.vlo.copy()
+        return Decision(controls_of(angle, k, vault.stiffness), predicted, bool(steps), True, False)
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :class:`~.planner.CurvePlanner`."""
+        feet = self._between(toes)
+        present = float(start[0, 1])
+        speeds = self.vaults.between(float(decision.predicted[0]), present)
+        way = self._away(feet, start, speeds, False)
+        controls, stride = self._leaving(node, feet, way, decision.controls)
+        return replace(decision, controls=controls, feasible=self._fits(way[0])), stride

@@ -1,0 +1,183 @@
+"""How the template passes over one leg, from a liftoff to VLO and from there to a touchdown.
+
+A gait passes at its own height with its own stiffness. Slower than any gait, the leg keeps its
+length as it passes, k (l0 - y) = m (g - v^2 / l0), and is the stiffer the slower it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.standing.options import StandingOptions
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import Event, Slot
+from template_control.slip.dynamics.stride import Stride, StrideSimulator
+from template_control.slip.gaits.gait import Gait
+from template_control.slip.maps.section import VLO
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+_FLAT = 0.02  # touchdown angle of a leg that does not land [rad]
+_STATES = 12
+_SPEEDS = 25  # that gaits and vaults are kept for
+
+
+class Family(NamedTuple):
+    """Walking gaits by their speed at VLO.
+
+    Attributes:
+        gait: with a speed [m/s].
+        speeds: slowest and fastest [m/s].
+    """
+
+    gait: Callable[[float], Gait]
+    speeds: tuple[float, float]
+
+
+class Vault(NamedTuple):
+    """A VLO, and the leg that passes it.
+
+    Attributes:
+        vlo: (3,) dx/dt, y, dy/dt [m/s, m, m/s].
+        stiffness: of the leg [N/m].
+    """
+
+    vlo: Array
+    stiffness: float
+
+
+class Touchdown(NamedTuple):
+    """Where a step lands.
+
+    Attributes:
+        angle: its touchdown angle [rad].
+        state: (2, 3) x and y of the CoM, each position, velocity, acceleration.
+        toes: x of the rear and the front foot [m].
+    """
+
+    angle: float
+    state: Array
+    toes: tuple[float, float]
+
+
+class Vaults:
+    """Passes over a leg by their speed at VLO.
+
+    Args:
+        parameters: the template.
+        options: tuning, for that template.
+        family: the gaits.
+        automaton: of the strides.
+    """
+
+    def __init__(
+        self,
+        parameters: SlipParameters,
+        options: StandingOptions,
+        family: Family,
+        automaton: Automaton = AUTOMATON,
+    ) -> None:
+        self.parameters, self.options, self.family = parameters, options, family
+        self._simulator = StrideSimulator(parameters, automaton)
+        self._node = automaton.start("w").name
+        self._known: dict[float, Vault] = {}
+        unit = float(np.sqrt(parameters.gravity * parameters.rest_length))
+        self._speeds = np.linspace(options.slowest * unit, family.speeds[1], _SPEEDS)
+
+    def between(self, wanted: float, present: float) -> list[float]:
+        """Speeds at VLO from the wanted one to the present one [m/s]."""
+        low, high = min(wanted, present), max(wanted, present)
+        inside = [float(v) for v in self._speeds if low < v < high]
+        first = float(np.clip(wanted, self._speeds[0], self._speeds[-1]))
+        return [first, *sorted(inside, key=lambda v: abs(v - wanted))]
+
+    def at(self, speed: float) -> Vault:
+        """The pass with a speed at VLO [m/s]."""
+        if speed not in self._known:
+            self._known[speed] = self._made(speed)
+        return self._known[speed]
+
+    def _made(self, speed: float) -> Vault:
+        p, (slowest, fastest) = self.parameters, self.family.speeds
+        if speed >= slowest:
+            gait = self.family.gait(min(speed, fastest))
+            return Vault(gait.state, float(gait.controls[Slot.K_SD]))
+        own = float(self.family.gait(slowest).controls[Slot.K_SD])
+        stiff = self.options.vault * p.mass * p.gravity / p.rest_length
+        share = np.clip(2.0 * (1.0 - speed / slowest), 0.0, 1.0)
+        stiffness = float(own + share * (stiff - own))
+        load = p.mass * (p.gravity - speed**2 / p.rest_length)
+        return Vault(np.array([speed, p.rest_length - load / stiffness, 0.0]), stiffness)
+
+    def approach(self, vault: Vault, toe: float) -> Array:
+        """States (n, 2, 3) on the way to VLO over ``toe`` [m], the last of them first.
+
+        The template's dynamics are the same forward and backward.
+        """
+        speed, height, vertical = vault.vlo
+        u = self._controls(_FLAT, vault.stiffness)
+        past = self._simulator.run(self._node, [0.0, height, speed, -vertical], u)
+        shortest, longest = self.options.short
+        # Whatever ends the stride: before it the leg pushes.
+        longest = min(longest, 0.98 * past.duration)
+        x, y, dx, dy, ddx, ddy = past.sample(np.linspace(shortest, longest, _STATES)).T
+        return np.stack(
+            (np.stack((toe - x, dx, -ddx), axis=-1), np.stack((y, -dy, ddy), axis=-1)), axis=1
+        )
+
+    def passing(self, z: Array) -> float:
+        """Stiffness with which the leg passes from VLO state ``z`` (3,) [N/m]."""
+        p, (least, most) = self.parameters, self.options.stiffness
+        load = p.mass * (p.gravity - z[0] ** 2 / p.rest_length)
+        bent = max(p.rest_length - float(z[1]), 1e-6)
+        return float(np.clip(load / bent, least * p.leg_stiffness, most * p.leg_stiffness))
+
+    def touchdowns(self, z: Array, stiffness: float, angles: tuple[float, float]) -> list[Touchdown]:
+        """Steps that may be made from a VLO.
+
+        Args:
+            z: (3,) state at VLO.
+            stiffness: of the leg [N/m].
+            angles: least and greatest touchdown angle [rad].
+        """
+        p, (number, flattest) = self.parameters, self.options.angles
+        shortest, longest = self.options.steps
+        top = float(np.arcsin(min(z[1] / p.rest_length, 1.0))) - 0.005
+        tried = np.unique(np.clip(np.linspace(flattest, top, number), *angles))
+        found = []
+        for angle in tried:
+            stride = self._simulator.run(
+                self._node, VLO.state(z), self._controls(float(angle), stiffness)
+            )
+            time = stride.time_of(Event.TOUCHDOWN)
+            if np.isfinite(time):
+                x, y, dx, dy, ddx, ddy = self._before(stride, time)
+                toe = float(x + p.rest_length * np.cos(angle))
+                if shortest <= toe <= longest or angles[0] == angles[1]:
+                    state = np.array([[x, dx, ddx], [y, dy, ddy]])
+                    found.append(Touchdown(float(angle), state, (0.0, toe)))
+        return found
+
+    def _before(self, stride: Stride, time: float) -> Array:
+        """(6,) the CoM as a foot touches down, not yet carried by it."""
+        return stride.sample(time * (1.0 - 1e-9))[0]
+
+    def arriving(self, node: str, state: Array, controls: Array, toes: Array) -> Stride:
+        """The template's stride from a node on; arguments as for its simulator."""
+        return self._simulator.run(node, state, controls, toes)
+
+    def _controls(self, angle: float, stiffness: float) -> Array:
+        return controls_of(angle, stiffness, stiffness)
+
+
+def controls_of(angle: float, before: float, after: float) -> Array:
+    """Controls (5,) of a step: touchdown angle [rad], stiffness before and after [N/m]."""
+    u = np.zeros(len(Slot))
+    u[[Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]] = angle, before, after
+    return u
