@@ -32,9 +32,11 @@ from .robot_template import paper_gait as paper_gait
 from .robot_template import template_for as template_for
 from .section_report import SectionReport as SectionReport
 from .standing.options import StandingOptions as StandingOptions
+from .standing.default import standing_planners as standing_planners
 from .standing.planners import ChangePlanner as ChangePlanner
 from .standing.planners import StandingGait as StandingGait
 from .standing.planners import StandPlanner as StandPlanner
 from .standing.planners import StartPlanner as StartPlanner
 from .standing.planners import StopPlanner as StopPlanner
+from .standing.pose import standing_pose as standing_pose
 from .stride_planning import ReplanOptions as ReplanOptions

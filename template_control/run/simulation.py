@@ -17,6 +17,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.section_report import SectionReport
+from template_control.embedding.standing.pose import standing_pose
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
@@ -30,7 +31,7 @@ from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.maps.section import APEX
+from template_control.slip.maps.section import APEX, REST
 from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.scenario import Scenario
 
@@ -137,6 +138,8 @@ def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array
     z = route.start if o.start is None else np.array(o.start)
     if pose is None and route.section == APEX:
         pose = _apex_pose(controller, z[: APEX.dimension])
+    if pose is None and route.section == REST:
+        pose = standing_pose(route.parameters)
     if pose is not None:
         q, v = state_in(robot, pose)
         controller.start(pose.rear, pose.swung)

@@ -89,7 +89,7 @@ class BetweenFeet:
             ends: (n, 2, 3) the same.
         """
         o = self.options
-        durations = np.linspace(*o.durations, o.trials[0])
+        durations = np.geomspace(*o.durations, o.trials[0])
         many = np.repeat(ends, len(durations), axis=0)
         each = np.tile(durations, len(ends))
         curves = quintics(start, many, each)

@@ -22,6 +22,7 @@ from template_control.slip.similarity import Scale, scaled
 
 Array = NDArray[np.float64]
 
+_TRIALS = 6  # of speeds, where a step's angle is chosen
 _STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
 
 
@@ -202,19 +203,30 @@ class ChangePlanner(_Curves):
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
         """See :class:`~.planner.Planner`: the step after which the speed can be had best."""
-        wanted = float(z[0] if target is None else target[0])
+        present = float(z[0])
+        wanted = present if target is None else float(target[0])
         k = self.vaults.passing(z)
-        vault = self.vaults.at(self.vaults.between(wanted, wanted)[0])
-
-        def cost(step: Touchdown) -> float:
-            feet = self._between(step.toes)
-            ends = self.vaults.approach(vault, step.toes[1])
-            return feet.to_liftoff(step.state, ends, False)[0].cost
-
         steps = self.vaults.touchdowns(z, k, angles)
-        angle = min(steps, key=cost).angle if steps else _STEEP
+        speeds = self.vaults.between(wanted, present)
+        vault = self.vaults.at(speeds[0])
+        angle = self._angle(steps, speeds[:: 1 + len(speeds) // _TRIALS]) if steps else _STEEP
         predicted = vault.vlo.copy()
         return Decision(controls_of(angle, k, vault.stiffness), predicted, bool(steps), True, False)
+
+    def _angle(self, steps: list[Touchdown], speeds: list[float]) -> float:
+        """The touchdown angle of the step after which the first of the speeds can be had."""
+        for speed in speeds:
+            vault = self.vaults.at(speed)
+            found = [
+                self._between(step.toes).to_liftoff(
+                    step.state, self.vaults.approach(vault, step.toes[1]), False
+                )[0]
+                for step in steps
+            ]
+            best = min(range(len(steps)), key=lambda i: found[i].cost)
+            if self._fits(found[best]):
+                break
+        return steps[best].angle
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
