@@ -171,7 +171,12 @@ class EmbeddingController:
         half = 0.5 * planner.gait.step_duration
         for leg in self.station.swings:
             self.feet.lift(self.feet.of[leg], self.robot, (swung or (half, half))[leg])
-        self.ground = float(self.robot.foot_position[rear, 1]) if node.stance else 0.0
+        if node.stance:
+            # Of two feet on the ground the front one landed last.
+            self.feet.landed = self.feet.of[self.station.stance[-1]]
+        self.ground = (
+            float(self.robot.foot_position[self.feet.landed, 1]) if node.stance else 0.0
+        )
         self._sense(np.zeros(2, dtype=bool))
         self._decide(section)
 

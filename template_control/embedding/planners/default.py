@@ -16,8 +16,10 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
+from template_control.embedding.standing.default import standing_planners
+from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
-from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.gaits.walking_family import speed_range, walking_gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.route import Route, ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario
@@ -61,12 +63,19 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
 
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
+    scenario = route.scenario if isinstance(route, ScenarioRoute) else None
+    standing: Planners = {}
+    if scenario is not None and scenario.stands:
+        relative = scenario.stand_height / p.rest_length * REFERENCE.rest_length
+        standing = standing_planners(p, StandingOptions(height=relative))
+        speed = next((s.speed for s in scenario.segments if s.speed), speed_range(p)[0])
     walk = walking or LqrPlanner(walking_gait(p, speed))
-    options = _keeping_up(route.scenario) if isinstance(route, ScenarioRoute) else None
+    options = None if scenario is None else _keeping_up(scenario)
     run = RunningPlanner(runs(slowest), options)
     return {
         "w": walk,
         "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
         "r": run,
         "rw": TransitionPlanner("rw", run, partial(walking_gait, p), RUN_TO_WALK),
+        **standing,
     }

@@ -44,12 +44,12 @@ def quintics(start: Array, ends: Array, durations: Array) -> Array:
     """Coefficients (..., 2, 6) of the quintics from ``start`` to ``ends``, constant term first.
 
     Args:
-        start: (2, 3) x and y, each position, velocity, acceleration.
+        start: (..., 2, 3) x and y, each position, velocity, acceleration.
         ends: (..., 2, 3) the same at the end.
         durations: (...) [s].
     """
     t = np.asarray(durations, dtype=float)[..., None]
-    p, v, a = start[:, 0], start[:, 1], start[:, 2]
+    p, v, a = start[..., 0], start[..., 1], start[..., 2]
     distance = ends[..., 0] - p - v * t - 0.5 * a * t**2
     speed = (ends[..., 1] - v - a * t) * t
     rate = (ends[..., 2] - a) * t**2

@@ -81,54 +81,72 @@ class BetweenFeet:
         far = np.maximum(np.hypot(x - rear, y), np.hypot(x - front, y)) - reach
         return np.asarray(np.maximum(outside, far).max(axis=1).clip(0.0))
 
+    def loaded(self, start: Array) -> Array:
+        """Starts (n, 2, 3) with accelerations that load the front foot at once.
+
+        Args:
+            start: (2, 3) x and y, each position, velocity and acceleration; the first of them.
+        """
+        x, y = start[:, 0]
+        lift = self.parameters.gravity + start[1, 2]
+        starts = np.repeat(start[None], 1 + len(self.options.loads), axis=0)
+        for i, share in enumerate(self.options.loads, 1):
+            starts[i, 0, 2] = (x - self.place(share)) * lift / y
+        return starts
+
     def best(self, start: Array, ends: Array) -> tuple[Found, int]:
         """The best quintic to one of several ends, and the end's number.
 
         Args:
-            start: (2, 3) x and y, each position, velocity and acceleration.
+            start: (2, 3) x and y, each position, velocity and acceleration; or (m, 2, 3) of these.
             ends: (n, 2, 3) the same.
         """
+        if start.ndim == ends.ndim:
+            return min((self.best(each, ends) for each in start), key=lambda found: found[0].cost)
         o = self.options
         durations = np.geomspace(*o.durations, o.trials[0])
         many = np.repeat(ends, len(durations), axis=0)
         each = np.tile(durations, len(ends))
         curves = quintics(start, many, each)
         excess = self.excess(curves, each)
-        cost = np.maximum(excess - o.slack, 0.0) + o.pace * each
+        cost = np.maximum(excess - o.slack, 0.0) + o.pace * (each + o.calm**2 / each)
         i = int(np.argmin(cost))
         found = Found((Quintic(curves[i], float(each[i])),), float(excess[i]), float(cost[i]))
         return found, i // len(durations)
 
-    def to_rest(self, start: Array) -> Found:
+    def to_rest(self, start: Array, lands: bool = False) -> Found:
         """To rest where the centre of pressure allows, then to the place to stand.
 
         Args:
             start: (2, 3) x and y, each position, velocity and acceleration.
+            lands: whether the front foot has just landed: it takes up load at once.
         """
         o = self.options
         margin = min(o.margin, 0.5 * abs(self.spacing))
         low, high = min(self.toes) + margin, max(self.toes) - margin
         wanted = self.place(o.place)
         places = np.append(np.linspace(low, high, o.trials[1]), wanted)
-        stop, i = self.best(start, np.array([self.at_rest(x) for x in places]))
-        there, _ = self.best(start, self.at_rest(wanted)[None])
+        starts = self.loaded(start) if lands else start
+        stop, i = self.best(starts, np.array([self.at_rest(x) for x in places]))
+        there, _ = self.best(starts, self.at_rest(wanted)[None])
         if there.cost <= stop.cost + o.pace * o.durations[1]:
             return there
         return self._joined(stop, self._shift(places[i], wanted))
 
-    def to_liftoff(self, start: Array, ends: Array, shifts: bool) -> tuple[Found, int]:
+    def to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
         """To one of several states in which the rear foot lifts off.
 
         Args:
             start: (2, 3) x and y, each position, velocity and acceleration.
             ends: (n, 2, 3) the same.
-            shifts: whether the CoM may first move back, and rest there.
+            lands: whether the front foot has just landed: it takes up load at once. If not, the
+                CoM may first move back, and rest there.
 
         Returns:
             What was found, and the number of the end.
         """
-        found, number = self.best(start, ends)
-        if not shifts or found.excess <= self.options.slack:
+        found, number = self.best(self.loaded(start) if lands else start, ends)
+        if lands or found.excess <= self.options.slack:
             return found, number
         for share in self.options.shifts:
             place = self.place(share)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Angle, Count, Interval, NotNegative, Positive, Share
-from template_control.slip.similarity import LENGTH, TIME, tuned
+from template_control.slip.similarity import LENGTH, SPEED, TIME, tuned
 
 
 @dataclass(frozen=True)
@@ -25,15 +25,22 @@ class StandingOptions(Checked):
             inside, and the CoM a little off its curve.
         margin: a rest place is this far from either foot [m].
         reach: longest way from a foot on the ground to the CoM, over l0.
-        pace: a second more of a curve counts as this much excess [m/s].
-        short: shortest and longest last way of the CoM in single stance before VLO [s].
+        calm: duration of a quintic that is liked best [s].
+        pace: a second more or less counts as this much excess [m/s].
+        single: shortest and longest way of the CoM in single stance before VLO [s].
+        landing: bounds of the shortest time from VLO to a touchdown [s].
+        swiftness: between them that time lets the foot come to its foothold with this mean speed,
+            over the CoM's at VLO.
         vault: stiffness of the leg that slowly passes under the CoM, k l0 / (m g).
         slowest: speed at VLO of the slowest step, over sqrt(g l0).
         steps: shortest and longest step [m].
+        loads: shares of the load that the front foot may take up at once where it has landed.
         closing: the feet should stand this far apart where a walk ends [m].
         narrow: a metre further apart counts as this much excess.
         angles: touchdown angles tried, and the flattest [rad].
         stiffness: least and greatest of the leg before touchdown, over k0.
+        yielding: its stiffnesses tried, over that with which it keeps its length. The CoM sinks
+            over a softer leg, and the foot lands further ahead of it.
     """
 
     height: Positive = tuned(0.97, LENGTH)
@@ -41,17 +48,22 @@ class StandingOptions(Checked):
     place: Share = tuned(0.5)
     beat: Positive = tuned(0.5, TIME)
     shifts: tuple[Share, ...] = tuned((0.05, 0.15, 0.25, 0.35, 0.45))
-    durations: Interval = tuned((0.12, 1.2), TIME)
+    durations: Interval = tuned((0.15, 1.2), TIME)
+    calm: Positive = tuned(0.3, TIME)
     trials: tuple[Count, Count] = tuned((12, 9))
     slack: NotNegative = tuned(0.005, LENGTH)
     margin: NotNegative = tuned(0.01, LENGTH)
     reach: Positive = tuned(1.025)
-    pace: NotNegative = tuned(0.002, LENGTH)
-    short: Interval = tuned((0.03, 0.5), TIME)
+    pace: NotNegative = tuned(0.002, SPEED)
+    single: Interval = tuned((0.15, 0.5), TIME)
+    landing: Interval = tuned((0.2, 0.35), TIME)
+    swiftness: Positive = tuned(3.2)
     vault: Positive = tuned(64.0)
     slowest: Positive = tuned(0.05)
-    steps: Interval = tuned((0.15, 0.55), LENGTH)
+    steps: Interval = tuned((0.15, 0.65), LENGTH)
+    loads: tuple[Share, ...] = tuned((0.33, 0.67, 1.0))
     closing: Positive = tuned(0.25, LENGTH)
     narrow: NotNegative = tuned(0.02)
     angles: tuple[Count, Angle] = tuned((12, 1.08))
-    stiffness: Interval = tuned((0.8, 4.0))
+    stiffness: Interval = tuned((0.5, 4.0))
+    yielding: tuple[Positive, ...] = tuned((1.0, 0.85, 0.7))

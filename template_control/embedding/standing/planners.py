@@ -16,9 +16,8 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.dynamics.stride import Stride
-from template_control.slip.maps.section import PADDED, REST
+from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.similarity import Scale, scaled
 
 Array = NDArray[np.float64]
 
@@ -75,6 +74,16 @@ class _Curves:
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`."""
 
+    def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
+        """The decision for a step (None: there is none) to a state ``end`` (3,)."""
+        angle, before = (_STEEP, self.parameters.leg_stiffness) if step is None else step[:2]
+        controls = controls_of(angle, before, stiffness)
+        return Decision(controls, end.copy(), step is not None, True, False)
+
+    def _price(self, step: Touchdown, found: Found) -> float:
+        """Of a step and the curve after it [m]."""
+        return found.cost + self.options.narrow * abs(step.toes[1] - self.options.closing)
+
     def _between(self, toes: tuple[float, float]) -> BetweenFeet:
         return BetweenFeet(toes, self.parameters, self.options)
 
@@ -82,7 +91,7 @@ class _Curves:
         return found.excess <= self.options.slack
 
     def _away(
-        self, feet: BetweenFeet, start: Array, speeds: list[float], shifts: bool
+        self, feet: BetweenFeet, start: Array, speeds: list[float], lands: bool
     ) -> tuple[Found, Vault, Array]:
         """To a liftoff from which VLO is reached, with the first speed that there is a curve to.
 
@@ -90,7 +99,7 @@ class _Curves:
             feet: on the ground.
             start: (2, 3) x and y, each position, velocity, acceleration.
             speeds: at VLO [m/s], the best first.
-            shifts: whether the CoM may first move back.
+            lands: see :meth:`BetweenFeet.to_liftoff`.
 
         Returns:
             The curve, the VLO, and the (2, 3) state at liftoff.
@@ -99,7 +108,7 @@ class _Curves:
         def to(speed: float) -> tuple[Found, Vault, Array]:
             vault = self.vaults.at(speed)
             ends = self.vaults.approach(vault, feet.toes[1])
-            found, i = feet.to_liftoff(start, ends, shifts)
+            found, i = feet.to_liftoff(start, ends, lands)
             return found, vault, ends[i]
 
         best = to(speeds[0])
@@ -135,6 +144,8 @@ class _Curves:
 class StandPlanner(_Curves):
     """Stands: the CoM comes to rest between the feet, and stays there."""
 
+    lands = False
+
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
@@ -145,7 +156,7 @@ class StandPlanner(_Curves):
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
     ) -> tuple[Decision, Stride]:
         """See :class:`~.planner.CurvePlanner`."""
-        found = self._between(toes).to_rest(start)
+        found = self._between(toes).to_rest(start, self.lands)
         pieces = [*found.pieces]
         left = self.options.beat - sum(piece.duration for piece in pieces)
         if left > 0.0:
@@ -172,7 +183,7 @@ class StartPlanner(_Curves):
         """See :class:`~.planner.CurvePlanner`."""
         feet = self._between(toes)
         speeds = self.vaults.between(float(decision.predicted[0]), 0.0)
-        way = self._away(feet, start, speeds, True)
+        way = self._away(feet, start, speeds, False)
         controls, stride = self._leaving(node, feet, way, decision.controls)
         return replace(decision, controls=controls, feasible=self._fits(way[0])), stride
 
@@ -180,20 +191,18 @@ class StartPlanner(_Curves):
 class StopPlanner(StandPlanner):
     """Makes the last step, and comes to rest."""
 
+    lands = True
+
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
         """See :class:`~.planner.Planner`: the step after which the CoM comes to rest best."""
-        o, k = self.options, self.vaults.passing(z)
-
         def cost(step: Touchdown) -> float:
-            found = self._between(step.toes).to_rest(step.state)
-            return found.cost + o.narrow * abs(step.toes[1] - o.closing)
+            found = self._between(step.toes).to_rest(step.state, True)
+            return self._price(step, found)
 
-        steps = self.vaults.touchdowns(z, k, angles)
-        angle = min(steps, key=cost).angle if steps else _STEEP
-        u = controls_of(angle, k, k)
-        return Decision(u, REST.padded(self.gait.state), bool(steps), True, False)
+        steps = self.vaults.touchdowns(z, angles)
+        return self._step(min(steps, key=cost) if steps else None, self.gait.state, 0.0)
 
 
 class ChangePlanner(_Curves):
@@ -205,28 +214,26 @@ class ChangePlanner(_Curves):
         """See :class:`~.planner.Planner`: the step after which the speed can be had best."""
         present = float(z[0])
         wanted = present if target is None else float(target[0])
-        k = self.vaults.passing(z)
-        steps = self.vaults.touchdowns(z, k, angles)
+        steps = self.vaults.touchdowns(z, angles)
         speeds = self.vaults.between(wanted, present)
         vault = self.vaults.at(speeds[0])
-        angle = self._angle(steps, speeds[:: 1 + len(speeds) // _TRIALS]) if steps else _STEEP
-        predicted = vault.vlo.copy()
-        return Decision(controls_of(angle, k, vault.stiffness), predicted, bool(steps), True, False)
+        step = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS]) if steps else None
+        return self._step(step, vault.vlo, vault.stiffness)
 
-    def _angle(self, steps: list[Touchdown], speeds: list[float]) -> float:
-        """The touchdown angle of the step after which the first of the speeds can be had."""
+    def _towards(self, steps: list[Touchdown], speeds: list[float]) -> Touchdown:
+        """The step after which the first of the speeds can be had."""
         for speed in speeds:
             vault = self.vaults.at(speed)
             found = [
                 self._between(step.toes).to_liftoff(
-                    step.state, self.vaults.approach(vault, step.toes[1]), False
+                    step.state, self.vaults.approach(vault, step.toes[1]), True
                 )[0]
                 for step in steps
             ]
-            best = min(range(len(steps)), key=lambda i: found[i].cost)
+            best = min(range(len(steps)), key=lambda i: self._price(steps[i], found[i]))
             if self._fits(found[best]):
                 break
-        return steps[best].angle
+        return steps[best]
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
@@ -235,6 +242,6 @@ class ChangePlanner(_Curves):
         feet = self._between(toes)
         present = float(start[0, 1])
         speeds = self.vaults.between(float(decision.predicted[0]), present)
-        way = self._away(feet, start, speeds, False)
+        way = self._away(feet, start, speeds, True)
         controls, stride = self._leaving(node, feet, way, decision.controls)
         return replace(decision, controls=controls, feasible=self._fits(way[0])), stride

@@ -57,11 +57,13 @@ class Touchdown(NamedTuple):
 
     Attributes:
         angle: its touchdown angle [rad].
+        stiffness: of the leg before it [N/m].
         state: (2, 3) x and y of the CoM, each position, velocity, acceleration.
         toes: x of the rear and the front foot [m].
     """
 
     angle: float
+    stiffness: float
     state: Array
     toes: tuple[float, float]
 
@@ -123,7 +125,7 @@ class Vaults:
         speed, height, vertical = vault.vlo
         u = self._controls(_FLAT, vault.stiffness)
         past = self._simulator.run(self._node, [0.0, height, speed, -vertical], u)
-        shortest, longest = self.options.short
+        shortest, longest = self.options.single
         # Whatever ends the stride: before it the leg pushes.
         longest = min(longest, 0.98 * past.duration)
         x, y, dx, dy, ddx, ddy = past.sample(np.linspace(shortest, longest, _STATES)).T
@@ -131,21 +133,26 @@ class Vaults:
             (np.stack((toe - x, dx, -ddx), axis=-1), np.stack((y, -dy, ddy), axis=-1)), axis=1
         )
 
-    def passing(self, z: Array) -> float:
-        """Stiffness with which the leg passes from VLO state ``z`` (3,) [N/m]."""
-        p, (least, most) = self.parameters, self.options.stiffness
+    def _keeping(self, z: Array) -> float:
+        """Stiffness with which the leg keeps its length from VLO state ``z`` (3,) [N/m]."""
+        p = self.parameters
         load = p.mass * (p.gravity - z[0] ** 2 / p.rest_length)
         bent = max(p.rest_length - float(z[1]), 1e-6)
-        return float(np.clip(load / bent, least * p.leg_stiffness, most * p.leg_stiffness))
+        return float(load / bent)
 
-    def touchdowns(self, z: Array, stiffness: float, angles: tuple[float, float]) -> list[Touchdown]:
+    def touchdowns(self, z: Array, angles: tuple[float, float]) -> list[Touchdown]:
         """Steps that may be made from a VLO.
 
         Args:
             z: (3,) state at VLO.
-            stiffness: of the leg [N/m].
             angles: least and greatest touchdown angle [rad].
         """
+        k, (least, most) = self._keeping(z), self.options.stiffness
+        k0 = self.parameters.leg_stiffness
+        tried = {min(max(share * k, least * k0), most * k0) for share in self.options.yielding}
+        return [step for k in sorted(tried) for step in self._landings(z, k, angles)]
+
+    def _landings(self, z: Array, stiffness: float, angles: tuple[float, float]) -> list[Touchdown]:
         p, (number, flattest) = self.parameters, self.options.angles
         shortest, longest = self.options.steps
         top = float(np.arcsin(min(z[1] / p.rest_length, 1.0))) - 0.005
@@ -159,9 +166,13 @@ class Vaults:
             if np.isfinite(time):
                 x, y, dx, dy, ddx, ddy = self._before(stride, time)
                 toe = float(x + p.rest_length * np.cos(angle))
+                swift = toe / (self.options.swiftness * max(float(z[0]), 1e-6))
+                least = float(np.clip(swift, *self.options.landing))
+                if angles[0] < angles[1] and time < least:
+                    continue
                 if shortest <= toe <= longest or angles[0] == angles[1]:
                     state = np.array([[x, dx, ddx], [y, dy, ddy]])
-                    found.append(Touchdown(float(angle), state, (0.0, toe)))
+                    found.append(Touchdown(float(angle), stiffness, state, (0.0, toe)))
         return found
 
     def _before(self, stride: Stride, time: float) -> Array:
