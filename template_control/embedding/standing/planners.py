@@ -216,24 +216,28 @@ class ChangePlanner(_Curves):
         wanted = present if target is None else float(target[0])
         steps = self.vaults.touchdowns(z, angles)
         speeds = self.vaults.between(wanted, present)
-        vault = self.vaults.at(speeds[0])
-        step = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS]) if steps else None
+        if not steps:
+            vault = self.vaults.at(speeds[0])
+            return self._step(None, vault.vlo, vault.stiffness)
+        step, vault = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS])
         return self._step(step, vault.vlo, vault.stiffness)
 
-    def _towards(self, steps: list[Touchdown], speeds: list[float]) -> Touchdown:
-        """The step after which the first of the speeds can be had."""
+    def _towards(self, steps: list[Touchdown], speeds: list[float]) -> tuple[Touchdown, Vault]:
+        """The step after which the first of the speeds can be had, and the VLO it leads to."""
+        best = (np.inf, steps[0], self.vaults.at(speeds[0]))
         for speed in speeds:
             vault = self.vaults.at(speed)
-            found = [
-                self._between(step.toes).to_liftoff(
-                    step.state, self.vaults.approach(vault, step.toes[1]), True
-                )[0]
-                for step in steps
-            ]
-            best = min(range(len(steps)), key=lambda i: self._price(steps[i], found[i]))
-            if self._fits(found[best]):
+            fits = False
+            for step in steps:
+                ends = self.vaults.approach(vault, step.toes[1])
+                found, _ = self._between(step.toes).to_liftoff(step.state, ends, True)
+                fits = fits or self._fits(found)
+                price = self._price(step, found)
+                if price < best[0]:
+                    best = price, step, vault
+            if fits:
                 break
-        return steps[best]
+        return best[1:]
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
