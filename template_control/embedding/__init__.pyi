@@ -31,8 +31,8 @@ from .robot_template import default_gait as default_gait
 from .robot_template import paper_gait as paper_gait
 from .robot_template import template_for as template_for
 from .section_report import SectionReport as SectionReport
-from .standing.options import StandingOptions as StandingOptions
 from .standing.default import standing_planners as standing_planners
+from .standing.options import StandingOptions as StandingOptions
 from .standing.planners import ChangePlanner as ChangePlanner
 from .standing.planners import StandingGait as StandingGait
 from .standing.planners import StandPlanner as StandPlanner

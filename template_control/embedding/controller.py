@@ -109,9 +109,7 @@ class EmbeddingController:
         self.time = 0.0
         self._fresh = True
         self._rear_shift = 0.0
-        self._sensed = Sensed(
-            swing_time=self.feet.swing_time, acceleration=self.reference[4:]
-        )
+        self._sensed = Sensed(swing_time=self.feet.swing_time, acceleration=self.reference[4:])
         self._guards = RobotGuards(self.parameters, o.guards)
         self._stations = stations(automaton, robot.nv, o.phases, o.swing)
         curved = {name for name, station in self._stations.items() if station.control.curved}
@@ -174,9 +172,7 @@ class EmbeddingController:
         if node.stance:
             # Of two feet on the ground the front one landed last.
             self.feet.landed = self.feet.of[self.station.stance[-1]]
-        self.ground = (
-            float(self.robot.foot_position[self.feet.landed, 1]) if node.stance else 0.0
-        )
+        self.ground = float(self.robot.foot_position[self.feet.landed, 1]) if node.stance else 0.0
         self._sense(np.zeros(2, dtype=bool))
         self._decide(section)
 

@@ -82,9 +82,7 @@ _RUNNING_STANCE = PhaseControl(
 _LEAVING_THE_GROUND = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,))
 
 # Nobody walks: time passes, and both feet carry.
-_STANDING = PhaseControl(
-    tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, curved=True
-)
+_STANDING = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, curved=True)
 _LIFTING_OFF = replace(_STANDING, unloads=(Leg.REAR,), weighs=False)
 
 PHASES: Phases = {

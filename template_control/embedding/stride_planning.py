@@ -274,9 +274,7 @@ class StridePlanning:
         self._planned_at = now
         self._look_ahead(0)
 
-    def _curve(
-        self, node: str, state: Array, toes: tuple[float, float], sensed: Sensed
-    ) -> Stride:
+    def _curve(self, node: str, state: Array, toes: tuple[float, float], sensed: Sensed) -> Stride:
         """The planner's curve from here; what it decides on the way holds from now on.
 
         Raises:

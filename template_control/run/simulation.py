@@ -39,7 +39,8 @@ Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 
-_STEPS = 50  # of a run on a route that does not end, where the options do not say
+STEPS = 50
+"""Steps of a run on a route that does not end, where the options do not say."""
 
 
 @checked
@@ -172,8 +173,8 @@ def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
         return o.steps  # the options have looked at the pushes
     if not controller.planning.route.endless:
         return np.inf
-    check_pushes(o.pushes, _STEPS)
-    return _STEPS
+    check_pushes(o.pushes, STEPS)
+    return STEPS
 
 
 def _loop(

@@ -145,5 +145,3 @@ def chained(first: Stride, second: Stride) -> Stride:
         meta=np.concatenate((first.meta, meta)),
         node_names=first.node_names,
     )
-
-

@@ -7,18 +7,19 @@ legs within their reach, and of those the quickest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.references.timed import Quintic, derivatives, quintics
+from template_control.embedding.references.timed import TERMS, Quintic, quintics
+from template_control.embedding.standing.curve_search import Rules, best_quintic
 from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
-_SAMPLES = np.linspace(0.0, 1.0, 21)
 _PEAK = 10.0 / np.sqrt(3.0)  # acceleration of a quintic from rest to rest, over distance / time^2
 
 
@@ -63,23 +64,11 @@ class BetweenFeet:
         """(2, 3) x and y, each position, velocity and acceleration, at rest over ``x``."""
         return np.array([[x, 0.0, 0.0], [self.options.height, 0.0, 0.0]])
 
-    def excess(self, coefficients: Array, durations: Array) -> Array:
-        """By how far curves leave the feet or their legs' reach (n,) [m].
-
-        Args:
-            coefficients: (n, 2, 6) of x and y.
-            durations: (n,) [s].
-        """
-        times = durations[:, None, None] * _SAMPLES
-        found = derivatives(coefficients[:, :, None, :], times)
-        (x, ax), (y, ay) = ((found[:, axis, :, 0], found[:, axis, :, 2]) for axis in (0, 1))
-        p = x - y * ax / (self.parameters.gravity + ay)
-        rear, front = self.toes
-        low, high = min(rear, front), max(rear, front)
-        outside = np.maximum(low - p, p - high)
-        reach = self.options.reach * self.parameters.rest_length
-        far = np.maximum(np.hypot(x - rear, y), np.hypot(x - front, y)) - reach
-        return np.asarray(np.maximum(outside, far).max(axis=1).clip(0.0))
+    @cached_property
+    def _rules(self) -> Rules:
+        p, o = self.parameters, self.options
+        reach = o.reach * p.rest_length
+        return Rules(min(self.toes), max(self.toes), p.gravity, reach, o.slack, o.pace, o.calm)
 
     def loaded(self, start: Array) -> Array:
         """Starts (n, 2, 3) with accelerations that load the front foot at once.
@@ -101,18 +90,12 @@ class BetweenFeet:
             start: (2, 3) x and y, each position, velocity and acceleration; or (m, 2, 3) of these.
             ends: (n, 2, 3) the same.
         """
-        if start.ndim == ends.ndim:
-            return min((self.best(each, ends) for each in start), key=lambda found: found[0].cost)
         o = self.options
         durations = np.geomspace(*o.durations, o.trials[0])
-        many = np.repeat(ends, len(durations), axis=0)
-        each = np.tile(durations, len(ends))
-        curves = quintics(start, many, each)
-        excess = self.excess(curves, each)
-        cost = np.maximum(excess - o.slack, 0.0) + o.pace * (each + o.calm**2 / each)
-        i = int(np.argmin(cost))
-        found = Found((Quintic(curves[i], float(each[i])),), float(excess[i]), float(cost[i]))
-        return found, i // len(durations)
+        curve = np.empty((2, TERMS))
+        starts = start.reshape(-1, 2, 3)
+        cost, excess, end, i = best_quintic(starts, ends, durations, self._rules, curve)
+        return Found((Quintic(curve, float(durations[i])),), excess, cost), end
 
     def to_rest(self, start: Array, lands: bool = False) -> Found:
         """To rest where the centre of pressure allows, then to the place to stand.

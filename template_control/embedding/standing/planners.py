@@ -11,11 +11,11 @@ from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.references.timed import Quintic, chained, timed_stride
 from template_control.embedding.standing.curves import BetweenFeet, Found
 from template_control.embedding.standing.options import StandingOptions
-from template_control.embedding.standing.vaults import Touchdown, Vault, Vaults, controls_of
+from template_control.embedding.standing.vaults import Touchdown, Vault, Vaults
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.vocabulary import Slot
-from template_control.slip.dynamics.stride import Stride
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
+from template_control.slip.dynamics.stride import Stride, controls
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
 
@@ -49,9 +49,14 @@ class StandingGait:
 
     @classmethod
     def of(cls, parameters: SlipParameters, options: StandingOptions) -> StandingGait:
-        """The stand that ``options``, for that template, tell."""
+        """The stand of a template.
+
+        Args:
+            parameters: the template.
+            options: tuning, for that template.
+        """
         state = np.array([0.0, options.height, 0.0])
-        return cls(parameters, state, controls_of(0.0, 0.0, 0.0), options.beat)
+        return cls(parameters, state, np.zeros(NUM_SLOTS), options.beat)
 
 
 class _Curves:
@@ -77,8 +82,8 @@ class _Curves:
     def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
         """The decision for a step (None: there is none) to a state ``end`` (3,)."""
         angle, before = (_STEEP, self.parameters.leg_stiffness) if step is None else step[:2]
-        controls = controls_of(angle, before, stiffness)
-        return Decision(controls, end.copy(), step is not None, True, False)
+        u = controls(angle, before, stiffness)
+        return Decision(u, end.copy(), step is not None, True, False)
 
     def _price(self, step: Touchdown, found: Found) -> float:
         """Of a step and the curve after it [m]."""
@@ -104,41 +109,27 @@ class _Curves:
         Returns:
             The curve, the VLO, and the (2, 3) state at liftoff.
         """
-
-        def to(speed: float) -> tuple[Found, Vault, Array]:
+        ways = []
+        for speed in speeds:
             vault = self.vaults.at(speed)
             ends = self.vaults.approach(vault, feet.toes[1])
             found, i = feet.to_liftoff(start, ends, lands)
-            return found, vault, ends[i]
-
-        best = to(speeds[0])
-        if self._fits(best[0]):
-            return best
-        # The further from the best speed, the sooner there is a curve.
-        low, high = 0, len(speeds) - 1
-        last = to(speeds[high])
-        if not self._fits(last[0]):
-            return min((best, last), key=lambda each: each[0].cost)
-        while high - low > 1:
-            middle = (low + high) // 2
-            found = to(speeds[middle])
-            if self._fits(found[0]):
-                high, last = middle, found
-            else:
-                low = middle
-        return last
+            ways.append((found, vault, ends[i]))
+            if self._fits(found):
+                return ways[-1]
+        return min(ways, key=lambda way: way[0].cost)
 
     def _leaving(
         self, node: str, feet: BetweenFeet, way: tuple[Found, Vault, Array], u: Array
     ) -> tuple[Array, Stride]:
         """Controls and stride of a curve to a liftoff, and on to VLO."""
         found, vault, liftoff = way
-        controls = u.copy()
-        controls[Slot.K_SD] = vault.stiffness
+        changed = u.copy()
+        changed[Slot.K_SD] = vault.stiffness
         first = timed_stride(self.automaton, node, found.pieces, feet.toes)
         state = liftoff[:, :2].T.ravel()
-        second = self.vaults.arriving(first.node, state, controls, first.toes)
-        return controls, chained(first, second)
+        second = self.vaults.arriving(first.node, state, changed, first.toes)
+        return changed, chained(first, second)
 
 
 class StandPlanner(_Curves):
@@ -175,7 +166,7 @@ class StartPlanner(_Curves):
     ) -> Decision:
         """See :class:`~.planner.Planner`."""
         wanted = self.gait.state if target is None else target
-        return Decision(controls_of(_STEEP, 0.0, 0.0), np.array(wanted), True, True, False)
+        return Decision(controls(_STEEP, 0.0, 0.0), np.array(wanted), True, True, False)
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
@@ -184,8 +175,8 @@ class StartPlanner(_Curves):
         feet = self._between(toes)
         speeds = self.vaults.between(float(decision.predicted[0]), 0.0)
         way = self._away(feet, start, speeds, False)
-        controls, stride = self._leaving(node, feet, way, decision.controls)
-        return replace(decision, controls=controls, feasible=self._fits(way[0])), stride
+        u, stride = self._leaving(node, feet, way, decision.controls)
+        return replace(decision, controls=u, feasible=self._fits(way[0])), stride
 
 
 class StopPlanner(StandPlanner):
@@ -197,6 +188,7 @@ class StopPlanner(StandPlanner):
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
         """See :class:`~.planner.Planner`: the step after which the CoM comes to rest best."""
+
         def cost(step: Touchdown) -> float:
             found = self._between(step.toes).to_rest(step.state, True)
             return self._price(step, found)
@@ -247,5 +239,5 @@ class ChangePlanner(_Curves):
         present = float(start[0, 1])
         speeds = self.vaults.between(float(decision.predicted[0]), present)
         way = self._away(feet, start, speeds, True)
-        controls, stride = self._leaving(node, feet, way, decision.controls)
-        return replace(decision, controls=controls, feasible=self._fits(way[0])), stride
+        u, stride = self._leaving(node, feet, way, decision.controls)
+        return replace(decision, controls=u, feasible=self._fits(way[0])), stride

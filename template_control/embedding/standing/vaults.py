@@ -12,11 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.references.timed import derivatives
+from template_control.embedding.standing.curve_search import curves
 from template_control.embedding.standing.options import StandingOptions
+from template_control.parts import ready
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Event, Slot
-from template_control.slip.dynamics.stride import Stride, StrideSimulator
+from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
@@ -85,15 +88,22 @@ class Vaults:
         family: Family,
         automaton: Automaton = AUTOMATON,
     ) -> None:
+        ready((curves,))
         self.parameters, self.options, self.family = parameters, options, family
         self._simulator = StrideSimulator(parameters, automaton)
         self._node = automaton.start("w").name
         self._known: dict[float, Vault] = {}
+        self._ways: dict[float, Array] = {}
         unit = float(np.sqrt(parameters.gravity * parameters.rest_length))
         self._speeds = np.linspace(options.slowest * unit, family.speeds[1], _SPEEDS)
 
     def between(self, wanted: float, present: float) -> list[float]:
-        """Speeds at VLO from the wanted one to the present one [m/s]."""
+        """Speeds at VLO that are tried, the best first [m/s].
+
+        Args:
+            wanted: the first, or the nearest there is [m/s].
+            present: none lies beyond it [m/s].
+        """
         low, high = min(wanted, present), max(wanted, present)
         inside = [float(v) for v in self._speeds if low < v < high]
         first = float(np.clip(wanted, self._speeds[0], self._speeds[-1]))
@@ -121,16 +131,28 @@ class Vaults:
         """States (n, 2, 3) on the way to VLO over ``toe`` [m], the last of them first.
 
         The template's dynamics are the same forward and backward.
+
+        Args:
+            vault: where they lead to.
+            toe: x of the foot [m].
         """
+        speed = float(vault.vlo[0])
+        if speed not in self._ways:
+            self._ways[speed] = self._way(vault)
+        states = self._ways[speed].copy()
+        states[:, 0, 0] += toe
+        return states
+
+    def _way(self, vault: Vault) -> Array:
         speed, height, vertical = vault.vlo
-        u = self._controls(_FLAT, vault.stiffness)
+        u = controls(_FLAT, vault.stiffness, vault.stiffness)
         past = self._simulator.run(self._node, [0.0, height, speed, -vertical], u)
         shortest, longest = self.options.single
         # Whatever ends the stride: before it the leg pushes.
         longest = min(longest, 0.98 * past.duration)
         x, y, dx, dy, ddx, ddy = past.sample(np.linspace(shortest, longest, _STATES)).T
         return np.stack(
-            (np.stack((toe - x, dx, -ddx), axis=-1), np.stack((y, -dy, ddy), axis=-1)), axis=1
+            (np.stack((-x, dx, -ddx), axis=-1), np.stack((y, -dy, ddy), axis=-1)), axis=1
         )
 
     def _keeping(self, z: Array) -> float:
@@ -160,35 +182,30 @@ class Vaults:
         found = []
         for angle in tried:
             stride = self._simulator.run(
-                self._node, VLO.state(z), self._controls(float(angle), stiffness)
+                self._node, VLO.state(z), controls(float(angle), stiffness, stiffness)
             )
             time = stride.time_of(Event.TOUCHDOWN)
             if np.isfinite(time):
-                x, y, dx, dy, ddx, ddy = self._before(stride, time)
-                toe = float(x + p.rest_length * np.cos(angle))
+                # As the foot touches down, and is not carried by it yet.
+                row = int(np.searchsorted(stride.meta[:, 0], time)) - 1
+                path = np.stack((stride.cx[row], stride.cy[row]))
+                state = derivatives(path, np.array(time - stride.meta[row, 0]))
+                toe = float(state[0, 0] + p.rest_length * np.cos(angle))
                 swift = toe / (self.options.swiftness * max(float(z[0]), 1e-6))
                 least = float(np.clip(swift, *self.options.landing))
                 if angles[0] < angles[1] and time < least:
                     continue
                 if shortest <= toe <= longest or angles[0] == angles[1]:
-                    state = np.array([[x, dx, ddx], [y, dy, ddy]])
                     found.append(Touchdown(float(angle), stiffness, state, (0.0, toe)))
         return found
 
-    def _before(self, stride: Stride, time: float) -> Array:
-        """(6,) the CoM as a foot touches down, not yet carried by it."""
-        return stride.sample(time * (1.0 - 1e-9))[0]
+    def arriving(self, node: str, state: Array, u: Array, toes: Array) -> Stride:
+        """The template's stride from a node on.
 
-    def arriving(self, node: str, state: Array, controls: Array, toes: Array) -> Stride:
-        """The template's stride from a node on; arguments as for its simulator."""
-        return self._simulator.run(node, state, controls, toes)
-
-    def _controls(self, angle: float, stiffness: float) -> Array:
-        return controls_of(angle, stiffness, stiffness)
-
-
-def controls_of(angle: float, before: float, after: float) -> Array:
-    """Controls (5,) of a step: touchdown angle [rad], stiffness before and after [N/m]."""
-    u = np.zeros(len(Slot))
-    u[[Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]] = angle, before, after
-    return u
+        Args:
+            node: of the automaton.
+            state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s].
+            u: (5,) controls.
+            toes: (2,) x of the rear and the front foot [m].
+        """
+        return self._simulator.run(node, state, u, toes)

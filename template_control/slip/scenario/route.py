@@ -48,7 +48,7 @@ _LEADS_TO: dict[str, tuple[Section, Gait]] = {
 }
 _STOPPABLE = 0.16  # speed at VLO, over sqrt(g l0), from which one step leads to rest
 _SLOWED = 0.11  # to which a faster walk is slowed down first
-_ALIKE = 0.03  # difference of speeds, over sqrt(g l0), that the walking planner makes good
+_ALIKE = 0.012  # difference of speeds, over sqrt(g l0), that the walking planner makes good
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
 
 

@@ -20,6 +20,9 @@ Walking = Literal["modified", "active"]
 STAND = "stand"
 """The gait of a segment in which the robot stands."""
 
+STAND_HEIGHT = 0.97
+"""Height at which a robot stands, over l0."""
+
 MOST_STRIDES = 10_000
 """How many strides a scenario may have."""
 _OF_MOTION = ("speed", "acceleration", "until_speed", "steps")
@@ -85,7 +88,7 @@ class Scenario(Checked):
     touchdown_angle: float = 70.0
     vlo: tuple[float, float] = (0.98, 0.0)
     apex_height: float = 0.98
-    stand_height: float = 0.97
+    stand_height: float = STAND_HEIGHT
     walking: Walking = "modified"
     name: str = "scenario"
 
@@ -114,6 +117,12 @@ class Scenario(Checked):
         """The gaits of its segments."""
         return frozenset(segment.gait for segment in self.segments)
 
+    @property
+    def walking_speed(self) -> float:
+        """dx/dt at VLO that the first walk begins with [m/s]; the start's where none says it."""
+        if self.segments[0].gait != STAND:
+            return self.start[0]
+        return next((s.speed for s in self.segments if s.speed is not None), self.start[0])
 
     @property
     def stands(self) -> bool:
@@ -122,6 +131,8 @@ class Scenario(Checked):
 
     def in_motion(self) -> Scenario | None:
         """The scenario without its stands, from a VLO on; None where nothing is left."""
+        if not self.stands:
+            return self
         moving = tuple(segment for segment in self.segments if segment.gait != STAND)
         if not moving:
             return None
