@@ -23,7 +23,7 @@ from template_control.slip.scenario.route import ScenarioRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
 
 P = tc.SlipParameters()
-O = StandingOptions()  # noqa: E741
+OPTIONS = StandingOptions()
 FAMILY = Family(partial(walking_gait, P), speed_range(P))
 BODY = np.array([P.mass, P.gravity, P.rest_length])
 STAND, WALK = Segment("stand", duration=1.0), Segment("walk", speed=0.8, duration=2.0)
@@ -31,7 +31,7 @@ STAND, WALK = Segment("stand", duration=1.0), Segment("walk", speed=0.8, duratio
 
 @pytest.fixture(scope="module")
 def vaults():
-    return Vaults(P, O, FAMILY)
+    return Vaults(P, OPTIONS, FAMILY)
 
 
 @pytest.fixture(scope="module")
@@ -92,12 +92,12 @@ def test_a_stand_comes_to_rest_between_the_feet(planners, spacing, speed):
     decision = planner.decide(REST.of(start[:, :2].T.ravel()))
     decision, stride = planner.curve("DS_ar^s", start, toes, decision)
     end = stride.state
-    np.testing.assert_allclose(end, [1.0 + 0.5 * spacing, O.height, 0.0, 0.0], atol=1e-12)
-    assert stride.duration >= O.beat - 1e-12
+    np.testing.assert_allclose(end, [1.0 + 0.5 * spacing, OPTIONS.height, 0.0, 0.0], atol=1e-12)
+    assert stride.duration >= OPTIONS.beat - 1e-12
     assert stride.events[-1].event is Event.REST
     times = np.linspace(0.0, stride.duration, 400)
     if decision.feasible:
-        assert outside(pressure(stride, times), toes) < O.slack + 1e-3
+        assert outside(pressure(stride, times), toes) < OPTIONS.slack + 1e-3
     assert decision.feasible or spacing == 0.1
 
 
@@ -116,7 +116,7 @@ def test_a_start_leads_to_vlo(planners, spacing):
     before, after = stride.sample([liftoff - 1e-9, liftoff + 1e-9])
     np.testing.assert_allclose(before, after, atol=1e-6)
     p = pressure(stride, np.linspace(0.0, liftoff - 1e-9, 400))
-    assert outside(p, toes) < (0.02 if spacing == 0.1 else O.slack + 1e-3)
+    assert outside(p, toes) < (0.02 if spacing == 0.1 else OPTIONS.slack + 1e-3)
     assert p[-1] == pytest.approx(spacing, abs=1e-3)
     u = decision.controls
     again = tc.simulate_stride(P, "SS_bv^w", before[:4], u, (spacing, spacing))

@@ -63,12 +63,14 @@ class Touchdown(NamedTuple):
         stiffness: of the leg before it [N/m].
         state: (2, 3) x and y of the CoM, each position, velocity, acceleration.
         toes: x of the rear and the front foot [m].
+        late: by how much it comes later than the foot could [s].
     """
 
     angle: float
     stiffness: float
     state: Array
     toes: tuple[float, float]
+    late: float
 
 
 class Vaults:
@@ -172,32 +174,37 @@ class Vaults:
         k, (least, most) = self._keeping(z), self.options.stiffness
         k0 = self.parameters.leg_stiffness
         tried = {min(max(share * k, least * k0), most * k0) for share in self.options.yielding}
-        return [step for k in sorted(tried) for step in self._landings(z, k, angles)]
+        steps = [step for k in sorted(tried) for step in self._landings(z, k, angles)]
+        # Where no step leaves the foot its time, the one that leaves it most has to do.
+        return [s for s in steps if s.late >= 0.0] or sorted(steps, key=lambda s: -s.late)[:1]
 
     def _landings(self, z: Array, stiffness: float, angles: tuple[float, float]) -> list[Touchdown]:
-        p, (number, flattest) = self.parameters, self.options.angles
-        shortest, longest = self.options.steps
-        top = float(np.arcsin(min(z[1] / p.rest_length, 1.0))) - 0.005
+        number, flattest = self.options.angles
+        top = float(np.arcsin(min(z[1] / self.parameters.rest_length, 1.0))) - 0.005
         tried = np.unique(np.clip(np.linspace(flattest, top, number), *angles))
-        found = []
-        for angle in tried:
-            stride = self._simulator.run(
-                self._node, VLO.state(z), controls(float(angle), stiffness, stiffness)
-            )
-            time = stride.time_of(Event.TOUCHDOWN)
-            if np.isfinite(time):
-                # As the foot touches down, and is not carried by it yet.
-                row = int(np.searchsorted(stride.meta[:, 0], time)) - 1
-                path = np.stack((stride.cx[row], stride.cy[row]))
-                state = derivatives(path, np.array(time - stride.meta[row, 0]))
-                toe = float(state[0, 0] + p.rest_length * np.cos(angle))
-                swift = toe / (self.options.swiftness * max(float(z[0]), 1e-6))
-                least = float(np.clip(swift, *self.options.landing))
-                if angles[0] < angles[1] and time < least:
-                    continue
-                if shortest <= toe <= longest or angles[0] == angles[1]:
-                    found.append(Touchdown(float(angle), stiffness, state, (0.0, toe)))
-        return found
+        found = (self._landing(z, controls(float(a), stiffness, stiffness)) for a in tried)
+        shortest, longest = self.options.steps
+        return [
+            step
+            for step in found
+            if step is not None and (shortest <= step.toes[1] <= longest or len(tried) == 1)
+        ]
+
+    def _landing(self, z: Array, u: Array) -> Touchdown | None:
+        """Where a step with controls ``u`` (5,) from VLO lands; None if it does not."""
+        stride = self._simulator.run(self._node, VLO.state(z), u)
+        time = stride.time_of(Event.TOUCHDOWN)
+        if not np.isfinite(time):
+            return None
+        # As the foot touches down, and is not carried by it yet.
+        row = int(np.searchsorted(stride.meta[:, 0], time)) - 1
+        path = np.stack((stride.cx[row], stride.cy[row]))
+        state = derivatives(path, np.array(time - stride.meta[row, 0]))
+        angle, stiffness = float(u[Slot.TOUCHDOWN_ANGLE]), float(u[Slot.K_SC])
+        toe = float(state[0, 0] + self.parameters.rest_length * np.cos(angle))
+        swift = toe / (self.options.swiftness * max(float(z[0]), 1e-6))
+        least = float(np.clip(swift, *self.options.landing))
+        return Touchdown(angle, stiffness, state, (0.0, toe), float(time) - least)
 
     def arriving(self, node: str, state: Array, u: Array, toes: Array) -> Stride:
         """The template's stride from a node on.

@@ -48,7 +48,8 @@ _LEADS_TO: dict[str, tuple[Section, Gait]] = {
 }
 _STOPPABLE = 0.16  # speed at VLO, over sqrt(g l0), from which one step leads to rest
 _SLOWED = 0.11  # to which a faster walk is slowed down first
-_ALIKE = 0.012  # difference of speeds, over sqrt(g l0), that the walking planner makes good
+_ALIKE = 0.012  # difference of speeds, over sqrt(g l0), with which a walk begins
+_BEHIND = 0.03  # difference that a walk makes good without a stride of its own
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
 
 
@@ -210,7 +211,7 @@ class _Progress:
         kind, left = self.last
         took = now - left if self.took is None else self.took
         here = replace(self, duration={**self.duration, kind: took}, last=None, took=None)
-        if kind in _TRANSITIONS:
+        if kind in _TRANSITIONS and not (kind == _CHANGE and self.walking):
             # The transition leads to where the segment's profile begins.
             return replace(here, began=now)
         return replace(here, strides=self.strides + 1)
@@ -304,7 +305,8 @@ class ScenarioRoute:
         if kind in ("ws", "w"):
             here, kind = self._reached(here, kind, float(z[0]), now)
         # A transition aims at where the profile begins, the others at where they will end.
-        ahead = 0.0 if kind in _TRANSITIONS else here.duration.get(kind, self._guess)
+        aims = kind not in _TRANSITIONS or (kind == _CHANGE and here.walking)
+        ahead = here.duration.get(kind, self._guess) if aims else 0.0
         speed = here.wanted(segment, now + ahead)
         if segment.gait == STAND:
             speed = _SLOWED * self._unit if kind == _CHANGE else 0.0
@@ -323,7 +325,10 @@ class ScenarioRoute:
         if segment.gait == STAND:
             slow = speed <= _STOPPABLE * self._unit
             return replace(here, walking=False), kind if slow else _CHANGE
-        if here.walking or abs(speed - here.wanted(segment, now)) <= _ALIKE * self._unit:
+        if not self.scenario.stands:
+            return here, kind
+        most = _BEHIND if here.walking else _ALIKE
+        if abs(speed - here.wanted(segment, now)) <= most * self._unit:
             return replace(here, walking=True), kind
         return here, _CHANGE
 
