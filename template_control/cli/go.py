@@ -29,9 +29,9 @@ from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.terminal import plain_console
 
-_NAMES = {
-    "w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk", "s": "standing",
-    "sw": "stand to walk", "ws": "walk to stand", "ww": "to another speed",
+_NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
+_STANDING = {
+    "s": "standing", "sw": "stand to walk", "ws": "walk to stand", "ww": "to another speed",
 }  # fmt: skip
 NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (
@@ -105,7 +105,10 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
         **{name: run[name] for name in _FROM_THE_RUN},
         "completed": bool(record.metadata["arrived"]),
         "top_speed": float(record.section_state[:, 0].max()),
-        "strides": {name: kinds.get(kind, 0) for kind, name in _NAMES.items()},
+        "strides": {
+            **{name: kinds.get(kind, 0) for kind, name in _NAMES.items()},
+            **{name: kinds[kind] for kind, name in _STANDING.items() if kind in kinds},
+        },
         "template": {
             "completed": template.completed,
             "top_speed": float(template.section_state[:, 0].max()),
