@@ -1,11 +1,13 @@
-"""Time of a control tick, split into its parts, over a walk in PyBullet.
+"""Time of a control tick, split into its parts, over a walk or a run in PyBullet.
 
-Run: python benchmarks/control_tick.py [steps]
+Run: python benchmarks/control_tick.py [steps] [--gait walk] [--gait run] [--speed 3]
+
+Times are those of the thread: whatever else the machine does in between does not count.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable
 from typing import Any
@@ -16,39 +18,78 @@ from rich.table import Table
 
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.running import RunningPlanner
+from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.robot.library import load_robot
-from template_control.robot.start import state_at_vlo
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.start import state_at_vlo, state_in
 from template_control.slip.gaits.gait import gait_at
+from template_control.slip.gaits.running_gait import running_gait
+from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
 
 _WARM_UP = 3  # steps, while the compiled kernels load
 
+Times = dict[str, np.ndarray[Any, Any]]
+
 
 def _timed(function: Callable[..., Any], into: list[float]) -> Callable[..., Any]:
     def call(*arguments: Any) -> Any:
-        start = time.perf_counter()
+        start = time.thread_time()
         result = function(*arguments)
-        into[-1] += time.perf_counter() - start
+        into[-1] += time.thread_time() - start
         return result
 
     return call
 
 
-def measure(steps: int) -> dict[str, np.ndarray[Any, Any]]:
-    """Seconds of every tick by part: pinocchio, references, assembly, solve, tick, physics."""
-    robot = load_robot("five-link")
+def _walking(robot: PlanarBiped) -> tuple[EmbeddingController, Any, Any]:
+    """A controller that walks, started, and the state that it starts from."""
     gait = gait_at(SlipParameters(mass=robot.mass), np.radians(66.0), 1.1)
     controller = EmbeddingController(robot, LqrPlanner(gait))
     q, v = state_at_vlo(robot, gait.vlo, 0, np.array([0.0, 0.05]), np.array([2.2, 0.0]))
     controller.start(0)
+    return controller, q, v
+
+
+def _running(robot: PlanarBiped, speed: float) -> tuple[EmbeddingController, Any, Any]:
+    """As :func:`_walking`, at ``speed`` [m/s]."""
+    gait = running_gait(SlipParameters(mass=robot.mass), speed)
+    controller = EmbeddingController(robot, RunningPlanner(gait))
+    controller.planning.begin(APEX)
+    options = controller.options
+    start = ApexStart(
+        gait.apex, gait, options.swing, controller.first_pitch(), controller.planning.automaton
+    )
+    pose = apex_pose(robot, start)
+    q, v = state_in(robot, pose)
+    controller.start(pose.rear, pose.swung)
+    return controller, q, v
+
+
+def measure(steps: int, speed: float | None = None) -> Times:
+    """Seconds of every tick by part.
+
+    Args:
+        steps: that count; a few more are made before.
+        speed: of a run [m/s]; None: walk.
+    """
+    robot = load_robot("five-link")
+    controller, q, v = _walking(robot) if speed is None else _running(robot, speed)
+    planning = controller.planning
     update: list[float] = []
     quadratic: list[float] = []
+    plans: list[float] = []
+    solves: list[float] = []
     # Timed from outside, on the instances, so that the library carries no clocks.
     robot.update = _timed(robot.update, update)  # type: ignore[method-assign]
     controller.qp.solve = _timed(controller.qp.solve, quadratic)  # type: ignore[method-assign]
+    for name in ("decide", "land", "follow", "reach_on", "reconsider"):
+        setattr(planning, name, _whole(getattr(planning, name), plans))
+    for workspace in (*controller.qp._workspaces, *controller.qp._braked):
+        workspace.solve = _timed(workspace.solve, solves)  # type: ignore[method-assign]
     ticks: list[float] = []
-    solves: list[float] = []
     physics: list[float] = []
     forces, dt, warm = np.zeros((2, 2)), 1e-3, 0
     with BulletPlant(robot, PlantOptions(time_step=dt)) as plant:
@@ -58,19 +99,20 @@ def measure(steps: int) -> dict[str, np.ndarray[Any, Any]]:
                 warm = len(ticks)
             plant.read(q, v)
             plant.contact_forces(forces)
-            update.append(0.0)
-            quadratic.append(0.0)
-            start = time.perf_counter()
+            for part in (update, quadratic, plans, solves):
+                part.append(0.0)
+            start = time.thread_time()
             solution = controller.tick(q, v, forces[:, 1] > 4.0, dt)
-            ticks.append(time.perf_counter() - start)
-            solves.append(solution.solve_seconds)
-            start = time.perf_counter()
+            ticks.append(time.thread_time() - start)
+            start = time.thread_time()
             plant.step(solution.torque)
-            physics.append(time.perf_counter() - start)
-    tick, model, whole, solve = (np.array(x)[warm:] for x in (ticks, update, quadratic, solves))
+            physics.append(time.thread_time() - start)
+    lists = (ticks, update, quadratic, solves, plans)
+    tick, model, whole, solve, plan = (np.array(x)[warm:] for x in lists)
     return {
         "Pinocchio update": model,
-        "references, events, plans": tick - model - whole,
+        "references, events": tick - model - whole - plan,
+        "plans": plan,
         "QP assembly": whole - solve,
         "QP solve": solve,
         "whole tick": tick,
@@ -78,18 +120,48 @@ def measure(steps: int) -> dict[str, np.ndarray[Any, Any]]:
     }
 
 
-def main() -> None:
-    """Print the table."""
-    steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    parts = measure(steps)
+def _whole(function: Callable[..., Any], into: list[float]) -> Callable[..., Any]:
+    """As :func:`_timed`, for functions that call each other: the outermost counts."""
+    inside = False
+    timed = _timed(function, into)
+
+    def call(*arguments: Any) -> Any:
+        nonlocal inside
+        if inside:
+            return function(*arguments)
+        inside = True
+        try:
+            return timed(*arguments)
+        finally:
+            inside = False
+
+    return call
+
+
+def _print(title: str, parts: Times) -> None:
     whole = np.median(parts["whole tick"])
-    table = Table(title=f"control tick over {steps} steps, {len(parts['whole tick'])} ticks")
-    for name in ("part", "median us", "p99 us", "median over whole tick"):
+    table = Table(title=f"{title}, {len(parts['whole tick'])} ticks")
+    for name in ("part", "mean us", "median us", "p99 us", "median over whole tick"):
         table.add_column(name, justify="left" if name == "part" else "right")
     for name, seconds in parts.items():
         median, p99 = np.percentile(seconds, [50, 99])
-        table.add_row(name, f"{1e6 * median:.1f}", f"{1e6 * p99:.1f}", f"{median / whole:.2f}")
+        mean = f"{1e6 * seconds.mean():.1f}"
+        table.add_row(
+            name, mean, f"{1e6 * median:.1f}", f"{1e6 * p99:.1f}", f"{median / whole:.2f}"
+        )
     Console().print(table)
+
+
+def main() -> None:
+    """Print a table for each gait."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("steps", nargs="?", type=int, default=200)
+    parser.add_argument("--gait", action="append", choices=("walk", "run"), help="both if none")
+    parser.add_argument("--speed", type=float, default=3.0, help="of the run [m/s]")
+    options = parser.parse_args()
+    for gait in options.gait or ("walk", "run"):
+        parts = measure(options.steps, None if gait == "walk" else options.speed)
+        _print(f"control tick over {options.steps} steps, {gait}", parts)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from hypothesis.extra import numpy as npst
 
 import template_control as tc
 from template_control import embedding, run, slip, sweep, whole_body
-from template_control.plant import BulletPlant, IdealPlant
+from template_control.plant import BulletPlant, IdealPlant, MujocoPlant
 from template_control.robot import state_at_vlo
 from template_control.robustness import measure, trial
 from template_control.slip import APEX, VLO, Leg, Phase, Slot
@@ -108,7 +108,8 @@ def targets(folder):
     """By name, what is called and arguments that are good."""
     held = {"height": 0.98, "stiffness": 16.5e3}
     options = (
-        tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
+        tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.MujocoOptions, tc.PlantOptions,
+        tc.SensorOptions,
         tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
         embedding.LoadOptions,
         embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
@@ -156,6 +157,7 @@ def targets(folder):
         whole_body.WholeBodyQp: {"robot": ROBOT},
         BulletPlant: {"robot": ROBOT, "options": tc.PlantOptions()},
         IdealPlant: {"robot": ROBOT, "options": tc.IdealOptions()},
+        MujocoPlant: {"robot": ROBOT, "options": tc.MujocoOptions()},
         tc.gait_at: {"parameters": P, "touchdown_angle": 1.15, "vlo_speed": 1.1},
         tc.gait_for_speed: {"parameters": P, "mean_speed": 1.2},
         tc.gait_from_energy: {"parameters": P, "height": 0.9818, "energy": 826.0},

@@ -2,12 +2,13 @@
 
 import json
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from template_control.cli.go import summarise_route
+from template_control.cli.go import _print, summarise_route
 from template_control.cli.main import main
 from template_control.cli.report import kept
 from template_control.run.record import Record
@@ -20,7 +21,8 @@ from template_control.view.route_figures import (
 
 KEYS = {
     "robot", "completed", "fell", "fall_reason", "duration", "top_speed", "speed_error_rms",
-    "strides", "joint_torque", "joint_speed", "qp_failures", "template", "record",
+    "nearest_speed_taken", "strides", "joint_torque", "joint_speed", "qp_failures", "template",
+    "record",
 }  # fmt: skip
 SCENARIO = """
 map = "exact"
@@ -101,6 +103,16 @@ def test_what_is_told_is_in_the_records(record, template):
     assert figures["template"]["speed_error_rms"] == pytest.approx(np.sqrt(np.mean(other**2)))
 
 
+def test_where_the_nearest_speed_was_taken_is_told(record, template, capfd):
+    assert summarise_route(record, template, None)["nearest_speed_taken"]["strides"] == 0
+    target = record.section_target.copy()
+    target[3, 0] = record.section_predicted[3, 0] + 0.5  # further than a running stride leads
+    figures = summarise_route(replace(record, section_target=target), template, None)
+    assert figures["nearest_speed_taken"] == {"strides": 1, "most": pytest.approx(0.5)}
+    _print(figures)
+    assert "1 times, 0.50 m/s off" in capfd.readouterr().out
+
+
 def test_the_table_has_both_beside_each_other(scenario, tmp_path, capfd):
     words = ["go", str(scenario), "--steps", "1", "--no-figures", "--output", str(tmp_path)]
     assert main(words) == 0, "it did as many strides as it was to"
@@ -120,6 +132,11 @@ def changed(scenario, tmp_path, old, new):
     [
         ("speed = 1.3", "speed = 6.5", "segment 2 wants to run at 6.5 m/s: five-link can run from"),
         ("speed = 1.3", "speed = 0.9", "segment 2 wants to run at 0.9 m/s: five-link can run from"),
+        (
+            "speed = 1.3",
+            "speed = 1.3\nacceleration = 6.0",
+            "segment 2 wants 6 m/s^2: a stride of five-link changes its speed by at most 2 m/s^2",
+        ),
         ('"run"', '"trot"', "trot"),
         ("start = [1.1", "start = [0.2", "the start has 0.2 m/s at VLO"),
     ],

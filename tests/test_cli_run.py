@@ -87,6 +87,12 @@ def test_a_run_is_repeated_by_its_file(ran, record, tmp_path):
         (["--speed", "9"], "no running gait has 9 m/s at its apex: give a speed from 1.2 to 5 m/s"),
         (["--speed", "0.8"], "no running gait has 0.8 m/s at its apex"),
         (["--speed", "9", "--robot", "bolt"], "give a speed from 0.718 to 3 m/s"),
+        (
+            ["--speed", "2", "--apex", "3"],
+            "five-link cannot run at 2 m/s with its apex at 3 m: give",
+        ),
+        (["--apex", "0.9"], "with its apex at 0.9 m: give a height from 0.9"),
+        (["--apex", "0.97", "--torque-scale", "0.3"], "its motors are too weak"),
         (["--config", "missing.toml"], "cannot read missing.toml"),
         (["--steps", "0"], "--steps"),
         (["--output", "/proc/none"], "/proc/none"),

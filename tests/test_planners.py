@@ -206,6 +206,11 @@ def test_trim_goes_against_the_drift_that_no_control_takes_away(gait):
     for _ in range(100):
         trim.end_stride(plan.section_state + [9.0, 0.0, 0.0], True)
     assert trim.acceleration == pytest.approx(-0.03 * 9.81)
+    # After another kind of stride it begins anew.
+    trim.forget()
+    assert (trim.acceleration, trim.drift) == (0.0, 0.0)
+    for _ in range(100):
+        trim.end_stride(plan.section_state + [9.0, 0.0, 0.0], True)
     # A path without a double stance teaches nothing.
     trim.expect(replace(plan, events=plan.events[:1]), gait)
     trim.end_stride(plan.section_state - [9.0, 0.0, 0.0], True)

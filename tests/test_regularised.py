@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from template_control.embedding.planners.gauss_newton import bounded_step
 from template_control.embedding.planners.regularised import (
     FromHere,
     FromSection,
     Prior,
-    bounded_step,
     solve_stride,
 )
 from template_control.slip.automaton.vocabulary import Outcome, Slot
@@ -77,19 +77,20 @@ def test_no_control_near_by_is_cheaper(faster, higher, seed):
     assert cost(other, aim, its) > cost(u, aim, its) * (1.0 - 1e-3) - 1e-9
 
 
-def test_differences_within_a_stride_agree_with_exact_derivatives():
+def test_differences_agree_with_exact_derivatives():
     def ahead(u):
         return STEP.step(GAIT.apex, u)
 
-    end, jacobian, outcome = FromSection(STEP, GAIT.apex, SLOTS).slopes(GAIT.controls)
-    here = FromHere(ahead, SLOTS)
-    other_end, other, how = here.slopes(GAIT.controls)
-    assert outcome is how is Outcome.SECTION
-    np.testing.assert_allclose(other_end, end, atol=1e-12)
-    np.testing.assert_allclose(
-        other * GAIT.controls[SLOTS], jacobian * GAIT.controls[SLOTS], atol=1e-4
-    )
-    np.testing.assert_array_equal(here.at(GAIT.controls)[0], end)
+    exact = STEP.linearise(GAIT.apex, GAIT.controls)
+    size = GAIT.controls[SLOTS]
+    for stride in (FromSection(STEP, GAIT.apex, SLOTS), FromHere(ahead, SLOTS)):
+        end, jacobian, outcome = stride.slopes(GAIT.controls)
+        assert outcome is Outcome.SECTION
+        np.testing.assert_allclose(end, exact.state, atol=1e-12)
+        np.testing.assert_allclose(
+            jacobian * size, exact.control_jacobian[:, SLOTS] * size, atol=1e-4
+        )
+        np.testing.assert_array_equal(stride.at(GAIT.controls)[0], end)
 
 
 def test_an_end_that_a_difference_spoils_is_told():

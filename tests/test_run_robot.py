@@ -194,6 +194,18 @@ def test_robot_runs_on_after_a_push(impulse, phase):
     assert np.max(np.abs(speed[18:] / 3.0 - 1.0)) < 0.02
 
 
+@pytest.mark.slow(seconds=8)
+def test_runner_is_back_ten_steps_after_a_hard_push():
+    pushes = (tc.Push(40.0, 6, 0.9), tc.Push(-40.0, 18, 0.0))
+    record = run(3.0, 30, "runner", pushes=pushes)
+    assert record.metadata["fall_reason"] == ""
+    assert record.solved.all()
+    error = np.abs(record.section_state[:, 0] / record.metadata["gait_state"][0] - 1.0)
+    for push in pushes:
+        assert np.max(error[push.step : push.step + 10]) > 0.15
+        assert error[push.step + 10] < 0.02
+
+
 @pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("mass_scale", [0.9, 1.1])
 def test_robot_runs_with_another_mass_than_its_model_has(mass_scale):

@@ -16,6 +16,9 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
+from template_control.embedding.section_report import Learnt
+from template_control.embedding.sensing import Sensed
+from template_control.embedding.stride_planning import ReplanOptions, StridePlanning
 from template_control.embedding.touchdown import free_controls
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
@@ -25,6 +28,7 @@ from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import StrideGoal
 
 P = SlipParameters()
 UNIT = P.mass * P.gravity / P.rest_length
@@ -197,6 +201,43 @@ def test_a_leg_that_has_landed_elsewhere_gets_other_stiffnesses():
     )
     assert right < left
     assert again.controls[Slot.TOUCHDOWN_ANGLE] == first.controls[Slot.TOUCHDOWN_ANGLE]
+
+
+class IntoARun:
+    """A route that begins with the transition."""
+
+    parameters, start, section, endless = P, WALK.vlo, VLO, True
+
+    def reset(self):
+        pass
+
+    def next(self, section, z, now):
+        return StrideGoal("wr" if section is VLO else "r", runs(1.3).apex, 1.3)
+
+    ahead = next
+
+
+def test_a_push_within_a_transition_gets_other_stiffnesses():
+    planning = StridePlanning(IntoARun(), {"wr": walk_to_run(), "r": RUNNING}, ReplanOptions())
+    planning.begin(VLO)
+    speed, height, vertical = WALK.vlo
+    start = Sensed(np.array([0.0, height, speed, vertical]), np.zeros(2))
+    planning.decide(VLO, start, 0.0, Learnt(load=1.0, trim=0.0, lean=0.0))
+    before = planning.reports[-1].decision.controls.copy()
+    node, state, toes = middle("wr", WALK.vlo, VLO, before, Event.REAR_LIFTOFF)
+    pushed = Sensed(state - [0.0, 0.0, 0.2, 0.0], np.array(toes))
+    as_before = StrideSimulator(P).run(node, pushed.state, before, tuple(toes))
+    assert as_before.outcome is not Outcome.SECTION, "it does not leave the ground"
+    planning.reconsider(AUTOMATON.node(node), pushed, 0.1, 0.5)
+    after = planning.reports[-1].decision.controls
+    # The energy that the push took comes back from a leg that becomes stiffer at its bottom.
+    assert (
+        after[Slot.K_SD_WR] / after[Slot.K_SC_WR]
+        > 1.1 * before[Slot.K_SD_WR] / before[Slot.K_SC_WR]
+    )
+    kept = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
+    np.testing.assert_array_equal(after[kept], before[kept])
+    assert planning.path.outcome is Outcome.SECTION
 
 
 def test_where_the_rest_cannot_be_done_the_controls_stay():

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import simulate_scenario
-from template_control.slip.scenario.scenario import load_scenario
+from template_control.slip.scenario.scenario import Scenario, Segment, load_scenario
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -56,6 +57,59 @@ def test_five_link_walks_runs_at_three_metres_a_second_and_walks(friction):
     assert speed[9] == pytest.approx(1.3, abs=0.05), "the transition hits its first apex"
     share = record.metadata["summary"]["saturated_share"]
     assert share < 0.025
+    assert record.section_trim[8] != 0.0
+    assert record.section_trim[9] == 0.0, "the walk after the run stands up: it learns anew"
+    settled(record)
+
+
+# A slow run of a few strides between two walks; the pushes are of 0.1 s.
+SHORT = Scenario(
+    segments=(
+        Segment("walk", speed=1.1, steps=7),
+        Segment("run", speed=1.3, duration=1.0),
+        Segment("walk", speed=1.1, steps=8),
+    ),
+    start=(1.1, 0.978, 0.0),
+    map_kind=MapKind.EXACT,
+)
+
+
+@pytest.mark.slow(seconds=14)
+@pytest.mark.parametrize(
+    "pushes",
+    [
+        # In double stance and at the bottom of the stance, where the leg must become stiffer; and
+        # in the stance from the run to the walk, after which a leg lands far ahead.
+        (tc.Push(-15.0, 7, 1.0), tc.Push(-15.0, 11, 0.14)),
+        (tc.Push(15.0, 7, 1.0), tc.Push(15.0, 11, 0.14)),
+    ],
+)
+def test_five_link_holds_pushes_within_both_transitions(pushes):
+    record = tc.simulate(tc.load_robot("five-link"), SHORT, tc.SimulationOptions(pushes=pushes))
+    check(record)
+    kinds = strides(record)
+    for push, kind in zip(pushes, ("wr", "rw"), strict=True):
+        assert kinds[push.step] == kind
+        begin, end = record.section_time[push.step : push.step + 2]
+        within = (record.time >= begin) & (record.time < end)
+        assert np.any(record.push[within] != 0.0)
+    assert np.all(np.abs(record.section_state[-3:, 1] - 0.978) < 0.03)
+    assert np.all(np.abs(record.section_state[-3:, 0] - 1.1) < 0.2)
+
+
+@pytest.mark.slow(seconds=14)
+def test_five_link_holds_pushes_while_it_accelerates_and_decelerates():
+    pushes = (tc.Push(-20.0, 14, 0.5), tc.Push(20.0, 40, 0.6))
+    record = go("walk_run_walk.toml", "five-link", pushes=pushes)
+    check(record)
+    assert {strides(record)[push.step] for push in pushes} == {"r"}
+    target, speed = record.section_target[:-1, 0], record.section_state[1:, 0]
+    assert target[13] < target[14] < target[15]
+    assert target[40] < target[39] < target[38]
+    for push in pushes:
+        assert np.max(np.abs(speed - target)[push.step : push.step + 2]) > 0.15
+        # Ten strides on it is where the profile wants it.
+        assert abs(speed[push.step + 10] - target[push.step + 10]) < 0.05
     settled(record)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import proxsuite
 import pytest
 
+from template_control.robot.library import load_robot
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.foot_task import FootTask
@@ -148,6 +149,39 @@ def test_infeasible_problem_is_reported_and_recovers(robot):
     *_, after = solve(robot, np.random.default_rng(4), 2, qp)
     assert after.solved
     np.testing.assert_allclose(after.torque, before.torque, atol=1e-4)
+
+
+def hurried(robot, options, torque_scale=1.0):
+    """In the air, a hip near its limit of speed is asked for more; its acceleration [rad/s^2]."""
+    q, v = standing(np.random.default_rng(7))
+    v[3] = 19.0
+    robot.update(q, v)
+    tasks = TaskStack((PostureTask(),), 7)
+    tasks.table[0, 3], tasks.table[0, 7 + DESIRED] = 1.0, 1000.0
+    qp = WholeBodyQp(robot, replace(options, torque_scale=torque_scale))
+    s = qp.solve(tasks, Stance((), np.zeros(0), np.zeros(0)))
+    assert s.solved
+    return s.acceleration[3]
+
+
+def test_a_joint_near_its_limit_gains_at_most_the_rest_in_the_horizon(robot):
+    unbounded = hurried(robot, replace(OPTIONS, speed_share=0.96))
+    assert robot.fastest == pytest.approx(19.0 / 20.0)
+    for horizon in (0.005, 0.02):
+        bound = (20.0 - 19.0) / horizon
+        assert unbounded > 1.1 * bound
+        bounded = hurried(robot, replace(OPTIONS, speed_horizon=horizon))
+        assert bounded == pytest.approx(bound, abs=0.1)
+
+
+def test_motors_that_cannot_slow_a_joint_down_make_it_no_faster(tmp_path, robot):
+    slow = tmp_path / "slow.urdf"
+    slow.write_text(robot.urdf.replace('velocity="20"', 'velocity="17"'))
+    it = load_robot(slow)
+    bound = (17.0 - 19.0) / OPTIONS.speed_horizon
+    assert hurried(it, OPTIONS) == pytest.approx(bound, abs=1.0)
+    assert hurried(it, OPTIONS, torque_scale=0.2) == pytest.approx(0.0, abs=1.0)
+    assert np.isfinite(hurried(it, OPTIONS, torque_scale=0.01))  # not even that
 
 
 def test_straight_coinciding_feet_are_reported_not_raised(robot):

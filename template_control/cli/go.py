@@ -22,6 +22,7 @@ from template_control.cli.options.world import (
 )
 from template_control.cli.report.kept import run_and_keep
 from template_control.cli.report.output import INTERRUPTED
+from template_control.cli.report.run_table import nearest_text
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.run.summary import summarise
@@ -35,8 +36,8 @@ _STANDING = {
 }  # fmt: skip
 NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (
-    "robot", "fell", "fall_reason", "duration", "speed_error_rms", "joint_torque", "joint_speed",
-    "saturated_share", "qp_failures", "real_time_factor",
+    "robot", "fell", "fall_reason", "duration", "speed_error_rms", "nearest_speed_taken",
+    "joint_torque", "joint_speed", "saturated_share", "qp_failures", "real_time_factor",
 )  # fmt: skip
 
 
@@ -132,6 +133,9 @@ def _print(figures: dict[str, Any]) -> None:
     ):
         values = (figures[key], other[key])
         table.add_row(name, *("" if x is None else f"{x:.3f} {unit}" for x in values))
+    nearest = figures["nearest_speed_taken"]
+    if nearest["strides"]:
+        table.add_row("nearest speed taken", nearest_text(nearest))
     table.add_row("duration", f"{figures['duration']:.2f} s")
     for name, count in figures["strides"].items():
         table.add_row(f"strides, {name}", f"{count}")

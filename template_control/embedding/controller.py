@@ -168,7 +168,7 @@ class EmbeddingController:
         self._sensed.feet = self.feet.of
         half = 0.5 * planner.gait.step_duration
         for leg in self.station.swings:
-            self.feet.lift(self.feet.of[leg], self.robot, (swung or (half, half))[leg])
+            self._lift(self.feet.of[leg], (swung or (half, half))[leg])
         if node.stance:
             # Of two feet on the ground the front one landed last.
             self.feet.landed = self.feet.of[self.station.stance[-1]]
@@ -239,7 +239,7 @@ class EmbeddingController:
         self._sensed.feet = self.feet.of
         lifted = stood - self._standing()
         for foot in lifted:
-            self.feet.lift(foot, self.robot)
+            self._lift(foot)
         s = self._sensed
         if lifted:
             self._rear_shift = 0.0
@@ -260,8 +260,11 @@ class EmbeddingController:
 
     def _enter(self, node: str) -> None:
         self.station = self._stations[node]
-        for swing in self.feet.swing:
-            swing.options = self.station.swing
+
+    def _lift(self, foot: int, swung: float = 0.0) -> None:
+        """A swing keeps the shape with which it began, whatever the next stride's is."""
+        self.feet.swing[foot].options = self.station.swing
+        self.feet.lift(foot, self.robot, swung)
 
     def _standing(self) -> set[int]:
         return {self.feet.of[leg] for leg in self.station.stance}
@@ -298,6 +301,9 @@ class EmbeddingController:
         learnt = Learnt(self.load.factor, self.trim.acceleration, self.lean.correction)
         node = self.planning.decide(section, s, self.time, learnt)
         self._enter(node.name)
+        if len({report.goal.stride for report in self.reports[-2:]}) > 1:
+            # A walk after a run stands up; one that leant had other drifts.
+            self.trim.forget()
         self.lean.aim(self.reports[-1].goal)
         self.trim.expect(self.planning.path if self.station.trimmed else None, self.planner.gait)
         self._on_new_path()

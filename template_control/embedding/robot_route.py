@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.checks.checked import checked
+from template_control.embedding.planners.running import AGILE
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.planar_biped import PlanarBiped
@@ -12,8 +13,10 @@ from template_control.slip.gaits.running_gait import running_speeds, suited_heig
 from template_control.slip.gaits.walking_family import speed_range
 from template_control.slip.scenario.route import ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
+from template_control.slip.similarity import Scale, scaled
 
 _RANGES = {"walk": speed_range, "run": running_speeds}
+_STRIDE = 0.7  # of sqrt(l0 / g): the duration of a fast running stride
 _WHERE = {"walk": "at VLO", "run": "at apex"}
 
 
@@ -26,9 +29,13 @@ def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
         scenario: speeds in m/s, as they are; its heights are scaled with l0.
 
     Raises:
-        ScenarioError: if a segment or the start wants a speed that no gait of the robot has.
+        ScenarioError: if a segment or the start wants a speed that no gait of the robot has, or a
+            segment a change of speed that is beyond a stride's reach.
     """
     own = scenario.on(template_for(robot))
+    p = own.parameters
+    unit = float(np.sqrt(p.gravity * p.rest_length))
+    _check_accelerations(robot, own)
     for number, segment in enumerate(own.segments, 1):
         if segment.gait not in _RANGES:
             continue
@@ -47,9 +54,19 @@ def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
             f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from {slowest:.3g} to"
             f" {fastest:.3g} m/s"
         )
-    p = own.parameters
-    unit = float(np.sqrt(p.gravity * p.rest_length))
     return ScenarioRoute(own, lambda speed: suited_height(speed / unit) * p.rest_length)
+
+
+def _check_accelerations(robot: PlanarBiped, own: Scenario) -> None:
+    """Refuse what no stride can do, however strong the motors: they bound it further."""
+    p = own.parameters
+    most = scaled(AGILE, Scale.of(p)).pace / (_STRIDE * float(np.sqrt(p.rest_length / p.gravity)))
+    for number, segment in enumerate(own.segments, 1):
+        if abs(segment.acceleration) > most:
+            raise ScenarioError(
+                f"segment {number} wants {segment.acceleration:g} m/s^2: a stride of {robot.name}"
+                f" changes its speed by at most {most:.2g} m/s^2"
+            )
 
 
 def _speeds(segment: Segment) -> list[float]:

@@ -1,14 +1,19 @@
-"""The template of a robot, and the gaits it walks."""
+"""The template of a robot, the gaits it walks, and the apexes at which its knees can run."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from template_control.checks.checked import checked
-from template_control.checks.ranges import Angle
+from template_control.checks.ranges import Angle, Positive
+from template_control.errors import GaitError
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
+from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
+from template_control.slip.gaits.running_gait import RunningGait, running_gait
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section_map import RESULTS
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale
 
@@ -17,6 +22,10 @@ _WALK = (_TOUCHDOWN, 1.1 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_leng
 # Of the straight leg at touchdown, as five-link with l0 = 1 m; the test
 # test_the_reference_template_is_five_link_s holds it.
 _STRETCH = 0.903514524055713
+_KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in all robots that ran
+_BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
+_SHORTEST = 0.8  # of l0, at the bottom: shorter, and the knees come to their stops
+_HEIGHTS = np.linspace(0.9, 1.3, 161)  # over l0, that are tried
 
 
 @checked
@@ -68,3 +77,67 @@ def template_for(robot: PlanarBiped) -> SlipParameters:
     relative = REFERENCE.leg_stiffness * REFERENCE.rest_length
     relative /= REFERENCE.mass * REFERENCE.gravity
     return SlipParameters(robot.mass, robot.gravity, length, relative * weight / length)
+
+
+def knee_torque(robot: PlanarBiped, gait: RunningGait) -> float:
+    """Torque that a knee needs at the bottom of a stance, estimated [N m].
+
+    A share of the template's leg force times the distance of a knee from the line between hip and
+    foot, with a thigh as long as the shank.
+
+    Args:
+        robot: its last update is overwritten.
+        gait: on the robot's template.
+    """
+    template_for(robot)  # which leaves the robot updated with straight legs
+    above_hip = float(robot.com[1])
+    leg = _shortest_leg(gait)
+    straight = 0.5 * robot.leg_length
+    half = 0.5 * max(leg - above_hip - robot.foot_radius, 0.0)
+    away = float(np.sqrt(max(straight**2 - half**2, 0.0)))
+    p = gait.parameters
+    return _KNEES * float(gait.controls[Slot.K_SC]) * (p.rest_length - leg) * away
+
+
+def _shortest_leg(gait: RunningGait) -> float:
+    """Length of the template's leg at the bottom [m]."""
+    result, _ = ReturnMap(gait.parameters, gait.stride).evaluate(gait.apex, gait.controls)
+    return float(result[RESULTS - 2])
+
+
+@checked
+def check_apex(
+    robot: PlanarBiped, speed: float, height: Positive, torque_scale: Positive = 1.0
+) -> None:
+    """Check that a robot can run with an apex of a given height.
+
+    Args:
+        robot: its last update is overwritten.
+        speed: dx/dt at apex [m/s].
+        height: y there [m].
+        torque_scale: share of the URDF's torque limits that may be used.
+
+    Raises:
+        GaitError: naming the heights that can be had, if not; or if no gait has this speed.
+    """
+    if _bears(robot, speed, height, torque_scale):
+        return
+    length = template_for(robot).rest_length
+    running_gait(template_for(robot), speed)  # the speed may be the culprit
+    good = [h for h in length * _HEIGHTS if _bears(robot, speed, float(h), torque_scale)]
+    what = f"{robot.name} cannot run at {speed:g} m/s with its apex at {height:g} m"
+    if not good:
+        raise GaitError(f"{what}, nor at any other height: its motors are too weak; run slower")
+    raise GaitError(f"{what}: give a height from {min(good):.3g} to {max(good):.3g} m")
+
+
+def _bears(robot: PlanarBiped, speed: float, height: float, torque_scale: float) -> bool:
+    """Whether there is such a gait, and its stance does not ask too much of a knee."""
+    p = template_for(robot)
+    try:
+        gait = running_gait(p, speed, height)
+    except GaitError:
+        return False
+    limit = torque_scale * min(float(robot.torque_limit[leg[1]]) for leg in robot.legs)
+    folded = _shortest_leg(gait) < _SHORTEST * p.rest_length
+    return not folded and knee_torque(robot, gait) <= _BEARABLE * limit

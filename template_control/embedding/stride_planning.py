@@ -300,10 +300,7 @@ class StridePlanning:
         """
         report, planner = self.reports[-1], self.planner
         if isinstance(planner, LandingPlanner):
-            free = free_controls(self.automaton, node)
-            ahead = self._ahead(node, sensed)
-            decision = planner.land(ahead, report.decision, report.goal.target, free)
-            self.reports[-1] = replace(report, decision=decision)
+            self._choose_again(planner, node, sensed)
         else:
             z = self._back_to_section(self.automaton.start(report.goal.stride), report, sensed)
             if z is not None:
@@ -311,6 +308,14 @@ class StridePlanning:
                 decision = planner.decide(z, report.goal.target, (angle, angle))
                 self.reports[-1] = replace(report, decision=decision)
         self.follow(node, sensed, now)
+
+    def _choose_again(self, planner: LandingPlanner, node: Node, sensed: Sensed) -> None:
+        """Let the planner choose the stiffnesses that the rest of the stride depends on."""
+        report = self.reports[-1]
+        free = free_controls(self.automaton, node)
+        ahead = self._ahead(node, sensed)
+        decision = planner.land(ahead, report.decision, report.goal.target, free)
+        self.reports[-1] = replace(report, decision=decision)
 
     def _ahead(self, node: Node, sensed: Sensed) -> Ahead:
         """Where the present stride ends from here, by its controls."""
@@ -386,13 +391,15 @@ class StridePlanning:
     def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> None:
         """Plan again from here; until a leg lands, the stride's controls are still free.
 
+        From then on the stiffnesses of what is left are, to a planner that has ``land``.
+
         Args:
             node: of the automaton, the robot's.
             sensed: the robot's state.
             phase_time: time along the path [s].
             now: time [s].
         """
-        report = self.reports[-1]
+        report, planner = self.reports[-1], self.planner
         starts = node.name == self.automaton.starts[report.goal.stride]
         if starts and node.name not in self.curved:
             z = self._back_to_section(node, report, sensed)
@@ -400,10 +407,10 @@ class StridePlanning:
                 left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
                 change = self.options.agility * min(left, self.options.foresight) ** 2
                 angle = float(report.decision.controls[Slot.TOUCHDOWN_ANGLE])
-                decision = self.planner.decide(
-                    z, report.goal.target, (angle - change, angle + change)
-                )
+                decision = planner.decide(z, report.goal.target, (angle - change, angle + change))
                 self.reports[-1] = replace(report, decision=decision)
+        elif isinstance(planner, LandingPlanner):
+            self._choose_again(planner, node, sensed)
         self.follow(node, sensed, now)
 
     def _back_to_section(self, node: Node, report: SectionReport, sensed: Sensed) -> Array | None:

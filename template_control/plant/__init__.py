@@ -1,4 +1,4 @@
-"""The worlds a robot walks in: PyBullet, and ideal contacts that stick."""
+"""The worlds a robot walks in: PyBullet, MuJoCo, and ideal contacts that stick."""
 
 import lazy_loader
 

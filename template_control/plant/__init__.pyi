@@ -3,5 +3,7 @@ from .bullet import PlantOptions as PlantOptions
 from .ground import GroundStep as GroundStep
 from .ideal import IdealOptions as IdealOptions
 from .ideal import IdealPlant as IdealPlant
+from .mujoco import MujocoOptions as MujocoOptions
+from .mujoco import MujocoPlant as MujocoPlant
 from .plant import Plant as Plant
 from .plant import open_plant as open_plant

@@ -10,7 +10,6 @@ template here is due to the robot.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +20,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError
 from template_control.plant.rigid_contact import pressing, solve
+from template_control.plant.trunk_box import trunk_corners
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 
@@ -94,7 +94,7 @@ class IdealPlant:
         self._push = 0.0
         self._anchor = np.zeros(2)
         self._impulse = np.zeros((2, 2))
-        self._trunk_corners = _trunk_corners(self.robot)
+        self._trunk_corners = trunk_corners(self.robot)
 
     @property
     def time_step(self) -> float:
@@ -289,17 +289,3 @@ class IdealPlant:
             v, _ = solve(r.mass_matrix, momentum, r.foot_jacobian, np.zeros((2, 2)), self.contacts)
             r.update(q, v)
         self._q, self._v = q, v
-
-
-def _trunk_corners(robot: PlanarBiped) -> Array:
-    """x and z (2, n) of the corners of boxes around the trunk's shapes, in its frame [m]."""
-    geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.GeometryType.COLLISION)
-    corners = []
-    for shape in geometry.geometryObjects:
-        if shape.parentJoint != BASE_DOF:
-            continue
-        shape.geometry.computeLocalAABB()
-        box = shape.geometry.aabb_local
-        for corner in product(*zip(box.min_, box.max_, strict=True)):
-            corners.append(shape.placement.act(np.array(corner))[[0, 2]])
-    return np.array(corners).reshape(-1, 2).T

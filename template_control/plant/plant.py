@@ -12,6 +12,7 @@ from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
+from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.robot.planar_biped import PlanarBiped
 
 Array = NDArray[np.float64]
@@ -69,7 +70,7 @@ class Plant(Protocol):
         """Give back what the plant holds."""
 
 
-World = PlantOptions | IdealOptions | Plant
+World = PlantOptions | MujocoOptions | IdealOptions | Plant
 """A plant, or the options of one of the library's."""
 
 _MEMBERS = (
@@ -99,7 +100,7 @@ def check_world(world: World) -> None:
     if lacking:
         raise ParameterError(
             f"plant is a {type(world).__name__}, which lacks {', '.join(lacking)}: give"
-            " PlantOptions, IdealOptions or an object with the members of Plant"
+            " PlantOptions, MujocoOptions, IdealOptions or an object with the members of Plant"
         )
     step = world.time_step
     if not (isinstance(step, int | float) and np.isfinite(step) and step > 0.0):
@@ -109,7 +110,7 @@ def check_world(world: World) -> None:
 
 
 def plant_name(world: World) -> str:
-    """Name of a plant: ``ideal``, ``pybullet``, or the name of the class of another one."""
+    """Name of a plant: ``ideal``, ``mujoco``, ``pybullet``; of another one, that of its class."""
     if isinstance(world, PlantOptions | IdealOptions):
         return world.kind
     return type(world).__name__
@@ -126,6 +127,8 @@ def open_plant(robot: PlanarBiped, world: World) -> AbstractContextManager[Plant
     """
     if isinstance(world, IdealOptions):
         return IdealPlant(robot, world)
+    if isinstance(world, MujocoOptions):
+        return MujocoPlant(robot, world)
     if isinstance(world, PlantOptions):
         return BulletPlant(robot, world)
     return nullcontext(world)

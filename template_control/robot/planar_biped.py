@@ -72,6 +72,8 @@ class PlanarBiped:
         foot_velocity: (2, 2) of the material point there [m/s].
         foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
         foot_bias: (2, 2) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
+        joint_velocity: (nv - 3,) of the actuated joints [rad/s].
+        fastest: the largest share of its limit that a joint's speed has.
     """
 
     def __init__(
@@ -129,6 +131,8 @@ class PlanarBiped:
         self.foot_velocity = np.zeros((2, 2))
         self.foot_jacobian = terms.foot_jacobian
         self.foot_bias = terms.foot_bias
+        self.joint_velocity = terms.joint_velocity
+        self.fastest = 0.0
 
     def __repr__(self) -> str:
         joints = ", ".join(self.joint_names)
@@ -215,7 +219,7 @@ class PlanarBiped:
             pin.getFrameClassicalAcceleration(model, data, left, _WORLD_ALIGNED).vector,
             pin.getFrameClassicalAcceleration(model, data, right, _WORLD_ALIGNED).vector,
         )
-        finite, self.angular_momentum, self.angular_momentum_bias = gather(
+        finite, self.angular_momentum, self.angular_momentum_bias, self.fastest = gather(
             self._sources, q, v, drift, self._terms
         )
         if not finite:

@@ -29,6 +29,7 @@ class PlanarTerms(NamedTuple):
         foot_position: (2, 2) [m].
         foot_jacobian: (2, 2, nv).
         foot_bias: (2, 2) [m/s^2].
+        joint_velocity: (nv - 3,) [rad/s].
     """
 
     com: Array
@@ -39,6 +40,7 @@ class PlanarTerms(NamedTuple):
     foot_position: Array
     foot_jacobian: Array
     foot_bias: Array
+    joint_velocity: Array
 
     @classmethod
     def zeros(cls, nv: int) -> PlanarTerms:
@@ -47,7 +49,7 @@ class PlanarTerms(NamedTuple):
         Args:
             nv: degrees of freedom.
         """
-        shapes = ((2,), (2,), (2,), (2, nv), (nv,), (2, 2), (2, 2, nv), (2, 2))
+        shapes = ((2,), (2,), (2,), (2, nv), (nv,), (2, 2), (2, 2, nv), (2, 2), (nv - BASE_DOF,))
         return cls(*(np.zeros(shape) for shape in shapes))
 
 
@@ -74,13 +76,14 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float)
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.nle, data.g)
     jacobians = (data.Jcom, data.Ag, data.J)
     feet = tuple(data.oMf[frame].translation for frame in frames)
-    return (*whole, *jacobians), feet, (carries, np.array([radius]))
+    limit = np.array(model.velocityLimit[BASE_DOF:])
+    return (*whole, *jacobians), feet, (carries, np.array([radius]), limit)
 
 
 @compiled
 def gather(
     views: Sources, q: Array, v: Array, drift: tuple[Array, Array], out: tuple[Array, ...]
-) -> tuple[bool, float, float]:
+) -> tuple[bool, float, float, float]:
     """Write the planar terms at the state that Pinocchio has last computed.
 
     Args:
@@ -92,14 +95,18 @@ def gather(
 
     Returns:
         Whether the state is finite; the angular momentum about the CoM, forward pitch
-        positive [kg m^2/s], and its Jacobian's time derivative times v [N m].
+        positive [kg m^2/s], and its Jacobian's time derivative times v [N m]; the largest share
+        of its limit that a joint's speed has.
     """
-    whole, feet, (carries, radius) = views
+    whole, feet, (carries, radius, limit) = views
     centre, speed, pull, momentum, effects, weight, com_jacobian, centroidal, jacobian = whole
-    com, com_velocity, com_bias, jcom, jl, foot_position, foot_jacobian, foot_bias = out
-    finite = True
+    com, com_velocity, com_bias, jcom, jl, foot_position, foot_jacobian, foot_bias, turning = out
+    finite, fastest = True, 0.0
     for k in range(q.shape[0]):
         finite = finite and np.isfinite(q[k]) and np.isfinite(v[k])
+    for k in range(limit.shape[0]):
+        turning[k] = v[BASE_DOF + k]
+        fastest = max(fastest, abs(turning[k]) / limit[k])
     com[0], com[1] = centre[0], centre[2]
     com_velocity[0], com_velocity[1] = speed[0], speed[2]
     com_bias[0], com_bias[1] = pull[0], pull[2]
@@ -123,4 +130,4 @@ def gather(
     force_z = effects[1] - weight[1]
     moment = effects[BASE_DOF - 1] - weight[BASE_DOF - 1]
     rate = moment - (com[1] - q[1]) * force_x + (com[0] - q[0]) * force_z
-    return finite, momentum[4], rate
+    return finite, momentum[4], rate, fastest

@@ -24,7 +24,7 @@ def check_planar(path: Path, model: pin.Model) -> None:
         model: of the robot.
 
     Raises:
-        RobotError: naming the joint that is otherwise, or has no torque limit.
+        RobotError: naming the joint that is otherwise, or has no limit of torque or speed.
     """
     kinds = [joint.shortname() for joint in model.joints][1:]
     names = list(model.names)[1:]
@@ -53,6 +53,13 @@ def check_planar(path: Path, model: pin.Model) -> None:
     for name, limit in zip(names[BASE_DOF:], limits, strict=True):
         if not 0.0 < limit < _UNLIMITED:
             raise RobotError(f"{path}: joint {name!r} has effort {limit}: give its torque limit")
+    speeds = np.array(model.velocityLimit[BASE_DOF:])
+    for name, limit in zip(names[BASE_DOF:], speeds, strict=True):
+        if not 0.0 < limit < _UNLIMITED:
+            raise RobotError(
+                f"{path}: joint {name!r} has velocity {limit}: give the speed [rad/s] that it can"
+                " have"
+            )
 
 
 def check_hips(path: Path, model: pin.Model, hips: Sequence[int]) -> None:

@@ -225,6 +225,9 @@ def _check_joint(path: Path, joint: ET.Element) -> None:
         if not direction.any():
             raise RobotError(f"{where}: axis is 0 0 0: give its direction")
     for limit in joint.findall("limit"):
+        for name, most in (("effort", "torque or force"), ("velocity", "speed")):
+            if limit.get(name) is None:
+                raise RobotError(f"{where}: limit has no {name}: give the joint's largest {most}")
         for name in _LIMITS:
             text = limit.get(name, "0")
             try:

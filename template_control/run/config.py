@@ -25,7 +25,12 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_route import robot_route
-from template_control.embedding.robot_template import default_gait, paper_gait, template_for
+from template_control.embedding.robot_template import (
+    check_apex,
+    default_gait,
+    paper_gait,
+    template_for,
+)
 from template_control.errors import ParameterError
 from template_control.parts import ready
 from template_control.robot.library import ROBOTS, load_robot
@@ -127,17 +132,24 @@ class GaitChoice(Checked):
             GaitError: if the template has no such gait.
         """
         if self.name == "run":
-            template = template_for(robot)
-            speed = self.speed
-            if speed is None:
-                speed = _RUN * float(np.sqrt(template.gravity * template.rest_length))
-            return running_gait(template, speed, self.apex_height)
+            return running_gait(template_for(robot), self.run_speed(robot), self.apex_height)
         if self.name == "paper":
             return paper_gait(template_for(robot))
         angle = None if self.touchdown_angle is None else float(np.radians(self.touchdown_angle))
         if self.speed is not None:
             return gait_for_speed(template_for(robot), self.speed, touchdown_angle=angle)
         return default_gait(robot, angle)
+
+    def run_speed(self, robot: PlanarBiped) -> float:
+        """Of a run, dx/dt at apex [m/s].
+
+        Args:
+            robot: its last update is overwritten.
+        """
+        if self.speed is not None:
+            return self.speed
+        template = template_for(robot)
+        return _RUN * float(np.sqrt(template.gravity * template.rest_length))
 
 
 @dataclass(frozen=True)
@@ -270,7 +282,10 @@ class RunConfig(Checked):
         robot = self.robot.load()
         ready(WALK)  # before the gait is looked for, which would compile a part of it alone
         if self.scenario is None:
-            gait = self.gait.of(robot)
+            choice, scale = self.gait, self.simulation.embedding.torque_scale
+            if choice.apex_height is not None:
+                check_apex(robot, choice.run_speed(robot), choice.apex_height, scale)
+            gait = choice.of(robot)
             return Ready(robot, gait, None, {gait.stride: self._planner(gait)})
         route = robot_route(robot, self.scenario)
         walk = walking_gait(route.parameters, first_speed(route))

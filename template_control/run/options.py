@@ -12,6 +12,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
+from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.plant import Plant, check_world
 from template_control.robot.start import Pose
 from template_control.run.sensing import SensorOptions
@@ -103,7 +104,7 @@ class SimulationOptions(Checked):
     """
 
     steps: Count | None = None
-    plant: PlantOptions | IdealOptions | Plant = field(default_factory=PlantOptions)
+    plant: PlantOptions | MujocoOptions | IdealOptions | Plant = field(default_factory=PlantOptions)
     embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
     start: tuple[float, float, float] | None = None
     pose: Pose | None = None

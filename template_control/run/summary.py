@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _STATE = ("speed", "height", "vertical_speed")
 _LAST = 50  # strides that a gait is judged by
+_NEAR = 0.02  # of sqrt(g l0): a plan that ends so near the wanted speed aims at it
 
 
 def _sections(record: Record) -> dict[str, Any]:
@@ -66,6 +67,17 @@ def _speed_error(record: Record) -> float | None:
     return float(np.sqrt(np.mean(error**2))) if error.size else None
 
 
+def _nearest(record: Record) -> dict[str, float]:
+    """Strides that were planned to end at another speed than the wanted one, and how far off.
+
+    That is where the wanted speed is further away than a stride can lead.
+    """
+    template = record.metadata["template"]
+    short = np.abs(record.section_target[:-1, 0] - record.section_predicted[:-1, 0])
+    near = _NEAR * float(np.sqrt(template["gravity"] * template["rest_length"]))
+    return {"strides": int(np.sum(short > near)), "most": float(short.max(initial=0.0))}
+
+
 def _quantiles(seconds: Array) -> dict[str, float]:
     median, p99 = np.percentile(seconds, [50, 99])
     return {"median": float(median), "p99": float(p99)}
@@ -83,7 +95,9 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         robot, gait, steps, fell, fall_reason, duration, mean_speed, vlo_target and
         vlo_mean_last_50 (speed, height, vertical_speed), or where the run ends at an apex
         apex_target and apex_mean_last_50 (speed, height), speed_error_rms (of dx/dt where
-        strides end, against their targets), com_error_rms and com_error_max (x, y, while a foot is
+        strides end, against their targets), nearest_speed_taken (strides planned to end at another
+        speed than the wanted one, the nearest within their reach, and the most that one was off
+        [m/s]), com_error_rms and com_error_max (x, y, while a foot is
         to stand), com_error_flight_rms (x, y; None without flight), joint_torque (per joint peak,
         rms, limit), joint_speed (per joint peak, limit), saturated_share, qp_failures,
         cost_of_transport (work of the joints, all counted positive, over m g and distance),
@@ -105,6 +119,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "mean_speed": walked / max(float(record.time[-1]), 1e-9),
         **_sections(record),
         "speed_error_rms": _speed_error(record),
+        "nearest_speed_taken": _nearest(record),
         **{name: value for name, value in m["summary"].items() if name != "joint_work"},
         "cost_of_transport": _cost_of_transport(record, walked),
         "flight_share": _flight_share(record),

@@ -6,6 +6,7 @@ Torques are scaled by their limits and forces by the robot's weight:
     s.t. -1 <= z <= 1                           torque limits
          0 <= mu f_y -+ f_x                     linearised friction cone, each stance foot
          0 <= f_y <= cap                        unilateral contact, unloading foot
+         low <= a_joint <= high                 only where a joint is near its speed limit
 
 H is badly conditioned (tasks against regularisers), and a proximal solver is slow along
 its soft directions. So the solver gets the same problem in w = L^T z with H = L L^T, whose
@@ -38,8 +39,8 @@ class Matrices(NamedTuple):
         f_map: (2 c, nu + 1) contact forces as an affine function of the torques.
         factor: (nu, nu) L in its lower triangle.
         gradient: (nu,) L^-1 g.
-        constraint: (nu + 3 c, nu) rows of unit length.
-        lower, upper: (nu + 3 c,) bounds of the rows times w.
+        constraint: (nu + 3 c, nu) rows of unit length; nu more where accelerations are bounded.
+        lower, upper: bounds of the rows times w.
     """
 
     a_map: Array
@@ -71,8 +72,9 @@ def assemble(
         costs: (2,) of the contact forces' distance from the wanted ones, per (m g)^2, and of
             the joint torques, per squared limit.
         limits: (nu + c + 2,) largest joint torques [N m], largest normal force of each stance foot
-            [N] (inf: none), coefficient of the friction cones, m g [N]. One array, as each one
-            that a compiled function is handed costs time.
+            [N] (inf: none), coefficient of the friction cones, m g [N]. Where the joints'
+            accelerations are bounded, (2 nu,) more: the least and the greatest [rad/s^2]. One
+            array, as each one that a compiled function is handed costs time.
         out: the arrays of :class:`Matrices`, overwritten; a plain tuple, as a compiled function
             is called with a named one in twice the time.
 
@@ -132,6 +134,13 @@ def assemble(
             constraint[top + 2, j] = f_map[y, j] * torque_limit[j] / weight
         lower[top + 2] = -f_map[y, nu] / weight
         upper[top + 2] = min(_FAR, (force_cap[foot] - f_map[y, nu]) / weight)
+    least = nu + feet + 2
+    for i in range((limits.shape[0] - least) // 2):
+        row_of, joint = nu + ROWS_PER_FOOT * feet + i, nv - nu + i
+        for j in range(nu):
+            constraint[row_of, j] = a_map[joint, j] * torque_limit[j]
+        lower[row_of] = limits[least + i] - a_map[joint, nu]
+        upper[row_of] = limits[least + nu + i] - a_map[joint, nu]
 
     if not cholesky(factor, nu):
         return False

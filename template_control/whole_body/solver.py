@@ -1,4 +1,9 @@
-"""Whole-body control on ProxQP: one warm-started workspace per contact state."""
+"""Whole-body control on ProxQP: one warm-started workspace per contact state.
+
+A joint near its limit of speed has its acceleration bounded, in a workspace with these further
+rows. Where the motors cannot slow down so much, it shall not get faster; where they cannot do
+that either, the tick is solved without these rows.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +17,9 @@ import proxsuite
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import NotNegative, Positive
+from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.similarity import RATE, tuned
+from template_control.slip.similarity import RATE, TIME, tuned
 from template_control.whole_body.problem import (
     ROWS_PER_FOOT,
     Matrices,
@@ -45,6 +50,11 @@ class QpOptions(Checked):
             in double stance it chooses between forces that serve the tasks alike.
         torque_cost: of the joint torques, per squared limit. Smaller: it only makes the
             optimum unique.
+        speed_share: from this share of its limit on a joint's speed is bounded. Far from the
+            limit the bound would only cost time.
+        speed_horizon: a joint gains at most the rest up to its limit in this time [s]. Shorter,
+            and it would meet the limit with a jolt; longer, and swings would be slowed that
+            never come near it.
     """
 
     friction: Positive = tuned(0.7)
@@ -53,6 +63,8 @@ class QpOptions(Checked):
     contact_damping: NotNegative = tuned(40.0, RATE)
     force_cost: Positive = tuned(1e-3)
     torque_cost: Positive = tuned(1e-4)
+    speed_share: Share = tuned(0.85)
+    speed_horizon: Positive = tuned(0.005, TIME)
 
     @property
     def cone(self) -> float:
@@ -96,10 +108,17 @@ class Solution:
 
 
 class _Workspace:
-    """Matrices and ProxQP object for one number of stance feet."""
+    """Matrices and ProxQP object for one number of stance feet.
 
-    def __init__(self, nv: int, nu: int, feet: int, weight: float) -> None:
-        rows = nu + ROWS_PER_FOOT * feet
+    Args:
+        nv, nu: degrees of freedom, and those that are driven.
+        feet: on the ground.
+        weight: of the robot [N].
+        bounded: how many accelerations of joints have bounds: none, or all.
+    """
+
+    def __init__(self, nv: int, nu: int, feet: int, weight: float, bounded: int = 0) -> None:
+        rows = nu + ROWS_PER_FOOT * feet + bounded
         self._identity = np.eye(nu)
         self.matrices = Matrices(
             a_map=np.zeros((nv, nu + 1)),
@@ -111,9 +130,11 @@ class _Workspace:
             upper=np.zeros(rows),
         )
         self.out = tuple(self.matrices)
-        self.limits = np.zeros(nu + feet + 2)
-        self.limits[-1] = weight
+        self.limits = np.zeros(nu + feet + 2 + 2 * bounded)
+        self.limits[nu + feet + 1] = weight
         self.torque_limit, self.cap = self.limits[:nu], self.limits[nu : nu + feet]
+        self.friction = self.limits[nu + feet : nu + feet + 1]
+        self.least, self.most = self.limits[nu + feet + 2 :].reshape(2, bounded)
         self.contact = np.zeros((2 * feet, nv + 2))
         self.jacobian = self.contact[:, :nv]
         self.bias, self.force = self.contact[:, nv], self.contact[:, nv + 1]
@@ -164,7 +185,7 @@ class _Workspace:
 
 
 class WholeBodyQp:
-    """Torques that serve weighted tasks within torque limits and friction cones.
+    """Torques that serve weighted tasks within limits of torque and speed, and friction cones.
 
     Args:
         robot: the model; :meth:`solve` reads its last update.
@@ -183,10 +204,13 @@ class WholeBodyQp:
         self.torque_limit: Array = robot.torque_limit * o.torque_scale
         self._contact_damping = o.contact_damping
         self._costs = np.array([o.force_cost, o.torque_cost])
+        self._speed_share, self._speed_rate = o.speed_share, 1.0 / o.speed_horizon
         nu = len(self.torque_limit)
-        self._workspaces = [
-            _Workspace(robot.nv, nu, feet, robot.mass * robot.gravity) for feet in range(3)
-        ]
+        weight = robot.mass * robot.gravity
+        self._workspaces, self._braked = (
+            [_Workspace(robot.nv, nu, feet, weight, bounded) for feet in range(3)]
+            for bounded in (0, nu)
+        )
         self._torque = np.zeros(nu)
         self._failing = False
 
@@ -199,16 +223,47 @@ class WholeBodyQp:
             load: ratio of the real to the modelled inertia; the torques are scaled by it
                 and stay within their limits.
         """
-        robot = self.robot
-        w = self._workspaces[len(stance.feet)]
+        robot, feet = self.robot, len(stance.feet)
         limit = self.torque_limit / load
+        w, seconds, solved = self._workspaces[feet], 0.0, False
+        if robot.fastest > self._speed_share:
+            w = self._braked[feet]
+            room, turning = robot.velocity_limit, robot.joint_velocity
+            for slack in (-np.inf, 0.0):
+                w.most[:] = np.maximum(self._speed_rate * (room - turning), slack)
+                w.least[:] = -np.maximum(self._speed_rate * (room + turning), slack)
+                regular, solved, more = self._attempt(w, tasks, stance, limit)
+                seconds += more
+                if solved:
+                    break
+        if not solved:
+            w = self._workspaces[feet]
+            regular, solved, more = self._attempt(w, tasks, stance, limit)
+            seconds += more
+        if not solved:
+            self._tell(regular, stance)
+        self._failing = not solved
+        if solved:
+            torques(w.matrices.factor, w.qp.results.x, limit, self._torque)
+        else:
+            np.clip(self._torque, -limit, limit, out=self._torque)
+        force = np.empty(2 * feet)
+        acceleration = np.empty(robot.nv)
+        follow(w.matrices.a_map, w.matrices.f_map, self._torque, acceleration, force)
+        return Solution(load * self._torque, force, acceleration, solved, seconds)
+
+    def _attempt(
+        self, w: _Workspace, tasks: TaskStack, stance: Stance, limit: Array
+    ) -> tuple[bool, bool, float]:
+        """Whether the problem is regular, and solved, in this workspace; seconds in ProxQP."""
+        robot = self.robot
         for i, foot in enumerate(stance.feet):
             rows = slice(2 * i, 2 * i + 2)
             w.jacobian[rows] = robot.foot_jacobian[foot]
             w.bias[rows] = robot.foot_bias[foot] + self._contact_damping * robot.foot_velocity[foot]
         w.force[:] = stance.force
         w.torque_limit[:], w.cap[:] = limit, stance.cap
-        w.limits[-2] = self.friction
+        w.friction[0] = self.friction
         regular = assemble(
             robot.mass_matrix,
             robot.nonlinear_effects,
@@ -220,18 +275,7 @@ class WholeBodyQp:
         )
         start = time.perf_counter()
         solved = regular and w.solve()
-        seconds = time.perf_counter() - start
-        if not solved:
-            self._tell(regular, stance)
-        self._failing = not solved
-        if solved:
-            torques(w.matrices.factor, w.qp.results.x, limit, self._torque)
-        else:
-            np.clip(self._torque, -limit, limit, out=self._torque)
-        force = np.empty(2 * len(stance.feet))
-        acceleration = np.empty(robot.nv)
-        follow(w.matrices.a_map, w.matrices.f_map, self._torque, acceleration, force)
-        return Solution(load * self._torque, force, acceleration, solved, seconds)
+        return regular, solved, time.perf_counter() - start
 
     def _tell(self, regular: bool, stance: Stance) -> None:
         """Log that the last solved torques are kept, once for failures in a row."""

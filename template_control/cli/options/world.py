@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from template_control.cli.options.ranges import check_ranges
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
+from template_control.plant.mujoco import MujocoOptions
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.simulation import STEPS
 
-_PLANTS = {options.kind: options for options in (PlantOptions, IdealOptions)}
+_PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions, IdealOptions)}
 _DEFAULT = SimulationOptions()
 _RANGES = {
     "steps": (1, 1_000_000),
@@ -33,8 +34,8 @@ def add_world_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plant",
         choices=tuple(_PLANTS),
-        help="pybullet if not given; ideal: rigid contacts that stick, no friction; --friction is"
-        " then the controller's cone only",
+        help="pybullet if not given; mujoco: the other physics engine, if it is installed; ideal:"
+        " rigid contacts that stick, no friction; --friction is then the controller's cone only",
     )
     parser.add_argument(
         "--friction",
@@ -131,7 +132,8 @@ def _plant(options: argparse.Namespace, base: SimulationOptions) -> PlantOptions
     assert isinstance(plant, PlantOptions | IdealOptions)  # a file holds no other plant
     if options.plant not in (None, plant.kind):
         made = _PLANTS[options.plant]
-        plant = made(time_step=plant.time_step, mass_scale=plant.mass_scale)
+        shared = {f.name for f in fields(made)} & {f.name for f in fields(plant)}
+        plant = made(**{name: getattr(plant, name) for name in shared})
     given = {"mass_scale": options.mass_scale}
     if isinstance(plant, PlantOptions):
         given["friction"] = options.friction

@@ -38,6 +38,9 @@ def print_table(figures: dict[str, Any]) -> None:
                 row(f"{section}, {name}", _state(z))
     if figures["speed_error_rms"] is not None:
         row("speed at the sections less the target, RMS", f"{figures['speed_error_rms']:.4f} m/s")
+    nearest = figures["nearest_speed_taken"]
+    if nearest["strides"]:
+        row("nearest speed taken for the wanted one", nearest_text(nearest))
     rms, worst = figures["com_error_rms"], figures["com_error_max"]
     for axis in ("x", "y"):
         row(
@@ -78,6 +81,15 @@ def print_table(figures: dict[str, Any]) -> None:
     row("real-time factor", f"{figures['real_time_factor']:.1f}")
     row("record", figures["record"] or "not saved")
     plain_console().print(table)
+
+
+def nearest_text(nearest: dict[str, float]) -> str:
+    """Where the wanted speed was out of a stride's reach.
+
+    Args:
+        nearest: ``nearest_speed_taken`` of a summary.
+    """
+    return f"{nearest['strides']} times, {nearest['most']:.2f} m/s off"
 
 
 def _state(z: dict[str, float]) -> str:

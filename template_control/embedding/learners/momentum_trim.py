@@ -59,13 +59,17 @@ class MomentumTrim:
     def __init__(self, parameters: SlipParameters, options: TrimOptions) -> None:
         p = parameters
         self.options = options
-        self.acceleration = 0.0
-        self.drift = 0.0
+        self.forget()
         self._speed = float(np.sqrt(p.gravity * p.rest_length))
         self._bound = options.bound * p.gravity
         self._path: TemplatePath | None = None
         self._gait: Gait | None = None
         self._left_alone = np.zeros(3)
+
+    def forget(self) -> None:
+        """Begin anew: what was learnt was for another way of moving."""
+        self.acceleration = 0.0
+        self.drift = 0.0
 
     def expect(self, path: TemplatePath | None, gait: Gait) -> None:
         """Take note of the exact template's path for the step that begins.

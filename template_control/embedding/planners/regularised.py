@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.planners.gauss_newton import improve
 from template_control.embedding.planners.planner import Ahead
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.maps.return_map import ReturnMap
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 
 _DIFFERENCE = 1e-6  # of a control
 _GRID = 5  # points of each control, where the base's stride fails
+_CLOSE = 0.03  # a step this short, in units of change, is the last: what it leaves is its square
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,11 @@ class Prior:
     lower: Array
     upper: Array
     rounds: int
+
+    @property
+    def table(self) -> Array:
+        """(4, f) base, change and bounds, as the compiled step takes them."""
+        return np.array([self.base, self.change, self.lower, self.upper])
 
 
 class StrideEnd(Protocol):
@@ -122,24 +129,32 @@ def solve_stride(
         (5,) controls; (m,) where the stride ends, None where none of those tried completes it.
     """
     u = prior.controls.copy()
-    x = _start(stride, aim, prior, tolerance)
+    goal, limits = np.array([aim, tolerance]), prior.table
+    x = prior.base
     best: tuple[float, Array, Array] | None = None
-    for _ in range(prior.rounds + 1):
+    for number in range(prior.rounds + 1):
         u[prior.slots] = x
         end, jacobian, outcome = stride.slopes(u)
         if outcome is not Outcome.SECTION:
-            if best is None:
+            if best is not None:
+                x = 0.5 * (x + best[1])
+            elif number == 0:
+                x = _from_grid(stride, aim, prior, tolerance)
+            else:
                 break
-            x = 0.5 * (x + best[1])
             continue
-        residual = np.concatenate(((end - aim) / tolerance, (x - prior.base) / prior.change))
-        cost = float(residual @ residual)
+        cost, longest, there = improve(end, jacobian, goal, x, limits)
         if best is not None and cost >= best[0]:
             x = 0.5 * (x + best[1])
             continue
-        best = (cost, x.copy(), end)
-        rows = np.vstack((jacobian / tolerance[:, None], np.diag(1.0 / prior.change)))
-        x = bounded_step(rows, residual, x, prior.lower, prior.upper)
+        best = (cost, x, end)
+        if longest < _CLOSE:
+            u[prior.slots] = there
+            end, outcome = stride.at(u)
+            if outcome is Outcome.SECTION:
+                return u, end
+            break
+        x = there
     if best is None:
         u[prior.slots] = prior.base
         return u, None
@@ -147,16 +162,13 @@ def solve_stride(
     return u, best[2]
 
 
-def _start(stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array) -> Array:
-    """The base, or where that fails the best of a grid within the bounds."""
+def _from_grid(stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array) -> Array:
+    """The best of a grid within the bounds; the base where all of it fails."""
     u = prior.controls.copy()
-    u[prior.slots] = prior.base
-    if stride.at(u)[1] is Outcome.SECTION:
-        return prior.base.copy()
     axes = [
         np.linspace(low, high, _GRID) for low, high in zip(prior.lower, prior.upper, strict=True)
     ]
-    best, least = prior.base.copy(), np.inf
+    best, least = prior.base, np.inf
     for x in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes)):
         u[prior.slots] = x
         end, outcome = stride.at(u)
@@ -166,27 +178,3 @@ def _start(stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array) -> Arr
             if cost < least:
                 best, least = x, cost
     return best
-
-
-def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Array) -> Array:
-    """x + dx with the least |rows dx + residual| between the bounds.
-
-    A variable that would leave its bounds is held there, and the others are solved for again.
-
-    Args:
-        rows: (r, f) Jacobian of the residual.
-        residual: (r,) at x.
-        x: (f,) within the bounds.
-        lower, upper: (f,) bounds.
-    """
-    free = upper > lower
-    step = np.clip(x, lower, upper) - x
-    for _ in range(len(x)):
-        left = residual + rows @ np.where(free, 0.0, step)
-        step[free] = -np.linalg.lstsq(rows[:, free], left, rcond=None)[0]
-        beyond = free & ((x + step < lower) | (x + step > upper))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(x + step, lower, upper)[beyond] - x[beyond]
-        free &= ~beyond
-    return np.clip(x + step, lower, upper)

@@ -55,7 +55,7 @@ class RunningOptions(Checked):
     angle_range: Interval = tuned((-0.1, 0.1))
     stiffness_range: Interval = tuned((0.6, 1.6))
     top_margin: NotNegative = tuned(0.005)
-    pace: Positive = tuned(0.06, SPEED)
+    pace: Positive = tuned(0.09, SPEED)
     climb: Positive = tuned(0.02, LENGTH)
     offset_gain: Share = tuned(0.2)
     offset_bound: tuple[NotNegative, NotNegative] = tuned((0.3, 0.03), SPEED, LENGTH)

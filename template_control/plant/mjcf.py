@@ -1,0 +1,194 @@
+"""A planar biped and its ground as MuJoCo's MJCF, written from the Pinocchio model.
+
+MuJoCo refuses links without mass, so the massless slides of the base become joints of the trunk:
+joints of one body act one after another, as a chain does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from template_control.plant.ground import GroundStep
+from template_control.plant.trunk_box import trunk_corners
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.requirements import BASE_DOF
+
+Array = NDArray[np.float64]
+
+FOOT = "foot"
+TRUNK = "trunk"
+"""What the names of shapes that touch the ground begin with."""
+
+_UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
+_MASSLESS = 1e-12  # of the robot's mass
+_CORNER = 1e-3  # radius of the balls at the trunk's corners [m]
+_BOX = (1000.0, 1.0, 1.0)  # half sides of a step's box [m]
+
+
+@dataclass(frozen=True)
+class World:
+    """What MJCF tells beside the robot.
+
+    Attributes:
+        friction: Coulomb coefficient between robot and ground.
+        time_step: [s].
+        mass_scale: factor of every link's mass and inertia.
+        contact_time: time constant with which a contact gives way [s].
+        ground_step: of the ground; None: it is flat.
+    """
+
+    friction: float
+    time_step: float
+    mass_scale: float
+    contact_time: float
+    ground_step: GroundStep | None
+
+
+def mjcf(robot: PlanarBiped, world: World) -> str:
+    """The model as MuJoCo reads it.
+
+    The joints have the names of Pinocchio's, the feet's spheres are ``foot0`` and ``foot1``, and
+    the trunk's body and shapes begin with ``trunk``. Feet and trunk meet the ground; the other
+    links, and the robot itself, do not.
+
+    Args:
+        robot: the model.
+        world: the rest.
+    """
+    root = Element("mujoco", model="plant")
+    _add(root, "compiler", angle="radian", autolimits="true")
+    option = _add(
+        root,
+        "option",
+        timestep=repr(world.time_step),
+        gravity=_text((0.0, 0.0, -robot.gravity)),
+        cone="elliptic",  # the friction cone as it is, no pyramid in it
+    )
+    # A state that is no number any more is the controller's to refuse, not to be put back.
+    _add(option, "flag", autoreset="disable")
+    ground = _add(root, "worldbody")
+    _add_ground(ground, world)
+    _add_robot(ground, robot, world.mass_scale)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _add(parent: Element, tag: str, **attributes: str) -> Element:
+    return ElementTree.SubElement(parent, tag, attributes)
+
+
+def _text(values: ArrayLike) -> str:
+    return " ".join(map(repr, np.asarray(values, dtype=float).tolist()))
+
+
+def _add_ground(parent: Element, world: World) -> None:
+    """A plane at the lower level, and a long box up to the higher one."""
+    how = {
+        "friction": _text((world.friction, 0.0, 0.0)),
+        "priority": "1",  # the ground's friction and give count, not the robot's
+        "condim": "3",
+        "solref": _text((world.contact_time, 1.0)),
+        "contype": "1",
+        "conaffinity": "0",
+    }
+    step = world.ground_step
+    low = 0.0 if step is None else min(step.height, 0.0)
+    _add(parent, "geom", type="plane", size="0 0 1", pos=_text((0.0, 0.0, low)), **how)
+    if step is not None:
+        side = 1.0 if step.height > 0.0 else -1.0  # of the edge, where the ground is higher
+        top = max(step.height, 0.0)
+        centre = (step.x + side * _BOX[0], 0.0, top - _BOX[2])
+        _add(parent, "geom", type="box", size=_text(_BOX), pos=_text(centre), **how)
+
+
+def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
+    """One body for each link that has mass, with the joints that lead to it."""
+    model = robot.model
+    axes = _axes(model)
+    bodies: dict[int, Element] = {0: ground}
+    waiting: dict[int, list[int]] = {0: []}  # joints above a link, which has no body of its own
+    for joint in range(1, model.njoints):
+        parent = model.parents[joint]
+        chain = [*waiting.get(parent, []), joint]
+        if model.inertias[joint].mass <= _MASSLESS * robot.mass:
+            waiting[joint], bodies[joint] = chain, bodies[parent]
+            continue
+        place = pin.SE3.Identity()
+        for above in chain:
+            place = place * model.jointPlacements[above]
+        name = TRUNK if joint == BASE_DOF else model.names[joint] + " link"
+        body = _add(bodies[parent], "body", name=name, **_place(place))
+        here = place.inverse()
+        for above in chain:
+            here = here * model.jointPlacements[above]
+            _add_joint(body, model, above, here, axes[:, above - 1])
+        _add_inertia(body, model.inertias[joint], mass_scale)
+        bodies[joint] = body
+    for i, foot in enumerate(robot.feet):
+        frame = model.frames[model.getFrameId(foot)]
+        centre = _text(frame.placement.translation)
+        _add_ball(bodies[frame.parentJoint], f"{FOOT}{i}", centre, robot.foot_radius)
+    for i, (x, z) in enumerate(trunk_corners(robot).T):
+        _add_ball(bodies[BASE_DOF], f"{TRUNK}{i}", _text((x, 0.0, z)), _CORNER)
+
+
+def _axes(model: pin.Model) -> Array:
+    """(6, joints) linear and angular axis of each joint in its own frame."""
+    data = model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    columns = [
+        pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)[:, joint - 1]
+        for joint in range(1, model.njoints)
+    ]
+    return np.array(columns).T
+
+
+def _place(place: pin.SE3) -> dict[str, str]:
+    x, y, z, w = pin.Quaternion(place.rotation).coeffs()
+    return {"pos": _text(place.translation), "quat": _text((w, x, y, z))}
+
+
+def _add_joint(body: Element, model: pin.Model, joint: int, here: pin.SE3, axis: Array) -> None:
+    """A joint of a body; ``here`` is its frame in the body's."""
+    hinge = bool(np.any(axis[3:]))
+    about = {
+        "name": model.names[joint],
+        "type": "hinge" if hinge else "slide",
+        "axis": _text(here.rotation @ (axis[3:] if hinge else axis[:3])),
+        "pos": _text(here.translation),
+    }
+    low, high = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
+    if joint > BASE_DOF and max(abs(low), abs(high)) < _UNLIMITED:
+        about["range"] = _text((low, high))
+    _add(body, "joint", **about)
+
+
+def _add_inertia(body: Element, inertia: pin.Inertia, scale: float) -> None:
+    # The robot turns about y only, where any rotation leaves the inertia as it is. MuJoCo refuses
+    # the flat inertias of a planar model, in which the other two axes have none.
+    about_y = scale * inertia.inertia[1, 1]
+    _add(
+        body,
+        "inertial",
+        mass=repr(float(scale * inertia.mass)),
+        pos=_text(inertia.lever),
+        diaginertia=_text((about_y, about_y, about_y)),
+    )
+
+
+def _add_ball(body: Element, name: str, centre: str, radius: float) -> None:
+    _add(
+        body,
+        "geom",
+        name=name,
+        type="sphere",
+        size=repr(float(radius)),
+        pos=centre,
+        contype="0",
+        conaffinity="1",
+    )

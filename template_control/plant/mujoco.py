@@ -1,0 +1,151 @@
+"""The robot in MuJoCo: a second physics engine, driven by joint torques and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Positive
+from template_control.errors import ParameterError, RobotError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.mjcf import FOOT, TRUNK, World, mjcf
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.requirements import BASE_DOF
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MujocoOptions(PlantOptions):
+    """What the world in MuJoCo is like; as in PyBullet, and how its contacts give way.
+
+    Attributes:
+        contact_time: time constant of a contact [s]; MuJoCo takes at least two time steps. From
+            2 to 20 ms the robots walk alike; 4 ms lets a foot sink by less than a millimetre.
+
+    Raises:
+        ParameterError: if a number is not positive and finite, or the contact is too quick.
+    """
+
+    kind: ClassVar[str] = "mujoco"
+
+    contact_time: Positive = 4e-3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.contact_time < 2.0 * self.time_step:
+            raise ParameterError(
+                f"MujocoOptions.contact_time is {self.contact_time:g} s: give at least two time"
+                f" steps, {2.0 * self.time_step:g} s"
+            )
+
+
+def _mujoco() -> Any:
+    """The package, which not everybody has.
+
+    Raises:
+        ParameterError: if it is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise ParameterError(
+            "plant mujoco needs the package mujoco: pip install 'template-control[mujoco]', or"
+            " take another plant"
+        ) from None
+    return mujoco
+
+
+class MujocoPlant:
+    """A MuJoCo world with ground at height 0, maybe a step, and one robot.
+
+    Args:
+        robot: whose model to write as MJCF, and whose joint order to speak.
+        options: friction, time step, mass error, contacts, step of the ground.
+
+    Raises:
+        ParameterError: if MuJoCo is not installed.
+        RobotError: if MuJoCo does not take the model.
+
+    Attributes:
+        model, data: MuJoCo's.
+    """
+
+    @checked
+    def __init__(self, robot: PlanarBiped, options: MujocoOptions) -> None:
+        self.options = options
+        self._engine = engine = _mujoco()
+        o = options
+        world = World(o.friction, o.time_step, o.mass_scale, o.contact_time, o.ground_step)
+        try:
+            self.model = engine.MjModel.from_xml_string(mjcf(robot, world))
+        except ValueError as error:
+            raise RobotError(f"MuJoCo does not take {robot.path} ({error}): change it") from None
+        self.data = engine.MjData(self.model)
+        names = list(robot.model.names)[1:]
+        self._q = np.array([self.model.joint(name).qposadr[0] for name in names])
+        self._v = np.array([self.model.joint(name).dofadr[0] for name in names])
+        self._actuated = self._v[BASE_DOF:]
+        self._trunk = self.model.body(TRUNK).id
+        shapes = [self.model.geom(i).name for i in range(self.model.ngeom)]
+        self._feet = {shapes.index(f"{FOOT}{i}"): i for i in range(len(robot.feet))}
+        self._trunk_shapes = {i for i, name in enumerate(shapes) if name.startswith(TRUNK)}
+        self._force = np.zeros(6)
+
+    @property
+    def time_step(self) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.time_step
+
+    def ground_height(self, x: float) -> float:
+        """See :class:`~.plant.Plant`."""
+        return self.options.ground_height(x)
+
+    def reset(self, q: Array, v: Array) -> None:
+        """See :meth:`~.plant.Plant.reset`."""
+        self._engine.mj_resetData(self.model, self.data)
+        self.data.qpos[self._q], self.data.qvel[self._v] = q, v
+
+    def read(self, q: Array, v: Array) -> None:
+        """See :meth:`~.plant.Plant.read`."""
+        q[:], v[:] = self.data.qpos[self._q], self.data.qvel[self._v]
+
+    def contact_forces(self, out: Array) -> None:
+        """See :meth:`~.plant.Plant.contact_forces`."""
+        out[:] = 0.0
+        for i in range(self.data.ncon):
+            contact = self.data.contact[i]
+            ours = 1 if contact.geom[1] in self._feet else 0
+            foot = self._feet.get(contact.geom[ours])
+            if foot is None:
+                continue
+            self._engine.mj_contactForce(self.model, self.data, i, self._force)
+            # The contact's axes are the rows of its frame; its force acts on the second shape.
+            force = contact.frame.reshape(3, 3).T @ self._force[:3]
+            out[foot] += force[[0, 2]] if ours else -force[[0, 2]]
+
+    def trunk_touches_ground(self) -> bool:
+        """True where the trunk itself lies on the ground."""
+        return any(
+            not self._trunk_shapes.isdisjoint(self.data.contact[i].geom.tolist())
+            for i in range(self.data.ncon)
+        )
+
+    def step(self, torque: Array, push: float = 0.0) -> None:
+        """See :meth:`~.plant.Plant.step`."""
+        self.data.qfrc_applied[self._actuated] = torque
+        self.data.xfrc_applied[self._trunk, 0] = push  # at the body's centre of mass
+        self._engine.mj_step(self.model, self.data)
+
+    def close(self) -> None:
+        """See :class:`~.plant.Plant`; there is nothing to give back."""
+
+    def __enter__(self) -> MujocoPlant:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
