@@ -189,6 +189,12 @@ def test_a_planner_without_a_curve_is_named():
         tc.simulate(tc.load_robot("five-link"), route, planners={"s": walk})
 
 
+@pytest.mark.parametrize("name", ["durations", "single"])
+def test_a_curve_takes_time(name):
+    with pytest.raises(ParameterError, match=f"StandingOptions.{name} begins with 0 s"):
+        StandingOptions(**{name: (0.0, 1.0)})
+
+
 # ---- scenarios
 
 
@@ -207,7 +213,7 @@ def test_a_route_stands_starts_walks_and_stops():
         (REST, 0.0, 1.0),
         (VLO, 0.3, 2.0),  # too slow for the walk
         (VLO, 0.8, 2.7),
-        (VLO, 0.7, 3.3),  # the walking planner makes it good
+        (VLO, 0.72, 3.3),  # the walking planner makes it good
         (VLO, 0.8, 4.8),  # two seconds after it came to its speed
         (VLO, 0.4, 5.5),
         (REST, 0.0, 6.2),

@@ -52,6 +52,7 @@ from .maps.section import APEX as APEX
 from .maps.section import VLO as VLO
 from .maps.section import Section as Section
 from .parameters import SlipParameters as SlipParameters
+from .scenario.paces import PaceOptions as PaceOptions
 from .scenario.record import ScenarioRecord as ScenarioRecord
 from .scenario.route import Route as Route
 from .scenario.route import ScenarioRoute as ScenarioRoute

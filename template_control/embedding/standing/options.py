@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Angle, Count, Interval, NotNegative, Positive, Share
+from template_control.errors import ParameterError
+from template_control.slip.scenario.scenario import STAND_HEIGHT
 from template_control.slip.similarity import LENGTH, SPEED, TIME, tuned
 
 
@@ -41,9 +43,12 @@ class StandingOptions(Checked):
         stiffness: least and greatest of the leg before touchdown, over k0.
         yielding: its stiffnesses tried, over that with which it keeps its length. The CoM sinks
             over a softer leg, and the foot lands further ahead of it.
+
+    Raises:
+        ParameterError: if the shortest quintic, or the shortest single stance, lasts no time.
     """
 
-    height: Positive = tuned(0.97, LENGTH)
+    height: Positive = tuned(STAND_HEIGHT, LENGTH)
     spacing: Positive = tuned(0.3, LENGTH)
     place: Share = tuned(0.5)
     beat: Positive = tuned(0.5, TIME)
@@ -67,3 +72,12 @@ class StandingOptions(Checked):
     angles: tuple[Count, Angle] = tuned((12, 1.08))
     stiffness: Interval = tuned((0.5, 4.0))
     yielding: tuple[Positive, ...] = tuned((1.0, 0.85, 0.7))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("durations", "single"):
+            if getattr(self, name)[0] <= 0.0:
+                raise ParameterError(
+                    f"StandingOptions.{name} begins with {getattr(self, name)[0]:g} s: give a time"
+                    " over 0"
+                )

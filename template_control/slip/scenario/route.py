@@ -21,6 +21,7 @@ from template_control.slip.dynamics.stride import finite
 from template_control.slip.gaits.gait import Gait as PeriodicGait
 from template_control.slip.maps.section import APEX, REST, VLO, Section, section_of
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.paces import PaceOptions
 from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segment
 
 Array = NDArray[np.float64]
@@ -46,10 +47,6 @@ _LEADS_TO: dict[str, tuple[Section, Gait]] = {
     "ws": (REST, "stand"),
     _CHANGE: (VLO, "walk"),
 }
-_STOPPABLE = 0.16  # speed at VLO, over sqrt(g l0), from which one step leads to rest
-_SLOWED = 0.11  # to which a faster walk is slowed down first
-_ALIKE = 0.012  # difference of speeds, over sqrt(g l0), with which a walk begins
-_BEHIND = 0.03  # difference that a walk makes good without a stride of its own
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
 
 
@@ -250,13 +247,18 @@ class ScenarioRoute:
     Args:
         scenario: the profile.
         apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
+        paces: when a walk changes its speed by a stride of its own.
     """
 
     @checked
     def __init__(
-        self, scenario: Scenario, apex_height: Callable[[float], float] | None = None
+        self,
+        scenario: Scenario,
+        apex_height: Callable[[float], float] | None = None,
+        paces: PaceOptions | None = None,
     ) -> None:
         self.scenario = scenario
+        self.paces = paces or PaceOptions()
         self._apex_height = apex_height or (lambda speed: scenario.apex_height)
         self.parameters = scenario.parameters
         stands = scenario.segments[0].gait == STAND
@@ -309,7 +311,7 @@ class ScenarioRoute:
         ahead = here.duration.get(kind, self._guess) if aims else 0.0
         speed = here.wanted(segment, now + ahead)
         if segment.gait == STAND:
-            speed = _SLOWED * self._unit if kind == _CHANGE else 0.0
+            speed = self.paces.slowed * self._unit if kind == _CHANGE else 0.0
         runs = segment.gait == "run"
         target = (speed, self._apex_height(speed)) if runs else (speed, *s.vlo)
         if _LEADS_TO[kind][0] is REST:
@@ -323,11 +325,11 @@ class ScenarioRoute:
         """The stride at VLO with ``speed``: one to another speed comes first where it must."""
         segment = self.scenario.segments[here.index]
         if segment.gait == STAND:
-            slow = speed <= _STOPPABLE * self._unit
+            slow = speed <= self.paces.stoppable * self._unit
             return replace(here, walking=False), kind if slow else _CHANGE
         if not self.scenario.stands:
             return here, kind
-        most = _BEHIND if here.walking else _ALIKE
+        most = self.paces.behind if here.walking else self.paces.alike
         if abs(speed - here.wanted(segment, now)) <= most * self._unit:
             return replace(here, walking=True), kind
         return here, _CHANGE
