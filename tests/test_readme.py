@@ -29,6 +29,7 @@ GUIDES = (
     "your_planner.md",
     "your_plant.md",
     "options.md",
+    "engines.md",
     "controller.md",
     "running.md",
     "architecture.md",
