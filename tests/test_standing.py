@@ -101,6 +101,15 @@ def test_a_stand_comes_to_rest_between_the_feet(planners, spacing, speed):
     assert decision.feasible or spacing == 0.1
 
 
+def test_a_foot_that_lands_late_finds_a_template_that_falls(planners):
+    planner = planners["ws"]
+    start = np.array([[0.1, 0.5, 0.0], [0.95, -0.2, -P.gravity]])
+    decision = planner.decide(np.array([0.3, 0.98, 0.0]))
+    _, stride = planner.curve("DS_br^ws", start, (0.0, 0.4), decision)
+    np.testing.assert_allclose(stride.state[2:], 0.0, atol=1e-12)
+    assert np.isfinite(pressure(stride, np.linspace(0.0, stride.duration, 100))).all()
+
+
 @pytest.mark.parametrize("spacing", [0.1, 0.2, 0.3, 0.4, 0.45])
 def test_a_start_leads_to_vlo(planners, spacing):
     """Along a path without a step in place or speed, to a VLO from which a walk can go on."""

@@ -54,7 +54,7 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
     """
     com_x, com_y, rest_length = com[0] + toe, com[1], body[2]
     if np.isnan(meta_row[5]):
-        lift = body[1] + com[5]
+        lift = max(body[1] + com[5], 1e-6)  # legs do not pull
         rear, front = meta_row[3], meta_row[4]
         share = (com_x - com_y * com[4] / lift - rear) / (front - rear)
         share = min(max(share, 0.0), 1.0)

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 _SAMPLES = 20  # of a curve, beside its start
 _TERMS = 6
+_LIGHTEST = 0.05  # of the weight: legs do not pull
 
 
 class Rules(NamedTuple):
@@ -90,7 +91,7 @@ def _excess(c: Array, t: float, rules: Rules) -> float:
         x, y = x * t + c[0, n], y * t + c[1, n]
     for n in range(_TERMS - 1, 1, -1):
         ax, ay = ax * t + n * (n - 1) * c[0, n], ay * t + n * (n - 1) * c[1, n]
-    p = x - y * ax / (rules.gravity + ay)
+    p = x - y * ax / max(rules.gravity + ay, _LIGHTEST * rules.gravity)
     away = max(x - rules.low, rules.high - x)
     far = np.sqrt(away * away + y * y) - rules.reach
     return float(max(rules.low - p, p - rules.high, far))

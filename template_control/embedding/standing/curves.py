@@ -77,7 +77,8 @@ class BetweenFeet:
             start: (2, 3) x and y, each position, velocity and acceleration; the first of them.
         """
         x, y = start[:, 0]
-        lift = self.parameters.gravity + start[1, 2]
+        lift = max(1.0 - self.options.fall, 1.0 + start[1, 2] / self.parameters.gravity)
+        lift *= self.parameters.gravity
         starts = np.repeat(start[None], 1 + len(self.options.loads), axis=0)
         for i, share in enumerate(self.options.loads, 1):
             starts[i, 0, 2] = (x - self.place(share)) * lift / y
@@ -93,7 +94,9 @@ class BetweenFeet:
         o = self.options
         durations = np.geomspace(*o.durations, o.trials[0])
         curve = np.empty((2, TERMS))
-        starts = start.reshape(-1, 2, 3)
+        starts = start.reshape(-1, 2, 3).copy()
+        # Where a foot lands late, the template has begun to fall.
+        starts[:, 1, 2] = np.maximum(starts[:, 1, 2], -o.fall * self.parameters.gravity)
         cost, excess, end, i = best_quintic(starts, ends, durations, self._rules, curve)
         return Found((Quintic(curve, float(durations[i])),), excess, cost), end
 

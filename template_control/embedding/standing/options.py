@@ -37,6 +37,7 @@ class StandingOptions(Checked):
         slowest: speed at VLO of the slowest step, over sqrt(g l0).
         steps: shortest and longest step [m].
         loads: shares of the load that the front foot may take up at once where it has landed.
+        fall: largest downward acceleration that a curve begins with, over g.
         closing: the feet should stand this far apart where a walk ends [m].
         narrow: a metre further apart counts as this much excess.
         angles: touchdown angles tried, and the flattest [rad].
@@ -67,6 +68,7 @@ class StandingOptions(Checked):
     slowest: Positive = tuned(0.05)
     steps: Interval = tuned((0.15, 0.65), LENGTH)
     loads: tuple[Share, ...] = tuned((0.33, 0.67, 1.0))
+    fall: Share = tuned(0.5)
     closing: Positive = tuned(0.25, LENGTH)
     narrow: NotNegative = tuned(0.02)
     angles: tuple[Count, Angle] = tuned((12, 1.08))
