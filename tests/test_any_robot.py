@@ -9,6 +9,7 @@ import pytest
 
 from template_control.cli.main import main
 from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import RobotError
 from template_control.robot.five_link import FiveLink, Link
@@ -16,6 +17,7 @@ from template_control.robot.library import ROBOTS, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.options import SimulationOptions
 from template_control.run.simulation import simulate
+from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 
@@ -44,6 +46,7 @@ def random_five_link(seed, mass=None, leg=None):
         rod(thigh, thigh_mass),
         rod(leg - thigh, shank_mass),
         torque_limit=(limit, limit),
+        velocity_limit=20.0 * np.sqrt(0.9 / leg),
         hip_width=0.2 * leg,
         foot_radius=0.011 * leg,
     )
@@ -97,6 +100,19 @@ def walk_unseen(tmp_path, build, steps):
     path.write_text(random_five_link(*build).urdf())
     record, gait = walk(PlanarBiped.from_urdf(path), steps)
     check(record, gait, steps)
+
+
+@pytest.mark.slow(seconds=5)
+def test_a_robot_never_seen_runs_a_hundred_steps(tmp_path):
+    path = tmp_path / "unseen.urdf"
+    path.write_text(random_five_link(*CORNERS[0]).urdf())
+    robot = PlanarBiped.from_urdf(path)
+    template = template_for(robot)
+    gait = running_gait(template, 2.0 * np.sqrt(template.rest_length * template.gravity / 9.81))
+    record = simulate(robot, RunningPlanner(gait), SimulationOptions(steps=100, record_every=5))
+    assert record.metadata["fall_reason"] == ""
+    assert record.section_state[-20:, 0].mean() == pytest.approx(gait.apex[0], rel=0.01)
+    assert record.metadata["summary"]["qp_failures"] == 0
 
 
 def test_a_robot_never_seen_walks(tmp_path):

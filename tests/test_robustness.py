@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import template_control as tc
 from template_control.cli import robustness as command
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError, RobotError, SweepError
@@ -14,7 +15,7 @@ from template_control.robot.library import load_robot
 from template_control.robustness import campaign as robustness
 from template_control.robustness.campaign import Finding, Level, measure, off_gait, trial
 from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
-from template_control.run.simulation import simulate
+from template_control.run.simulation import perturbed_start, simulate
 from template_control.slip.parameters import SlipParameters
 from template_control.view.robustness_figure import robustness_figure
 
@@ -64,7 +65,7 @@ def test_options_hold_the_level(robot, gait, monkeypatch):
     monkeypatch.setattr(
         Situation, "footholds", lambda self, _, steps: self.gait.step_length * np.arange(steps + 1)
     )
-    where = Situation(robot, gait)
+    where = Situation(robot, gait, LqrPlanner(gait))
 
     def of(name, level, number=2):
         return BY_NAME[name].options(where, level, number)
@@ -92,7 +93,7 @@ def test_options_hold_the_level(robot, gait, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 4])
 def test_the_edge_of_a_step_lies_between_two_footholds(robot, gait, number):
-    options = BY_NAME["step-up"].options(Situation(robot, gait), 0.001, number)
+    options = BY_NAME["step-up"].options(Situation(robot, gait, LqrPlanner(gait)), 0.001, number)
     edge = options.plant.ground_step.x
     record = simulate(robot, LqrPlanner(gait), replace(options, steps=8))
     at = np.searchsorted(record.time, record.section_time)
@@ -124,6 +125,22 @@ def test_trials_succeed():
     assert not good["fell"]
     assert good["steps"] == BEGIN + 1 + AFTER
     assert abs(good["speed_error"]) < 0.02
+
+
+def test_footholds_of_a_run_are_where_its_feet_bear(robot):
+    gait = tc.running_gait(tc.template_for(robot), 3.0)
+    where = Situation(robot, gait, tc.RunningPlanner(gait))
+    holds = where.footholds(perturbed_start(gait, 0), 3)
+    assert len(holds) == 3
+    assert np.diff(holds) == pytest.approx(gait.step_length, rel=0.1)
+
+
+@pytest.mark.slow(seconds=6)
+def test_trials_of_a_run_succeed_and_know_its_speed():
+    good = trial("five-link", "step-down", 0.01, 1, 3.0)
+    assert not good["fell"]
+    assert abs(good["speed_error"]) < 0.02
+    assert abs(good["height_error"]) < 0.02
 
 
 def test_trials_fall_alike():
@@ -230,7 +247,9 @@ def test_files_are_of_this_robot_and_these_trials(cheap, tmp_path, monkeypatch):
     second = set(tmp_path.glob("*.jsonl")) - first
     stiff = load_robot("five-link")
     stiff.urdf += "<!-- another -->"
-    monkeypatch.setattr(robustness, "load_robot", lambda _: stiff)
+    gait = tc.default_gait(stiff)
+    where = Situation(stiff, gait, LqrPlanner(gait))
+    monkeypatch.setattr(robustness, "_situation", lambda *_: where)
     cheap(["heavier"], tmp_path, quick=True)
     third = set(tmp_path.glob("*.jsonl")) - first - second
     assert len(first) == len(second) == len(third) == 2

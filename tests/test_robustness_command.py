@@ -34,6 +34,18 @@ def test_json_figure_and_resumption(tmp_path, capfd):
     assert {path: path.read_bytes() for path in tmp_path.glob("*.jsonl")} == before
 
 
+@pytest.mark.slow(seconds=18)
+def test_a_run_is_disturbed_as_a_walk_is(tmp_path, capfd):
+    words = ["robustness", "--gait", "run", "--quick", "--disturbance", "step-up", "--workers", "1"]
+    assert main([*words, "--json", "--output", str(tmp_path)]) == 0
+    figures = json.loads(capfd.readouterr().out)
+    assert set(figures["gait"]) == {"mean_speed", "apex_height"}
+    assert abs(figures["undisturbed"]["speed_error"]) < 0.02
+    steps = figures["disturbances"]["step-up"]
+    assert steps["breaking_point"] == pytest.approx(0.01)
+    assert [level["level"] for level in steps["levels"]] == pytest.approx([0.005, 0.01])
+
+
 def test_a_robot_that_cannot_walk_is_one_line(tmp_path, refused):
     weak = tmp_path / "weak.urdf"
     text = robot_path("five-link").read_text()
@@ -49,6 +61,9 @@ def test_a_robot_that_cannot_walk_is_one_line(tmp_path, refused):
     [
         (["--robot", "hexapod"], "hexapod"),
         (["--workers", "0"], "--workers is 0"),
+        (["--speed", "2"], "--speed goes with --gait run"),
+        (["--gait", "run", "--speed", "9"], "no running gait has 9 m/s at its apex"),
+        (["--gait", "run", "--speed", "nan"], "--speed is nan"),
         (["--output", "/proc/none"], "/proc/none"),
     ],
 )
@@ -67,7 +82,7 @@ def test_an_unknown_disturbance_is_refused(capfd):
 
 
 def test_ctrl_c_tells_how_to_go_on(tmp_path, monkeypatch, capfd):
-    def impatient(*_):
+    def impatient(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(command, "measure", impatient)
@@ -105,7 +120,7 @@ def test_the_snippet_of_the_documentation_runs(capfd):
 
 @pytest.mark.slow(seconds=40)
 def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
-    (line,) = (line for line in commands() if "--quick" in line)
+    (line,) = (x for x in commands() if "--quick" in x and "--gait" not in x)
     monkeypatch.chdir(tmp_path)
     assert main(shlex.split(line)[1:]) == 0
     assert (tmp_path / "runs" / "robustness" / "five-link" / "robustness.png").is_file()

@@ -15,6 +15,7 @@ from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.sensing import Sensed
 from template_control.errors import ParameterError
 from template_control.robot.start import state_in
+from template_control.robustness.disturbances import Situation
 from template_control.run.options import SimulationOptions
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -214,10 +215,22 @@ def test_robot_runs_with_another_mass_than_its_model_has(mass_scale):
     assert record.section_state[-10:, 0].mean() == pytest.approx(3.0, rel=0.01)
 
 
+@pytest.mark.slow(seconds=3)
+@pytest.mark.parametrize("height", [0.03, -0.03])
+def test_robot_runs_on_over_a_step_that_it_does_not_see(robot, gait, height):
+    where = Situation(robot, gait, tc.RunningPlanner(gait))
+    before, beyond = where.footholds((*gait.apex, 0.0), 5)[-2:]
+    step = tc.GroundStep(height, 0.5 * (before + beyond))
+    record = run(3.0, 17, plant=tc.PlantOptions(ground_step=step))
+    assert record.metadata["fall_reason"] == ""
+    assert record.foot[-1, :, 1].min() > height - 0.01
+    assert np.max(np.abs(record.section_state[14:, 0] / 3.0 - 1.0)) < 0.02
+
+
 @pytest.mark.slow(seconds=5)
-@pytest.mark.parametrize("name", ["human", "bolt"])
-def test_other_robots_run_by_similarity(name):
-    record = run(2.0, 30, name)
+@pytest.mark.parametrize(("name", "steps"), [("human", 30), ("bolt", 100)])
+def test_other_robots_run_by_similarity(name, steps):
+    record = run(2.0, steps, name)
     assert record.metadata["fall_reason"] == ""
     wanted = record.metadata["gait_state"][0]
     assert record.section_state[-10:, 0].mean() == pytest.approx(wanted, rel=0.01)

@@ -235,7 +235,9 @@ def test_pushes(gait, impulse, phase):
 @pytest.fixture(scope="module")
 def footholds(gait):
     """About the place where the ground is to step up or down."""
-    return Situation(load_robot("five-link"), gait).footholds(tuple(gait.vlo), 11)[-2:]
+    return Situation(load_robot("five-link"), gait, LqrPlanner(gait)).footholds(
+        tuple(gait.vlo), 11
+    )[-2:]
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +24,11 @@ from template_control.cli.report.output import INTERRUPTED
 from template_control.cli.report.run_table import nearest_text
 from template_control.errors import ParameterError
 from template_control.run.record import Record
-from template_control.run.summary import summarise
+from template_control.run.summary import STANDING, STRIDES, summarise
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.terminal import plain_console
 
-_NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
-_STANDING = {
-    "s": "standing", "sw": "stand to walk", "ws": "walk to stand", "ww": "to another speed",
-}  # fmt: skip
 NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (
     "robot", "fell", "fall_reason", "duration", "speed_error_rms", "nearest_speed_taken",
@@ -100,15 +95,14 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
         path: where the run was saved; None if it was not.
     """
     run = summarise(record, path)
-    kinds = Counter(record.metadata["strides"][i] for i in record.stride[:-1])
     error = template.section_state[1:, 0] - template.wanted_speed
     return {
         **{name: run[name] for name in _FROM_THE_RUN},
         "completed": bool(record.metadata["arrived"]),
         "top_speed": float(record.section_state[:, 0].max()),
         "strides": {
-            **{name: kinds.get(kind, 0) for kind, name in _NAMES.items()},
-            **{name: kinds[kind] for kind, name in _STANDING.items() if kind in kinds},
+            **{name: run["strides"].get(name, 0) for name in STRIDES.values()},
+            **{name: run["strides"][name] for name in STANDING.values() if name in run["strides"]},
         },
         "template": {
             "completed": template.completed,

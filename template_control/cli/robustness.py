@@ -1,4 +1,4 @@
-"""``template-control robustness``: how much a robot's walk takes until it breaks."""
+"""``template-control robustness``: how much a robot's walk or run takes until it breaks."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from typing import Any
 import matplotlib as mpl
 from rich.table import Table
 
+from template_control.cli.options.gait import SPEEDS
+from template_control.cli.options.ranges import check_ranges
 from template_control.cli.options.robot import add_robot
 from template_control.cli.report.output import INTERRUPTED
 from template_control.errors import ParameterError
@@ -19,6 +21,8 @@ from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.library import load_robot
 from template_control.robustness.campaign import SETTLED, Finding, Robustness, measure
 from template_control.robustness.disturbances import AFTER, DISTURBANCES
+from template_control.run.config import GaitChoice
+from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writable
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
@@ -41,15 +45,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's description and options."""
     parser.description = (
         "Raise pushes, unseen steps of the ground, friction, mass and torque errors, sensor"
-        " noise and delay level by level, with several trials each, until the walk breaks."
+        " noise and delay level by level, with several trials each, until walk or run breaks."
         f" A trial succeeds if the robot does not fall within {AFTER} more steps and, after"
-        " a push or a step, its mean speed and VLO height over the last 5 of them are"
+        " a push or a step, its mean speed and height at VLO or apex over the last 5 are"
         f" within {100 * SETTLED:g} % of its gait's. Ends with a table and a figure. Ctrl-C"
         " and the same command again go on where it was. Exit status: 0, 2 for bad input"
         " or a robot that falls undisturbed, 130 after Ctrl-C."
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot(parser)
+    parser.add_argument("--gait", choices=("walk", "run"), default="walk", help="what it keeps")
+    parser.add_argument(
+        "--speed",
+        type=float,
+        metavar="M/S",
+        help="of a run at apex; 3 m/s for l0 = 1 m if not given",
+    )
     parser.add_argument(
         "--disturbance",
         action="append",
@@ -70,7 +81,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output",
         type=Path,
-        help="folder for the trials and the figure; by default runs/robustness/ROBOT",
+        help="folder for the trials and the figure; by default runs/robustness/ROBOT, of a run"
+        " runs/robustness/ROBOT-run",
     )
     printed = parser.add_mutually_exclusive_group()
     printed.add_argument(
@@ -85,17 +97,20 @@ def run(options: argparse.Namespace) -> int:
     """Measure as told; returns 0, or 130 after Ctrl-C.
 
     Raises:
-        ParameterError: if the number of workers is out of its range.
+        ParameterError: if the number of workers is out of its range, or a walk is given a speed.
     """
     if not 1 <= options.workers <= _MOST_WORKERS:
         raise ParameterError(
             f"--workers is {options.workers}: give a number from 1 to {_MOST_WORKERS}"
         )
-    load_robot(options.robot)  # before a folder is made for it
-    folder = writable(options.output or Path("runs/robustness") / Path(options.robot).stem)
+    speed, name = _speed(options), Path(options.robot).stem  # before a folder is made for it
+    name += "" if speed is None else "-run"
+    folder = writable(options.output or Path("runs/robustness") / name)
     try:
         with workers(options.workers) as pool, stdout_to_stderr():
-            found = measure(options.robot, options.disturbance, folder, pool, options.quick)
+            found = measure(
+                options.robot, options.disturbance, folder, pool, options.quick, speed=speed
+            )
     except KeyboardInterrupt:
         print(
             f"template-control: interrupted; finished trials are in {folder}, the same command"
@@ -115,6 +130,18 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def _speed(options: argparse.Namespace) -> float | None:
+    """Of a run, dx/dt at apex; None: the robot is to walk."""
+    robot = load_robot(options.robot)
+    check_ranges(options, {"speed": SPEEDS})
+    if options.gait == "run":
+        gait = GaitChoice("run", options.speed).of(robot)
+        return float(gait.state[0])
+    if options.speed is not None:
+        raise ParameterError("--speed goes with --gait run: leave one out, or give both")
+    return None
+
+
 def _draw(found: Robustness, folder: Path) -> Path:
     with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         return save_figure(robustness_figure(found), folder / "robustness.png")
@@ -124,13 +151,15 @@ def data(found: Robustness) -> dict[str, Any]:
     """The findings as plain data; levels and breaking points in SI units.
 
     Returns:
-        robot, gait (mean_speed, vlo_height), undisturbed (speed_error, height_error),
-        disturbances: by name trials, breaking_point, half_point, standing_point (null where
-        the mildest level is beyond it) and levels (level, success_rate, fell, astray).
+        robot, gait (mean_speed, and vlo_height or, of a run, apex_height), undisturbed
+        (speed_error, height_error), disturbances: by name trials, breaking_point, half_point,
+        standing_point (null where the mildest level is beyond it) and levels (level,
+        success_rate, fell, astray).
     """
+    height = "apex_height" if isinstance(found.gait, RunningGait) else "vlo_height"
     return {
         "robot": found.robot,
-        "gait": {"mean_speed": found.gait.mean_speed, "vlo_height": float(found.gait.vlo[1])},
+        "gait": {"mean_speed": found.gait.mean_speed, height: float(found.gait.state[1])},
         "undisturbed": {"speed_error": found.speed_error, "height_error": found.height_error},
         "disturbances": {
             f.disturbance.name: {

@@ -42,6 +42,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_planner_options(parser)
     add_world_options(parser)
     add_disturbance_options(parser)
+    parser.add_argument(
+        "--no-catch",
+        dest="catches",
+        action="store_const",
+        const=False,
+        help="let a walk that is pushed too hard fall; without this it breaks into a run, slows"
+        " down and walks on",
+    )
     add_length_options(parser)
     add_output_options(parser, "runs/walk")
 

@@ -13,8 +13,10 @@ from .planners.lqr import LqrOptions as LqrOptions
 from .planners.lqr import LqrPlanner as LqrPlanner
 from .planners.modified import ModifiedOptions as ModifiedOptions
 from .planners.modified import ModifiedPlanner as ModifiedPlanner
+from .planners.planner import BreakingPlanner as BreakingPlanner
 from .planners.planner import CurvePlanner as CurvePlanner
 from .planners.planner import Decision as Decision
+from .planners.planner import Free as Free
 from .planners.planner import LandingPlanner as LandingPlanner
 from .planners.planner import Planner as Planner
 from .planners.running import RunningOptions as RunningOptions

@@ -314,7 +314,8 @@ class EmbeddingController:
         if planning.overdue(self.node, self.phase_time):
             planning.reach_on(self.node, s, self.time)
         elif planning.surprised(s.state[2] - self.reference[2], self.phase_time, self.time):
-            planning.reconsider(self.node, s, self.phase_time, self.time)
+            self._enter(planning.reconsider(self.node, s, self.phase_time, self.time).name)
+            self.lean.aim(self.reports[-1].goal)
         else:
             return
         self._on_new_path()

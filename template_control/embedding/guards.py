@@ -96,6 +96,8 @@ class RobotGuards:
         stretch = self._value(edge.event, sensed)
         if stretch > self.options.overstretch * self.parameters.rest_length:
             return True
+        if stretch > 0.0 and due == np.inf:
+            return True
         angle = self.options.liftoff_angle
         if angle is None:
             return due <= 0.0

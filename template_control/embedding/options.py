@@ -36,6 +36,7 @@ class EmbeddingOptions(QpOptions):
         replan: when a stride is planned anew.
         load: tuning of the load estimate.
         trim: tuning of the momentum trim.
+        catches: whether a walk that is kept breaks into a run where it cannot go on.
         lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
     """
 
@@ -47,4 +48,5 @@ class EmbeddingOptions(QpOptions):
     replan: ReplanOptions = field(default_factory=ReplanOptions)
     load: LoadOptions = field(default_factory=LoadOptions)
     trim: TrimOptions = field(default_factory=TrimOptions)
+    catches: bool = tuned(True)
     lean: LeanOptions = field(default_factory=LeanOptions)

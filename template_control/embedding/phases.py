@@ -109,7 +109,7 @@ PHASES: Phases = {
     ),
     "DS_sc^wr": replace(_LEAVING_THE_GROUND, lands=True),
     "DS_sd^wr": _LEAVING_THE_GROUND,
-    "SS_sc^wr": _RUNNING_STANCE,
+    "SS_sc^wr": replace(_RUNNING_STANCE, lands=True),
     "SS_sd^wr": _RUNNING_STANCE,
     "SS_sc^rw": replace(_RUNNING_STANCE, lands=True),
     "SS_sd^rw": _RUNNING_STANCE,

@@ -19,8 +19,10 @@ from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, Range, Share, Triple
 from template_control.embedding.planners.planner import (
     Ahead,
+    BreakingPlanner,
     CurvePlanner,
     Decision,
+    Free,
     LandingPlanner,
     Planner,
     Planners,
@@ -36,11 +38,13 @@ from template_control.embedding.sensing import Sensed
 from template_control.embedding.touchdown import flown_angle, free_controls
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.breaking import RUN_ON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Slot
 from template_control.slip.dynamics.stride import Stride, StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.catching import BreakingRoute
 from template_control.slip.scenario.route import Route, StrideGoal
 from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 
@@ -116,6 +120,9 @@ class StridePlanning:
         self.reaching = False
         self.arrived = False
         self._planned_at = 0.0
+        self._whole = True
+        self._broken = False
+        self._excess = 0.0  # speed at the stride's section less the wanted, and what came on top
         self._passed = 0  # so many of the path's events are over
         self._feet = (0, 1)  # rear and front leg's at the start of the path
         self._simulator = StrideSimulator(route.parameters, automaton)
@@ -186,6 +193,8 @@ class StridePlanning:
         if goal is None:
             # The last stride goes on until whoever drives the robot ends the run.
             self.arrived, goal = True, self.reports[-1].goal
+        self._broken = False
+        self._excess = float(z[0] - goal.target[0])
         decision, start = self._plan(section, z, goal)
         seconds = time.perf_counter() - begin
         node = self.automaton.start(goal.stride)
@@ -207,6 +216,8 @@ class StridePlanning:
         if start is not z:
             state[:4] = section.state(start, state[0])
         self._follow(node, state, sensed, now)
+        if not decision.lasting and not self.arrived:
+            return self._break(node, sensed, 0.0, now)
         return node
 
     def _plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
@@ -252,6 +263,7 @@ class StridePlanning:
         else:
             first = self._simulator.run(start, state, u, toes)
         strides = [first]
+        self._whole = True
         # The next foothold must be known when the swing begins, before the next section. Where
         # no foot stands, the second one's is still further.
         more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
@@ -263,12 +275,14 @@ class StridePlanning:
             z = section.of(last.state)
             goal = self.route.ahead(section, z, at) or report.goal
             ahead = self.planner_of(goal).decide(z, goal.target)
+            self._whole = self._whole and ahead.lasting
             start = self.automaton.start(goal.stride).name
             if start in self.curved:
                 break  # both feet stand: there is no foothold to know
             toes = (float(last.toes[0]), float(last.toes[1]))
             strides.append(self._simulator.run(start, last.state, ahead.controls, toes))
             more -= 1
+        self._whole = self._whole and all(stride.completed for stride in strides)
         self.path = join(strides, self.options.path)
         self._feet = sensed.feet
         self._planned_at = now
@@ -329,6 +343,47 @@ class StridePlanning:
 
         return ahead
 
+    def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
+        """Break into another stride where the present one cannot go on.
+
+        Arguments as for :meth:`reconsider`.
+
+        Returns:
+            The node that the robot is in then, with the path from there; ``node`` where the route
+            knows no other stride, or the template does not complete it.
+        """
+        report, route = self.reports[-1], self.route
+        if not isinstance(route, BreakingRoute):
+            return node
+        goal = route.instead(report.goal, float(sensed.state[2]), self._excess)
+        if goal is None:
+            return node
+        planner, name = self.planner_of(goal), node.name
+        if goal.stride != report.goal.stride:
+            name = RUN_ON.get(name, "")
+        if name not in self.automaton.index or not isinstance(planner, BreakingPlanner):
+            return node
+        other = self.automaton.node(name)
+        slots = free_controls(self.automaton, other)
+        if other.edge(Event.TOUCHDOWN) is not None:
+            slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
+        free = Free(slots, self._turn(phase_time))
+        ahead = self._ahead(other, sensed)
+        decision = planner.break_into(ahead, report.decision.controls, goal.target, free)
+        if not decision.feasible:
+            return node
+        target = section_of(self.automaton.sections(name)[1]).padded(goal.target)
+        self.reports[-1] = replace(report, goal=goal, target=target, decision=decision)
+        self._broken = True
+        route.take(goal)
+        self.follow(other, sensed, now)
+        return other
+
+    def _turn(self, phase_time: float) -> float:
+        """How far the swing foot can still change the touchdown angle [rad]."""
+        left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
+        return self.options.agility * min(left, self.options.foresight) ** 2
+
     def due(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
         return self.dues[event]
@@ -375,20 +430,22 @@ class StridePlanning:
     def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
         """Whether a disturbance has carried the robot away from its path.
 
+        Where the robot has broken into a stride, a path that leads nowhere is one as well.
+
         Args:
             deviation: of the forward speed from the path's [m/s].
             phase_time: time along the path [s].
             now: time [s].
         """
         o = self.options
-        return (
-            not self.reaching
-            and abs(deviation) > o.speed
-            and phase_time > o.interval
-            and now - self._planned_at > o.interval
-        )
+        if self.reaching or now - self._planned_at <= o.interval:
+            return False
+        if abs(deviation) > o.speed and phase_time > o.interval:
+            self._excess += deviation
+            return True
+        return self._broken and not self._whole
 
-    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> None:
+    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.
 
         From then on the stiffnesses of what is left are, to a planner that has ``land``.
@@ -398,20 +455,30 @@ class StridePlanning:
             sensed: the robot's state.
             phase_time: time along the path [s].
             now: time [s].
+
+        Returns:
+            The node that the robot is in then.
         """
         report, planner = self.reports[-1], self.planner
+        if self._broken:
+            other = self._break(node, sensed, phase_time, now)
+            if self._planned_at < now:
+                self.follow(node, sensed, now)
+            return other
+        lasting = True
         starts = node.name == self.automaton.starts[report.goal.stride]
         if starts and node.name not in self.curved:
             z = self._back_to_section(node, report, sensed)
             if z is not None:
-                left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
-                change = self.options.agility * min(left, self.options.foresight) ** 2
+                change = self._turn(phase_time)
                 angle = float(report.decision.controls[Slot.TOUCHDOWN_ANGLE])
                 decision = planner.decide(z, report.goal.target, (angle - change, angle + change))
                 self.reports[-1] = replace(report, decision=decision)
+                lasting = decision.lasting
         elif isinstance(planner, LandingPlanner):
             self._choose_again(planner, node, sensed)
         self.follow(node, sensed, now)
+        return node if lasting and self._whole else self._break(node, sensed, 0.0, now)
 
     def _back_to_section(self, node: Node, report: SectionReport, sensed: Sensed) -> Array | None:
         """The section state from which the template would have come to where the robot is.

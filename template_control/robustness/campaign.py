@@ -1,4 +1,4 @@
-"""How much a robot's walk takes: every disturbance raised until the walk breaks.
+"""How much a robot's walk or run takes: every disturbance raised until it breaks.
 
 All disturbances are raised together, one level after the other, each level a sweep whose
 trials are on disk as they finish. A disturbance is left out from the level on where all trials
@@ -17,10 +17,8 @@ from typing import Any
 import numpy as np
 
 from template_control.checks.checked import checked
-from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.robot_template import default_gait
+from template_control.embedding.planners.running import RunningOptions
 from template_control.errors import ParameterError, RobotError, SweepError
-from template_control.robot.library import load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robustness.disturbances import (
     AFTER,
@@ -29,14 +27,16 @@ from template_control.robustness.disturbances import (
     Disturbance,
     Situation,
 )
+from template_control.run.config import GaitChoice, RobotChoice, RunConfig
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
-from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.gait import Gait, WalkingGait
+from template_control.slip.gaits.running_gait import RunningGait
 from template_control.sweep.sweep import Item, SweepOptions, sweep
 
 SETTLED = 0.02
-"""How near to the gait's mean speed and VLO height a walk must be to be back on it."""
+"""How near to the gait's mean speed and height at its section a robot must be to be back on it."""
 
 _LAST = 5  # steps these are averaged over
 _HALF = 0.5
@@ -120,52 +120,67 @@ class Robustness:
 
     Attributes:
         robot: its name.
-        gait: that it walked.
-        speed_error, height_error: of the undisturbed walk, relative, as trials are judged.
+        gait: that it kept.
+        speed_error, height_error: undisturbed, relative, as trials are judged.
         findings: one a disturbance.
     """
 
     robot: str
-    gait: WalkingGait
+    gait: WalkingGait | RunningGait
     speed_error: float
     height_error: float
     findings: tuple[Finding, ...]
 
 
-def off_gait(record: Record, gait: WalkingGait) -> tuple[float, float]:
-    """How far a walk's last 5 steps are from its gait, relative to the gait.
+def off_gait(record: Record, gait: Gait) -> tuple[float, float]:
+    """How far a robot's last 5 steps are from its gait, relative to the gait.
 
     Args:
         record: a run of at least 5 steps, without a fall.
         gait: the gait to compare with.
 
     Returns:
-        Mean forward speed over the gait's, less one; mean VLO height over the gait's, less one.
+        Mean forward speed over the gait's, less one; mean height at the section over the gait's,
+        less one.
     """
     x = np.interp(record.section_time[[-1 - _LAST, -1]], record.time, record.com[:, 0])
     speed = (x[1] - x[0]) / (record.section_time[-1] - record.section_time[-1 - _LAST])
     height = record.section_state[-_LAST:, 1].mean()
-    return float(speed / gait.mean_speed - 1.0), float(height / gait.vlo[1] - 1.0)
+    pace = gait.step_length / gait.step_duration
+    return float(speed / pace - 1.0), float(height / gait.state[1] - 1.0)
+
+
+def _situation(robot: str, speed: float | None) -> Situation:
+    """The robot and its gait: a walk, or a run with ``speed`` at apex [m/s]."""
+    choice = RobotChoice(robot)
+    if speed is None:
+        config = RunConfig(choice)
+    else:
+        config = RunConfig(choice, GaitChoice("run", speed), RunningOptions())
+    ready = config.prepare()
+    return Situation(ready.robot, ready.gait, ready.planners[ready.gait.stride])
 
 
 @checked
-def trial(robot: str, disturbance: str, level: float, number: int) -> dict[str, Any]:
-    """One walk under one disturbance, as a sweep's worker runs it.
+def trial(
+    robot: str, disturbance: str, level: float, number: int, speed: float | None = None
+) -> dict[str, Any]:
+    """One walk or run under one disturbance, as a sweep's worker runs it.
 
     Args:
         robot: name or URDF path.
         disturbance: name of the disturbance.
         level: the disturbance's size for this robot [SI].
         number: of the trial, from 0; trials of a level differ by it.
+        speed: of a run, dx/dt at apex [m/s]; None: the robot walks.
 
     Returns:
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
     """
-    model = load_robot(robot)
-    gait = default_gait(model)
-    options = _BY_NAME[disturbance].options(Situation(model, gait), level, number)
-    record = simulate(model, LqrPlanner(gait), options)
-    errors = (None, None) if record.fell else off_gait(record, gait)
+    where = _situation(robot, speed)
+    options = _BY_NAME[disturbance].options(where, level, number)
+    record = simulate(where.robot, where.planner, options)
+    errors = (None, None) if record.fell else off_gait(record, where.gait)
     return {
         "fell": record.fell,
         "reason": record.metadata["fall_reason"],
@@ -183,8 +198,9 @@ def measure(
     executor: Executor | None = None,
     quick: bool = False,
     progress: bool = True,
+    speed: float | None = None,
 ) -> Robustness:
-    """Raise disturbances until the robot's walk breaks.
+    """Raise disturbances until the robot's walk or run breaks.
 
     Args:
         robot: name or URDF path.
@@ -195,21 +211,24 @@ def measure(
         executor: where to run the trials; None for one process a core.
         quick: two levels of two trials each, to see that everything works.
         progress: show a bar a level on stderr.
+        speed: of a run, dx/dt at apex [m/s]; None: the robot walks.
 
     Raises:
         ParameterError: if there is no such disturbance.
         RobotError: if there is no such robot or it falls without a disturbance.
+        GaitError: if no run has this speed.
         SweepError: if a trial fails for another reason than a fall, or files do not fit.
     """
     wanted = set(_BY_NAME if names is None else names)
     if not wanted or not wanted <= set(_BY_NAME):
         raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(_BY_NAME)}")
-    model = load_robot(robot)
-    gait = default_gait(model)
-    undisturbed = _undisturbed(robot, model, gait)
+    where = _situation(robot, speed)
+    model, gait = where.robot, where.gait
+    undisturbed = _undisturbed(robot, where)
     chosen = [_shortened(d, quick) for d in DISTURBANCES if d.name in wanted]
     levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
-    stem = _fingerprint(model, chosen)
+    moving: Item = {} if speed is None else {"speed": speed}
+    stem = _fingerprint(model, chosen, moving)
     found = {d.name: Finding(d) for d in chosen}
     for index in range(max(len(of) for of in levels.values())):
         going = [d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken]
@@ -219,6 +238,7 @@ def measure(
                 "disturbance": d.name,
                 "level": levels[d.name][index],
                 "number": i,
+                **moving,
             }
             for d in going
             for i in range(d.trials)
@@ -243,12 +263,12 @@ def measure(
     return Robustness(model.name, gait, *errors, findings=tuple(found[d.name] for d in chosen))
 
 
-def _undisturbed(robot: str, model: PlanarBiped, gait: WalkingGait) -> Record:
-    record = simulate(model, LqrPlanner(gait), SimulationOptions(steps=BEGIN + 1 + AFTER))
+def _undisturbed(robot: str, where: Situation) -> Record:
+    record = simulate(where.robot, where.planner, SimulationOptions(steps=BEGIN + 1 + AFTER))
     if record.fell:
         raise RobotError(
             f"{robot} falls without a disturbance ({record.metadata['fall_reason']}):"
-            " there is no robustness to measure; make it walk first"
+            " there is no robustness to measure; make it go first"
         )
     return record
 
@@ -271,10 +291,11 @@ def _judged(disturbance: Disturbance, level: float, results: list[dict[str, Any]
     return Level(level, len(results) - fell - astray, fell, astray)
 
 
-def _fingerprint(model: PlanarBiped, chosen: Sequence[Disturbance]) -> str:
-    """What the trials' results depend on: this package's code, the URDF, the trials."""
+def _fingerprint(model: PlanarBiped, chosen: Sequence[Disturbance], moving: Item) -> str:
+    """What the trials' results depend on: this package's code, the URDF, gait, the trials."""
     digest = hashlib.sha256(model.urdf.encode())
     for path in sorted(_PACKAGE.rglob("*.py")):
         digest.update(path.read_bytes())
-    digest.update(repr([(d.name, d.levels, d.trials) for d in chosen]).encode())
+    trials = [(d.name, d.levels, d.trials) for d in chosen]
+    digest.update(repr((trials, moving)).encode())
     return digest.hexdigest()[:10]

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.planner import Planner
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.planar_biped import PlanarBiped
@@ -22,16 +23,17 @@ from template_control.run.options import Push, SimulationOptions
 from template_control.run.sensing import SensorOptions
 from template_control.run.simulation import perturbed_start, simulate
 from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.running_gait import RunningGait
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale
 
 BEGIN = 10
-"""Steps of a walk on its gait before a push comes."""
+"""Steps on the gait before a push comes."""
 
 AFTER = 20
-"""Steps a walk must go on after it, or with a lasting one from the start."""
+"""Steps a robot must go on after it, or with a lasting one from the start."""
 
-_SOON = 4  # steps of a walk that starts off its gait before a step of the ground comes
+_SOON = 4  # steps of a robot that starts off its gait before a step of the ground comes
 _PHASES = 10  # of the step in which a push begins
 _EDGES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the way between two footholds
 _STARTS = 5  # seeds of the starts off the gait
@@ -45,11 +47,13 @@ class Situation:
 
     Attributes:
         robot: the model; its last update is overwritten.
-        gait: the gait that is walked.
+        gait: the gait that is kept.
+        planner: that keeps it.
     """
 
     robot: PlanarBiped
-    gait: WalkingGait
+    gait: WalkingGait | RunningGait
+    planner: Planner
 
     @property
     def scale(self) -> Scale:
@@ -57,23 +61,29 @@ class Situation:
         return Scale.of(self.gait.parameters)
 
     def footholds(self, start: tuple[float, float, float], steps: int) -> NDArray[np.float64]:
-        """Where the robot treads when it walks undisturbed.
+        """Where the robot treads in each step when nothing disturbs it.
 
         Args:
-            start: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+            start: (3,) dx/dt, y, dy/dt at the gait's section [m/s, m, m/s].
             steps: how many.
 
         Returns:
-            (steps + 1,) x of the footholds [m]; the gait's own if the robot falls, as it will then
-            fall with the disturbance as well.
+            (n,) x of the footholds [m], the last step's last; the gait's own if the robot falls,
+            as it will then fall with the disturbance as well.
         """
-        options = SimulationOptions(steps=steps, start=start)
-        record = simulate(self.robot, LqrPlanner(self.gait), options)
+        record = simulate(self.robot, self.planner, SimulationOptions(steps=steps, start=start))
         if record.fell:
             return self.gait.step_length * np.arange(steps + 1.0)
-        # The last VLO may round to just after the last sample.
+        # The last section may round to just after the last sample.
         at = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
-        return np.asarray(record.foot[at, record.rear[at], 0])
+        if np.all(record.contact_force[at].any(axis=(1, 2))):
+            return np.asarray(record.foot[at, record.rear[at], 0])
+        # No foot stands at an apex: that which bore most in between.
+        load = record.contact_force[:, :, 1]
+        strides = [slice(a, b) for a, b in pairwise(at)]
+        most = [np.unravel_index(np.argmax(load[s]), load[s].shape) for s in strides]
+        holds = [record.foot[s][i, foot, 0] for s, (i, foot) in zip(strides, most, strict=True)]
+        return np.array(holds)
 
 
 @dataclass(frozen=True)
@@ -101,8 +111,8 @@ class Disturbance:
         trials: number of trials at each level.
         size: factor from the reference template's levels to a template's.
         options: of the run at a level [SI] and a trial's index.
-        passing: whether it comes only once: the walk must then be back on its gait at the end.
-            Otherwise it lasts from the start, and the walk must only go on.
+        passing: whether it comes only once: the robot must then be back on its gait at the end.
+            Otherwise it lasts from the start, and the robot must only go on.
         grain: levels are whole multiples of it, at least one; 0 for any levels [SI].
     """
 

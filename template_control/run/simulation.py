@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
@@ -31,8 +32,9 @@ from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.maps.section import APEX, REST
-from template_control.slip.scenario.route import Route
+from template_control.slip.maps.section import APEX, REST, VLO
+from template_control.slip.scenario.catching import CatchingRoute
+from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -76,7 +78,9 @@ def simulate(
     Args:
         robot: model of the controller, and whose URDF the plant loads.
         route: which stride comes next and towards which state; or a scenario, which is put on
-            the robot's template; or a planner, whose gait the robot keeps.
+            the robot's template; or a planner, whose gait the robot keeps. A walk then breaks
+            into a run where it cannot go on, and walks again
+            (:class:`~template_control.slip.scenario.catching.CatchingRoute`).
         options: how the run goes.
         progress: called with the number of completed steps after each.
         planners: one for each kind of stride of the route; by default
@@ -95,7 +99,7 @@ def simulate(
     if isinstance(route, Scenario):
         route = robot_route(robot, route)
     if isinstance(route, Planner):
-        controller = EmbeddingController(robot, route, o.embedding, automaton=automaton)
+        controller = _keeping(robot, route, o.embedding, automaton)
     else:
         chosen = planners or default_planners(route)
         controller = EmbeddingController(robot, chosen, o.embedding, route, automaton)
@@ -126,6 +130,17 @@ def simulate(
     if stop is not None:
         raise RunInterrupted(record) from stop
     return record
+
+
+def _keeping(
+    robot: PlanarBiped, planner: Planner, options: EmbeddingOptions, automaton: Automaton
+) -> EmbeddingController:
+    """A controller that keeps the planner's gait; a walk that cannot go on breaks into a run."""
+    steady = SteadyRoute.of(planner.gait, automaton)
+    if not options.catches or automaton is not AUTOMATON or steady.section is not VLO:
+        return EmbeddingController(robot, planner, options, steady, automaton)
+    caught = CatchingRoute(steady)
+    return EmbeddingController(robot, default_planners(caught, planner), options, caught, automaton)
 
 
 def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
@@ -196,6 +211,7 @@ def _loop(
     q, v, forces = np.zeros(robot.nv), np.zeros(robot.nv), np.zeros((2, 2))
     threshold = o.falls.contact_force * robot.mass * robot.gravity
     done, tick = 0, 0
+    begun: list[tuple[float, float]] = []
     while done < last and not planning.arrived:
         now = tick * dt
         plant.read(q, v)
@@ -208,7 +224,10 @@ def _loop(
         seconds = time.perf_counter() - start
         if sensors.noisy:
             robot.update(q, v)  # what is recorded is true
-        push = _push(o.pushes, controller, now)
+        if len(begun) < len(controller.reports):
+            # A step that changes into another stride keeps its pushes where they were.
+            begun.append((controller.reports[-1].time, controller.planner.gait.step_duration))
+        push = _push(o.pushes, begun, now)
         recorder.tick(Truth(now, q, v, forces, push), solution, seconds)
         reason = _fallen(plant, controller, q, o, now)
         if reason:
@@ -250,13 +269,16 @@ def _tell(report: SectionReport, number: int) -> None:
         _LOG.info("%.3f s, step %d: the planner left its own law", report.time, number)
 
 
-def _push(pushes: tuple[Push, ...], controller: EmbeddingController, now: float) -> float:
-    """Force of the pushes that act at time ``now`` [N]."""
+def _push(pushes: tuple[Push, ...], begun: list[tuple[float, float]], now: float) -> float:
+    """Force of the pushes that act at time ``now`` [N].
+
+    ``begun`` holds when each step began, and the duration of its gait's steps [s].
+    """
     total = 0.0
     for push in pushes:
-        if push.step < len(controller.reports):
-            duration = controller.planner.gait.step_duration
-            begin = controller.reports[push.step].time + push.phase * duration
+        if push.step < len(begun):
+            time, duration = begun[push.step]
+            begin = time + push.phase * duration
             if begin <= now < begin + push.duration:
                 total += push.impulse / push.duration
     return total

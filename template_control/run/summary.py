@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,17 @@ from template_control.slip.maps.section import section_of
 
 Array = NDArray[np.float64]
 
+
+STRIDES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
+"""The kinds of stride in words."""
+
+STANDING = {
+    "s": "standing",
+    "sw": "stand to walk",
+    "ws": "walk to stand",
+    "ww": "to another speed",
+}
+"""The kinds of stride of a scenario that stands."""
 
 _STATE = ("speed", "height", "vertical_speed")
 _LAST = 50  # strides that a gait is judged by
@@ -37,6 +49,17 @@ def _sections(record: Record) -> dict[str, Any]:
         f"{names[last].lower()}_target": state(target),
         f"{names[last].lower()}_mean_last_{_LAST}": state(here.mean(axis=0)) if len(here) else None,
     }
+
+
+def completed_strides(record: Record) -> dict[str, int]:
+    """How many strides of each kind a run completed, the kinds in words.
+
+    Args:
+        record: the run.
+    """
+    kinds = Counter(record.metadata["strides"][i] for i in record.stride[:-1])
+    names = STRIDES | STANDING
+    return {names.get(kind, kind): count for kind, count in kinds.items()}
 
 
 def _flight_share(record: Record) -> dict[str, float | None]:
@@ -92,9 +115,9 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         path: where it was saved; None where it was not.
 
     Returns:
-        robot, gait, steps, fell, fall_reason, duration, mean_speed, vlo_target and
-        vlo_mean_last_50 (speed, height, vertical_speed), or where the run ends at an apex
-        apex_target and apex_mean_last_50 (speed, height), speed_error_rms (of dx/dt where
+        robot, gait, steps, strides (count by kind), fell, fall_reason, duration, mean_speed,
+        vlo_target and vlo_mean_last_50 (speed, height, vertical_speed), or where the run ends at
+        an apex apex_target and apex_mean_last_50 (speed, height), speed_error_rms (of dx/dt where
         strides end, against their targets), nearest_speed_taken (strides planned to end at another
         speed than the wanted one, the nearest within their reach, and the most that one was off
         [m/s]), com_error_rms and com_error_max (x, y, while a foot is
@@ -113,6 +136,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "robot": m["robot"],
         "gait": m["gait"],
         "steps": record.steps,
+        "strides": completed_strides(record),
         "fell": record.fell,
         "fall_reason": m["fall_reason"] or None,
         "duration": duration,

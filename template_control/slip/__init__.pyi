@@ -1,5 +1,6 @@
 from .automaton.automaton import AUTOMATON as AUTOMATON
 from .automaton.automaton import STRIDE_START as STRIDE_START
+from .automaton.breaking import RUN_ON as RUN_ON
 from .automaton.hybrid import Automaton as Automaton
 from .automaton.hybrid import Edge as Edge
 from .automaton.hybrid import Node as Node
@@ -52,6 +53,9 @@ from .maps.section import APEX as APEX
 from .maps.section import VLO as VLO
 from .maps.section import Section as Section
 from .parameters import SlipParameters as SlipParameters
+from .scenario.catching import BreakingRoute as BreakingRoute
+from .scenario.catching import CatchingRoute as CatchingRoute
+from .scenario.catching import CatchOptions as CatchOptions
 from .scenario.paces import PaceOptions as PaceOptions
 from .scenario.record import ScenarioRecord as ScenarioRecord
 from .scenario.route import Route as Route

@@ -23,7 +23,9 @@ _GIVEN = {
     "apex_height": "apex",
 }
 """By the field of a :class:`GaitChoice`, the option that sets it."""
-_RANGES = {"speed": (0.01, 10.0), "touchdown_angle": (1.0, 89.0), "apex": (0.01, 10.0)}
+SPEEDS = (0.01, 10.0)
+"""That a gait may be asked for [m/s]; whether there is one is told later."""
+_RANGES = {"speed": SPEEDS, "touchdown_angle": (1.0, 89.0), "apex": (0.01, 10.0)}
 
 
 def add_gait_options(parser: argparse.ArgumentParser) -> None:

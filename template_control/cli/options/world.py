@@ -116,7 +116,7 @@ def simulation_choice(
     """
     check_ranges(options, _RANGES)
     given: dict[str, Any] = {"plant": _plant(options, base)}
-    embedding = {name: getattr(options, name) for name in ("friction", "torque_scale")}
+    embedding = {n: getattr(options, n, None) for n in ("friction", "torque_scale", "catches")}
     given["embedding"] = replace(base.embedding, **_without_none(embedding))
     if options.push is not None:
         given["pushes"] = tuple(map(_push, options.push))

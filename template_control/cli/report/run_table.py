@@ -25,6 +25,9 @@ def print_table(figures: dict[str, Any]) -> None:
         table.add_row(name, text)
 
     row("steps", f"{figures['steps']}")
+    if len(figures["strides"]) > 1:
+        for name, count in figures["strides"].items():
+            row(f"steps, {name}", f"{count}")
     row("falls", "0" if not figures["fell"] else f"1: {figures['fall_reason']}")
     row("duration", f"{figures['duration']:.2f} s")
     row("mean speed", f"{figures['mean_speed']:.3f} m/s")

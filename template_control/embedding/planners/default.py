@@ -21,12 +21,14 @@ from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.section import APEX
+from template_control.slip.scenario.catching import CatchingRoute
 from template_control.slip.scenario.route import Route, ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.similarity import REFERENCE
 
 # A slow stride lasts 1.3 sqrt(l0 / g); a run that is behind its profile must be able to catch up.
 _STRIDE = 1.9
+_CATCHING = RunningOptions(pace=0.12)  # a run that catches a walk is to be over soon
 _GENTLE = 0.05  # of g: up to this acceleration moderate controls keep up
 
 
@@ -71,13 +73,14 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
 
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
-    scenario = route.scenario if isinstance(route, ScenarioRoute) else None
+    followed = route.followed if isinstance(route, CatchingRoute) else route
+    scenario = followed.scenario if isinstance(followed, ScenarioRoute) else None
     standing: Planners = {}
     if scenario is not None and scenario.stands:
         relative = scenario.stand_height / p.rest_length * REFERENCE.rest_length
         standing = standing_planners(p, StandingOptions(height=relative))
     walk = walking or LqrPlanner(walking_gait(p, speed))
-    options = None if scenario is None else _keeping_up(scenario)
+    options = _CATCHING if scenario is None else _keeping_up(scenario)
     run = RunningPlanner(runs(slowest), options)
     return {
         "w": walk,

@@ -84,6 +84,19 @@ class Ahead(Protocol):
         """(m,) state at the section where it ends, and how it ends, with (5,) controls ``u``."""
 
 
+@dataclass(frozen=True)
+class Free:
+    """What of the controls can still be chosen within a stride.
+
+    Attributes:
+        slots: that the rest of the stride depends on.
+        turn: how far the touchdown angle can still be changed [rad].
+    """
+
+    slots: Sequence[int]
+    turn: float
+
+
 @runtime_checkable
 class LandingPlanner(Planner, Protocol):
     """A planner that knows how to choose again where a foot has landed.
@@ -122,6 +135,21 @@ class CurvePlanner(Planner, Protocol):
 
         Returns:
             What holds from now on, and the stride from here.
+        """
+
+
+@runtime_checkable
+class BreakingPlanner(Planner, Protocol):
+    """A planner of a stride that the robot can break into within another one."""
+
+    def break_into(self, ahead: Ahead, controls: Array, target: Array, free: Free) -> Decision:
+        """Controls for a stride from within.
+
+        Args:
+            ahead: where it leads.
+            controls: (5,) u of the stride that is left.
+            target: (m,) state wanted at the section where the stride ends.
+            free: what of u can still be chosen.
         """
 
 

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, NotNegative, Positive
-from template_control.embedding.planners.planner import ANY_ANGLE, Ahead, Decision, Planner
+from template_control.embedding.planners.planner import (
+    ANY_ANGLE,
+    Ahead,
+    Decision,
+    Free,
+    Planner,
+)
 from template_control.embedding.planners.regularised import (
     FromHere,
     FromSection,
@@ -30,6 +36,8 @@ from template_control.slip.maps.section import PADDED
 from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
+
+_LEGS = (Slot.K_SC, Slot.K_SD)  # of a gait, before and after the bottom
 
 
 @dataclass(frozen=True)
@@ -46,6 +54,9 @@ class TransitionOptions(Checked):
             would touch down at once.
         again: change of each, a share, that counts as 1 when a foot has landed.
         again_bounds: of the stiffnesses when a foot has landed, as shares of those chosen before.
+        broken_turn: change of alpha [rad] that counts as 1 where the robot breaks into the stride.
+        broken_angles: of alpha then, relative to the gait's [rad].
+        broken_bounds: of the stiffnesses then, as shares of those of the gait that it leads to.
         rounds: Gauss-Newton steps.
 
     Raises:
@@ -60,6 +71,9 @@ class TransitionOptions(Checked):
     top_margin: NotNegative = tuned(0.005)
     again: Positive = tuned(0.3)
     again_bounds: Interval = tuned((0.5, 2.0))
+    broken_turn: Positive = tuned(0.05)
+    broken_angles: Interval = tuned((-0.2, 0.1))
+    broken_bounds: Interval = tuned((0.35, 2.0))
     rounds: Index = tuned(6)
 
     def __post_init__(self) -> None:
@@ -146,6 +160,32 @@ class TransitionPlanner:
         prior = Prior(controls.copy(), stiff, base, o.again * base, lower, upper, o.rounds)
         tolerance = np.array(o.tolerance)[: len(target)]
         u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
+        return self._decision(u, end, target)
+
+    def break_into(self, ahead: Ahead, controls: Array, target: Array, free: Free) -> Decision:
+        """See :meth:`~.planner.BreakingPlanner.break_into`.
+
+        u_0 is that of the gait that the stride leads to; what is not free here stays.
+        """
+        o, gait = self.options, self._after(float(target[0]))
+        own = [slot for slot in o.slots if slot != Slot.TOUCHDOWN_ANGLE]
+        chosen = {Slot.TOUCHDOWN_ANGLE: Slot.TOUCHDOWN_ANGLE} | dict(zip(own, _LEGS, strict=False))
+        slots = [slot for slot in free.slots if slot in chosen]
+        turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
+        base = gait.controls[[chosen[Slot(slot)] for slot in slots]]
+        now, wanted = float(controls[Slot.TOUCHDOWN_ANGLE]), gait.controls[Slot.TOUCHDOWN_ANGLE]
+        flattest = max(now - free.turn, min(now, wanted + o.broken_angles[0]))
+        steepest = min(now + free.turn, max(now, wanted + o.broken_angles[1]))
+        softest, stiffest = o.broken_bounds
+        lower = np.where(turns, flattest, softest * base)
+        upper = np.where(turns, steepest, stiffest * base)
+        base = np.clip(base, lower, upper)
+        change = np.where(turns, o.broken_turn, o.again * base)
+        u = controls.copy()
+        u[own] = gait.controls[[chosen[slot] for slot in own]]
+        prior = Prior(u, slots, base, change, lower, upper, o.rounds)
+        tolerance = np.array(o.tolerance)[: len(target)]
+        u, end = solve_stride(FromHere(ahead, slots), target, prior, tolerance)
         return self._decision(u, end, target)
 
     def _decision(self, u: Array, end: Array | None, wanted: Array) -> Decision:

@@ -135,8 +135,17 @@ def _walk_to_run() -> tuple[Node, ...]:
             None,
             (
                 Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
-                *_AWAITING_TOUCHDOWN_FAILURES,
+                # A walker that is too fast takes off before.
+                Edge(Event.REAR_LIFTOFF, "F_aa^wr", Reset.SWAP, "G_l^wr"),
+                *_AWAITING_TOUCHDOWN_FAILURES[1:],
             ),
+        ),
+        Node(
+            "F_aa^wr",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^wr", Reset.PLACE_REAR, "G_t^wr"), *_FLIGHT_FAILURES),
         ),
         Node(
             "DS_sc^wr",
@@ -145,7 +154,7 @@ def _walk_to_run() -> tuple[Node, ...]:
             Slot.K_SC,
             (
                 Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
-                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
                 *_DOUBLE_STANCE_FAILURES,
             ),
         ),

@@ -1,0 +1,214 @@
+"""A walk that cannot go on breaks into a run, slows down and walks on."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.cli.main import main
+from template_control.embedding.planners.default import default_planners
+from template_control.embedding.planners.planner import BreakingPlanner, Free
+from template_control.embedding.section_report import Learnt
+from template_control.embedding.sensing import Sensed
+from template_control.embedding.stride_planning import ReplanOptions, StridePlanning
+from template_control.embedding.touchdown import free_controls
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.breaking import RUN_ON
+from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
+from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.running_gait import running_gait, running_speeds
+from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.maps.section import APEX, VLO
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.catching import BreakingRoute, CatchingRoute, CatchOptions
+from template_control.slip.scenario.route import ScenarioRoute, SteadyRoute
+from template_control.slip.scenario.scenario import Scenario, Segment
+
+P = SlipParameters()
+WALK = walking_gait(P, 1.1)
+FAST, SLOW = np.array([2.0, 0.98]), np.array([1.3, 0.98])
+NOTHING = Learnt(load=1.0, trim=0.0, lean=0.0)
+
+
+def catching(**options):
+    return CatchingRoute(SteadyRoute.of(WALK), CatchOptions(**options))
+
+
+def asked(route, *sections):
+    """Kinds of stride that the route asks for; what it says ahead is what it then asks for."""
+    kinds = []
+    for section, z in sections:
+        ahead, goal = route.ahead(section, z, 0.0), route.next(section, z, 0.0)
+        assert ahead.stride == goal.stride
+        kinds.append(goal.stride)
+    return kinds
+
+
+def test_undisturbed_it_asks_what_the_route_asks_that_it_follows():
+    route, steady = catching(), SteadyRoute.of(WALK)
+    assert isinstance(route, BreakingRoute)
+    assert not isinstance(steady, BreakingRoute)
+    assert (route.section, route.endless, route.parameters) == (VLO, True, P)
+    np.testing.assert_array_equal(route.start, steady.start)
+    assert asked(route, *[(VLO, WALK.vlo)] * 3) == ["w"] * 3
+    goal = route.next(VLO, WALK.vlo, 0.0)
+    np.testing.assert_array_equal(goal.target, WALK.vlo)
+    assert goal.then is None, "no lean for a run that never comes"
+
+
+def test_it_runs_until_it_is_slow_and_walks_on():
+    route = catching(walkable=1.45, slow=1.35)
+    walk = route.next(VLO, WALK.vlo, 0.0)
+    run = route.instead(walk, speed=2.0, excess=0.9)
+    assert (run.stride, run.then) == ("wr", "r")
+    assert run.target[0] == 2.0
+    assert asked(route, (VLO, WALK.vlo)) == ["w"], "naming a way does not go it"
+    route.take(run)
+    assert route.next(APEX, FAST, 0.0).target[0] == 1.35
+    assert asked(route, (APEX, FAST), (APEX, np.array([1.46, 0.98]))) == ["r", "r"]
+    back = route.next(APEX, SLOW, 0.0)
+    assert (back.stride, back.then) == ("rw", "w")
+    np.testing.assert_array_equal(back.target, WALK.vlo)
+    assert asked(route, (VLO, WALK.vlo)) == ["w"]
+    route.take(route.instead(walk, 2.0, 0.9))
+    route.reset()
+    assert asked(route, (VLO, WALK.vlo)) == ["w"]
+
+
+def test_only_a_walk_that_is_much_too_fast_is_caught():
+    route = catching(excess=0.42)
+    walk = route.next(VLO, WALK.vlo, 0.0)
+    slowest, fastest = running_speeds(P)
+    assert route.instead(walk, 2.0, 0.41) is None
+    assert route.instead(walk, slowest - 1e-6, 0.5) is None, "no run is that slow"
+    assert route.instead(walk, 9.0, 8.0).target[0] == fastest
+    changing = replace(walk, stride="wr")
+    assert route.instead(changing, 2.0, 0.9) is None, "a transition that was planned goes on"
+    route.take(route.instead(walk, 2.0, 0.9))
+    assert route.instead(changing, 2.0, 0.0).stride == "wr", "pushed again, it aims again"
+    assert route.instead(replace(walk, stride="r"), 2.0, 0.9) is None
+
+
+def test_a_scenario_goes_on_after_the_catch():
+    segments = (Segment("walk", 1.1, steps=2), Segment("run", 2.0, steps=1))
+    route = CatchingRoute(ScenarioRoute(Scenario(segments=segments)))
+    assert not route.endless
+    walk = route.next(VLO, WALK.vlo, 0.0)
+    route.take(route.instead(walk, 2.0, 0.9))
+    assert asked(route, (APEX, FAST), (APEX, SLOW), (VLO, WALK.vlo)) == ["r", "rw", "w"]
+    assert asked(route, (VLO, WALK.vlo), (APEX, FAST)) == ["wr", "r"], "the scenario's own run"
+    assert route.next(APEX, SLOW, 9.0) is None
+
+
+@pytest.mark.parametrize(("walks", "runs"), RUN_ON.items())
+def test_the_same_legs_stand_where_a_walk_breaks_into_a_run(walks, runs):
+    before, after = AUTOMATON.node(walks), AUTOMATON.node(runs)
+    assert before.stance == after.stance
+    assert after in AUTOMATON.stride(AUTOMATON.starts["wr"])
+
+
+def test_a_walker_that_takes_off_lands_on_the_other_foot_and_runs():
+    u = running_gait(P, 2.4).controls.copy()
+    u[Slot.TOUCHDOWN_ANGLE] = 1.22
+    u[[Slot.K_SC_WR, Slot.K_SD_WR]] = u[[Slot.K_SC, Slot.K_SD]]
+    u[[Slot.K_SC, Slot.K_SD]] = P.leg_stiffness
+    stride = simulate_stride(P, "SS_av^wr", VLO.state([2.4, 0.99, 0.4]), u)
+    assert stride.outcome is Outcome.SECTION
+    assert [e.target for e in stride.events] == [
+        "F_aa^wr", "SS_sc^wr", "SS_sd^wr", "F_ba^wr", "F_aa^r"
+    ]  # fmt: skip
+    landing = stride.events[1]
+    assert landing.event is Event.TOUCHDOWN
+    assert stride.toes.max() > 0.3, "it lands ahead of the foot that took off"
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.05, 10.0])
+def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
+    route = catching()
+    planner = default_planners(route)["wr"]
+    assert isinstance(planner, BreakingPlanner)
+    node, state = AUTOMATON.node("SS_av^wr"), VLO.state([1.9, 0.985, 0.1])
+    u, target = WALK.controls, running_gait(P, 1.9).apex
+
+    def ahead(u):
+        stride = simulate_stride(P, node.name, state, u)
+        return APEX.of(stride.state), stride.outcome
+
+    free = Free([int(Slot.TOUCHDOWN_ANGLE), *free_controls(AUTOMATON, node)], turn)
+    decision = planner.break_into(ahead, u, target, free)
+    assert decision.feasible
+    assert not decision.nominal
+    end, outcome = ahead(decision.controls)
+    assert outcome is Outcome.SECTION
+    np.testing.assert_allclose(decision.predicted[:2], end, atol=1e-12)
+    assert abs(end[0] - target[0]) < 0.3
+    assert abs(end[1] - target[1]) < 0.06
+    moved = decision.controls[Slot.TOUCHDOWN_ANGLE] - u[Slot.TOUCHDOWN_ANGLE]
+    assert abs(moved) <= turn + 1e-12
+    stays = [Slot.K_SC, Slot.K_SD]
+    np.testing.assert_array_equal(decision.controls[stays], u[stays])
+
+
+def pushed(speed, route):
+    """Plan a walking step, push the robot 60 ms later, and plan again: planning and node then."""
+    planning = StridePlanning(route, default_planners(route), ReplanOptions())
+    planning.begin(VLO)
+    sensed = Sensed(VLO.state(WALK.vlo), np.zeros(2))
+    node = planning.decide(VLO, sensed, 0.0, NOTHING)
+    u = planning.reports[0].decision.controls
+    sensed.state[:] = simulate_stride(P, node.name, sensed.state, u).sample(0.06)[0, :4]
+    sensed.state[2] += speed
+    assert planning.surprised(speed, 0.06, 0.06)
+    return planning, planning.reconsider(node, sensed, 0.06, 0.06)
+
+
+def test_a_push_within_a_step_is_answered_by_a_walk_or_by_a_run():
+    planning, node = pushed(0.2, catching())
+    assert node.name == "SS_av^w"
+    assert planning.reports[0].goal.stride == "w"
+    planning, node = pushed(0.9, catching())
+    assert node.name == "SS_av^wr"
+    report = planning.reports[0]
+    assert (len(planning.reports), report.goal.stride) == (1, "wr")
+    assert report.decision.feasible
+    assert report.target[2] == 0.0, "of an apex"
+    assert planning.path.outcome is Outcome.SECTION
+    _, node = pushed(0.9, SteadyRoute.of(WALK))
+    assert node.name == "SS_av^w", "this route knows no other way"
+
+
+def kinds(record):
+    return [record.metadata["strides"][i] for i in record.stride[:-1]]
+
+
+@pytest.mark.slow(seconds=30)
+@pytest.mark.parametrize(("name", "phase"), [("runner", 0.3), ("five-link", 0.7)])
+def test_a_robot_that_is_pushed_too_hard_runs_and_walks_on(name, phase):
+    robot = tc.load_robot(name)
+    planner = tc.LqrPlanner(tc.default_gait(robot))
+    options = tc.SimulationOptions(steps=18, pushes=(tc.Push(80.0, step=3, phase=phase),))
+    record = tc.simulate(robot, planner, options)
+    assert record.metadata["fall_reason"] == ""
+    found = kinds(record)
+    runs = found.count("r")
+    walks = len(found) - runs - 2
+    assert found == ["w"] * 3 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * (walks - 3)
+    assert runs >= 4
+    assert walks > 5
+    assert np.all(np.abs(record.torque) <= record.metadata["torque_limit"])
+    assert record.push.sum() * 1e-3 == pytest.approx(80.0, rel=1e-6), "it stays where it was"
+    speed = record.section_state[:, 0]
+    assert speed.max() > 1.9
+    assert speed[-1] == pytest.approx(1.1, abs=0.06)
+
+
+@pytest.mark.slow(seconds=10)
+def test_the_command_says_no_and_counts_strides(tmp_path, capsys):
+    arguments = ["walk", "--push", "60@2:0.4", "--steps", "5", "--no-figures", "--json"]
+    assert main([*arguments, "--output", str(tmp_path / "caught")]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["strides"] == {"walking": 2, "walk to run": 1, "running": 2}
+    assert main([*arguments, "--no-catch", "--output", str(tmp_path / "not")]) in (0, 1)
+    assert set(json.loads(capsys.readouterr().out)["strides"]) == {"walking"}
