@@ -207,6 +207,9 @@ def test_transitions_are_chosen_at_their_own_section():
         (starts["w"], starts["wr"]),
         (starts["w"], starts["wr*"]),
         (starts["r"], starts["rw"]),
+        (starts["w"], starts["ws"]),
+        (starts["w"], starts["ww"]),
+        (starts["s"], starts["sw"]),
     }
 
 

@@ -69,6 +69,7 @@ def test_guards_are_those_of_the_vocabulary():
         Event.PASSED_FRONT_FOOT: -0.3,
         Event.FALL: -0.4,
         Event.BACKWARD: -2.0,
+        Event.REST: -5.0,
     }
     assert list(expected) == list(Event)
     np.testing.assert_allclose(guards_of(state, toes, 0.5), list(expected.values()), atol=1e-15)

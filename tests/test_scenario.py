@@ -105,7 +105,7 @@ SEGMENT = '[[segment]]\ngait = "walk"\nspeed = 1.1\nsteps = 2\n'
         (SEGMENT + SEGMENT.replace("walk", "trot"), "segment 2 gait is 'trot'"),
         (SEGMENT.replace("1.1", "inf"), "segment 1 speed is inf"),
         (SEGMENT.replace("steps = 2", ""), "segment 1 never ends"),
-        (SEGMENT.replace("walk", "run"), "segment 1 must walk"),
+        (SEGMENT.replace("walk", "run"), "segment 1 must stand, or walk"),
         (SEGMENT.replace("2", "0"), "steps is 0"),
         ('map = "mercator"\n' + SEGMENT, "map is 'mercator'"),
         ("apex_height = -1\n" + SEGMENT, "apex_height is -1"),

@@ -9,7 +9,7 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.maps.section import APEX, VLO, section_of
+from template_control.slip.maps.section import APEX, REST, VLO, section_of
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -73,5 +73,6 @@ def test_the_mirrored_template_walks_back():
 def test_sections_by_event():
     assert section_of(Event.VLO) is VLO
     assert section_of(Event.APEX) is APEX
-    with pytest.raises(ParameterError, match="TOUCHDOWN is no section: give VLO or APEX"):
+    assert section_of(Event.REST) is REST
+    with pytest.raises(ParameterError, match="TOUCHDOWN is no section: give VLO or APEX or REST"):
         section_of(Event.TOUCHDOWN)

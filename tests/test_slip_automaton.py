@@ -85,7 +85,8 @@ def test_run_to_walk_stride_follows_equation_43():
 @pytest.mark.parametrize("node", AUTOMATON.nodes, ids=lambda n: n.name)
 def test_legs_match_the_phase(node):
     legs = (node.rear is not None) + (node.front is not None)
-    assert legs == {Phase.F: 0, Phase.SS: 1, Phase.DS: 2}[node.phase]
+    # A double stance without springs follows a curve.
+    assert legs in {Phase.F: {0}, Phase.SS: {1}, Phase.DS: {0, 2}}[node.phase]
     for edge in node.edges:
         if isinstance(edge.target, Outcome):
             assert edge.target is not Outcome.SECTION
@@ -227,7 +228,7 @@ def changed(name, *edges):
         (
             changed("F_aa^h", *(Edge(event, "F_aa^h") for event in Event)),
             {},
-            rf"node F_aa\^h has 10 edges: give it at most {MAX_EDGES}",
+            rf"node F_aa\^h has 11 edges: give it at most {MAX_EDGES}",
         ),
         ((*HOP.nodes, HOP.nodes[0]), {}, r"two nodes are called F_aa\^h"),
     ],

@@ -24,11 +24,12 @@ from template_control.cli.report.output import INTERRUPTED
 from template_control.cli.report.run_table import nearest_text
 from template_control.errors import ParameterError
 from template_control.run.record import Record
-from template_control.run.summary import STRIDES, summarise
+from template_control.run.summary import STANDING, STRIDES, summarise
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.terminal import plain_console
 
+NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (
     "robot", "fell", "fall_reason", "duration", "speed_error_rms", "nearest_speed_taken",
     "joint_torque", "joint_speed", "saturated_share", "qp_failures", "real_time_factor",
@@ -64,6 +65,8 @@ def run(options: argparse.Namespace) -> int:
     config, ready = prepared(options)
     if ready.route is None:
         raise ParameterError("no scenario is given: name a file, such as examples/example_one.toml")
+    if ready.route.scenario.stands:
+        plain_console(stderr=True).print(NO_STANDS)
     with plain_console(stderr=True).status("the template"):
         template = simulate_scenario(ready.route.scenario)
 
@@ -97,7 +100,10 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
         **{name: run[name] for name in _FROM_THE_RUN},
         "completed": bool(record.metadata["arrived"]),
         "top_speed": float(record.section_state[:, 0].max()),
-        "strides": {name: run["strides"].get(name, 0) for name in STRIDES.values()},
+        "strides": {
+            **{name: run["strides"].get(name, 0) for name in STRIDES.values()},
+            **{name: run["strides"][name] for name in STANDING.values() if name in run["strides"]},
+        },
         "template": {
             "completed": template.completed,
             "top_speed": float(template.section_state[:, 0].max()),

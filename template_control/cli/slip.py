@@ -13,6 +13,7 @@ import numpy as np
 from rich.table import Table
 
 from template_control import view
+from template_control.cli.go import NO_STANDS
 from template_control.cli.options.output import output_folder
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.record import ScenarioRecord
@@ -55,6 +56,8 @@ def run(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario)
     if options.map is not None:
         scenario = replace(scenario, map_kind=_MAPS[options.map])
+    if scenario.stands:
+        plain_console(stderr=True).print(NO_STANDS)
     folder = output_folder(options.output)
     with plain_console(stderr=True).status("simulating") as status:
         record = simulate_scenario(scenario, lambda now: status.update(f"simulating, {now:.1f} s"))

@@ -6,7 +6,11 @@ import argparse
 import json
 
 from template_control.cli.options.config import add_config, prepared
-from template_control.cli.options.gait import add_gait_options, add_planner_options
+from template_control.cli.options.gait import (
+    add_gait_options,
+    add_planner_options,
+    add_stand_options,
+)
 from template_control.cli.options.output import add_output_options
 from template_control.cli.options.robot import add_robot_options
 from template_control.cli.options.world import (
@@ -34,6 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_config(parser)
     add_robot_options(parser)
     add_gait_options(parser)
+    add_stand_options(parser)
     add_planner_options(parser)
     add_world_options(parser)
     add_disturbance_options(parser)
@@ -53,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     """Walk as told; returns 0, 1 after a fall, 130 after Ctrl-C."""
     config, ready = prepared(options)
     for number, segment in enumerate(config.scenario.segments if config.scenario else (), 1):
-        if segment.gait != "walk":
+        if segment.gait == "run":
             raise ScenarioError(
                 f"segment {number} is to {segment.gait}: give the scenario to template-control go"
             )

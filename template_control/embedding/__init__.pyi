@@ -14,6 +14,7 @@ from .planners.lqr import LqrPlanner as LqrPlanner
 from .planners.modified import ModifiedOptions as ModifiedOptions
 from .planners.modified import ModifiedPlanner as ModifiedPlanner
 from .planners.planner import BreakingPlanner as BreakingPlanner
+from .planners.planner import CurvePlanner as CurvePlanner
 from .planners.planner import Decision as Decision
 from .planners.planner import Free as Free
 from .planners.planner import LandingPlanner as LandingPlanner
@@ -32,4 +33,12 @@ from .robot_template import default_gait as default_gait
 from .robot_template import paper_gait as paper_gait
 from .robot_template import template_for as template_for
 from .section_report import SectionReport as SectionReport
+from .standing.default import standing_planners as standing_planners
+from .standing.options import StandingOptions as StandingOptions
+from .standing.planners import ChangePlanner as ChangePlanner
+from .standing.planners import StandingGait as StandingGait
+from .standing.planners import StandPlanner as StandPlanner
+from .standing.planners import StartPlanner as StartPlanner
+from .standing.planners import StopPlanner as StopPlanner
+from .standing.pose import standing_pose as standing_pose
 from .stride_planning import ReplanOptions as ReplanOptions

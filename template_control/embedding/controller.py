@@ -95,7 +95,6 @@ class EmbeddingController:
         self.parameters = route.parameters
         self.options = scaled(options or EmbeddingOptions(), Scale.of(self.parameters))
         o = self.options
-        self.planning = StridePlanning(route, planners, o.replan, automaton)
         self.qp = WholeBodyQp(robot, o)
         self.load = LoadEstimate(o.load, robot.gravity)
         self.trim = MomentumTrim(self.parameters, o.trim)
@@ -110,9 +109,13 @@ class EmbeddingController:
         self.time = 0.0
         self._fresh = True
         self._rear_shift = 0.0
-        self._sensed = Sensed(swing_time=self.feet.swing_time)
+        self._sensed = Sensed(swing_time=self.feet.swing_time, acceleration=self.reference[4:])
         self._guards = RobotGuards(self.parameters, o.guards)
         self._stations = stations(automaton, robot.nv, o.phases, o.swing)
+        curved = {name for name, station in self._stations.items() if station.control.curved}
+        self.planning = StridePlanning(route, planners, o.replan, automaton, curved)
+        p = self.parameters
+        self._body = np.array([p.mass, p.gravity, p.rest_length])
         self.station = next(iter(self._stations.values()))
 
     @property
@@ -166,7 +169,10 @@ class EmbeddingController:
         half = 0.5 * planner.gait.step_duration
         for leg in self.station.swings:
             self._lift(self.feet.of[leg], (swung or (half, half))[leg])
-        self.ground = float(self.robot.foot_position[rear, 1]) if node.stance else 0.0
+        if node.stance:
+            # Of two feet on the ground the front one landed last.
+            self.feet.landed = self.feet.of[self.station.stance[-1]]
+        self.ground = float(self.robot.foot_position[self.feet.landed, 1]) if node.stance else 0.0
         self._sense(np.zeros(2, dtype=bool))
         self._decide(section)
 
@@ -333,13 +339,7 @@ class EmbeddingController:
         )
         self.phase_offset += (s.state[2] - self.robot.com_velocity[0]) * dt
         segment = path.curve.meta[row]
-        leg_forces(
-            segment,
-            self.reference[0] + toe,
-            self.reference[1],
-            self.parameters.rest_length,
-            self.template_forces,
-        )
+        leg_forces(segment, toe, self.reference, self._body, self.template_forces)
         if segment[3] != toe:
             # Template and robot are on either side of liftoff: to each foot its own force.
             self.template_forces[:] = np.flipud(self.template_forces.copy())

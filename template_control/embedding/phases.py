@@ -46,6 +46,7 @@ class PhaseControl(Checked):
         weighs: whether the load estimate observes this phase.
         trims: whether the momentum trim acts in this phase.
         swing: shape of the swings that begin in this phase; None: that of the controller's options.
+        curved: whether the CoM follows the planner's curve in time, and not the template's springs.
         lands: whether the stiffnesses that are still free are chosen again as the phase begins,
             from where the foot has landed.
     """
@@ -59,6 +60,7 @@ class PhaseControl(Checked):
     trims: bool = False
     swing: SwingOptions | None = None
     lands: bool = False
+    curved: bool = False
 
 
 Phases = Mapping[Phase | str, PhaseControl]
@@ -78,6 +80,10 @@ _RUNNING_STANCE = PhaseControl(
 
 # As in walking, but a stride that is made once has nothing to be trimmed by.
 _LEAVING_THE_GROUND = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,))
+
+# Nobody walks: time passes, and both feet carry.
+_STANDING = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, curved=True)
+_LIFTING_OFF = replace(_STANDING, unloads=(Leg.REAR,), weighs=False)
 
 PHASES: Phases = {
     Phase.F: PhaseControl(
@@ -107,6 +113,10 @@ PHASES: Phases = {
     "SS_sd^wr": _RUNNING_STANCE,
     "SS_sc^rw": replace(_RUNNING_STANCE, lands=True),
     "SS_sd^rw": _RUNNING_STANCE,
+    "DS_ar^s": _STANDING,
+    "DS_br^ws": replace(_STANDING, weighs=False),
+    "DS_ar^sw": _LIFTING_OFF,
+    "DS_bl^ww": _LIFTING_OFF,
 }
 """What walking and running need in each phase; transitions may start from it."""
 

@@ -37,6 +37,8 @@ def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
     unit = float(np.sqrt(p.gravity * p.rest_length))
     _check_accelerations(robot, own)
     for number, segment in enumerate(own.segments, 1):
+        if segment.gait not in _RANGES:
+            continue
         slowest, fastest = _RANGES[segment.gait](own.parameters)
         for speed in _speeds(segment):
             if not slowest <= speed <= fastest:
@@ -46,7 +48,8 @@ def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
                     f" {_WHERE[segment.gait]}"
                 )
     slowest, fastest = speed_range(own.parameters)
-    if not slowest <= own.start[0] <= fastest:
+    moves = own.segments[0].gait in _RANGES
+    if moves and not slowest <= own.start[0] <= fastest:
         raise ScenarioError(
             f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from {slowest:.3g} to"
             f" {fastest:.3g} m/s"

@@ -23,6 +23,8 @@ class Sensed:
         contact: (2,) whether each foot touches the ground.
         swing_time: (2,) time since each foot lifted off [s].
         feet: the foot that is the rear leg's, and the front leg's.
+        acceleration: (2,) wanted of the CoM at the last tick [m/s^2]: what is planned anew goes on
+            with it.
     """
 
     state: Array = field(default_factory=lambda: np.zeros(4))
@@ -30,3 +32,4 @@ class Sensed:
     contact: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(2, dtype=bool))
     swing_time: Array = field(default_factory=lambda: np.full(2, np.inf))
     feet: tuple[int, int] = (0, 1)
+    acceleration: Array = field(default_factory=lambda: np.zeros(2))

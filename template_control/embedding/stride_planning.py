@@ -7,6 +7,7 @@ has carried the robot away from it.
 from __future__ import annotations
 
 import time
+from collections.abc import Set
 from dataclasses import dataclass, field, replace
 from typing import Annotated
 
@@ -19,6 +20,7 @@ from template_control.checks.ranges import NotNegative, Positive, Range, Share, 
 from template_control.embedding.planners.planner import (
     Ahead,
     BreakingPlanner,
+    CurvePlanner,
     Decision,
     Free,
     LandingPlanner,
@@ -39,7 +41,7 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.breaking import RUN_ON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome, Slot
-from template_control.slip.dynamics.stride import StrideSimulator
+from template_control.slip.dynamics.stride import Stride, StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.catching import BreakingRoute
@@ -88,6 +90,7 @@ class StridePlanning:
         planners: one for each kind of stride of the route.
         options: when to plan again.
         automaton: of the strides.
+        curved: nodes in which the planner's curve is followed, not the template's springs.
 
     Attributes:
         reports: one a section, the start's included.
@@ -103,11 +106,13 @@ class StridePlanning:
         planners: Planners,
         options: ReplanOptions,
         automaton: Automaton = AUTOMATON,
+        curved: Set[str] = frozenset(),
     ) -> None:
         self.route = route
         self.planners = planners
         self.options = options
         self.automaton = automaton
+        self.curved = curved
         self.parameters: SlipParameters = route.parameters
         self.reports: list[SectionReport] = []
         self.path: TemplatePath
@@ -253,7 +258,10 @@ class StridePlanning:
         u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
         self.reaching = angle_drop > 0.0
         start = node.name
-        first = self._simulator.run(start, state, u, toes)
+        if start in self.curved:
+            first = self._curve(start, state, toes, sensed)
+        else:
+            first = self._simulator.run(start, state, u, toes)
         strides = [first]
         self._whole = True
         # The next foothold must be known when the swing begins, before the next section. Where
@@ -269,6 +277,8 @@ class StridePlanning:
             ahead = self.planner_of(goal).decide(z, goal.target)
             self._whole = self._whole and ahead.lasting
             start = self.automaton.start(goal.stride).name
+            if start in self.curved:
+                break  # both feet stand: there is no foothold to know
             toes = (float(last.toes[0]), float(last.toes[1]))
             strides.append(self._simulator.run(start, last.state, ahead.controls, toes))
             more -= 1
@@ -277,6 +287,22 @@ class StridePlanning:
         self._feet = sensed.feet
         self._planned_at = now
         self._look_ahead(0)
+
+    def _curve(self, node: str, state: Array, toes: tuple[float, float], sensed: Sensed) -> Stride:
+        """The planner's curve from here; what it decides on the way holds from now on.
+
+        Raises:
+            ParameterError: if the planner has none.
+        """
+        report, planner = self.reports[-1], self.planner
+        if not isinstance(planner, CurvePlanner):
+            raise ParameterError(
+                f"{type(planner).__name__} plans no curve for node {node}: give it a method curve"
+            )
+        start = np.column_stack((state[:2], state[2:4], sensed.acceleration))
+        decision, stride = planner.curve(node, start, toes, report.decision)
+        self.reports[-1] = replace(report, decision=decision)
+        return stride
 
     def land(self, node: Node, sensed: Sensed, now: float) -> None:
         """A foot has landed: choose again what is still free, from where it did.
@@ -440,7 +466,8 @@ class StridePlanning:
                 self.follow(node, sensed, now)
             return other
         lasting = True
-        if node.name == self.automaton.starts[report.goal.stride]:
+        starts = node.name == self.automaton.starts[report.goal.stride]
+        if starts and node.name not in self.curved:
             z = self._back_to_section(node, report, sensed)
             if z is not None:
                 change = self._turn(phase_time)

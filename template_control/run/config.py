@@ -10,7 +10,7 @@ import inspect
 import os
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
-from template_control.embedding.planners.default import default_planners
+from template_control.embedding.planners.default import default_planners, first_speed
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner, Planners
@@ -37,13 +37,13 @@ from template_control.robot.library import ROBOTS, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
-from template_control.run.simulation import simulate
+from template_control.run.simulation import STEPS, simulate
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.scenario.route import ScenarioRoute
-from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.scenario.scenario import STAND_HEIGHT, Scenario, Segment
 from template_control.slip.similarity import REFERENCE
 
 
@@ -205,6 +205,7 @@ class OwnPlanner(Checked):
         return made
 
 
+_STAND = 2.0  # a walk's first and last stand [s]
 _PLANNER_MEMBERS = ("gait", "offset", "reset", "decide", "observe")
 
 PlannerChoice = LqrOptions | ModifiedOptions | RunningOptions | OwnPlanner
@@ -287,8 +288,45 @@ class RunConfig(Checked):
             gait = choice.of(robot)
             return Ready(robot, gait, None, {gait.stride: self._planner(gait)})
         route = robot_route(robot, self.scenario)
-        walk = walking_gait(route.parameters, float(route.start[0]))
+        walk = walking_gait(route.parameters, first_speed(route))
         return Ready(robot, walk, route, default_planners(route, self._planner(walk)))
+
+    def with_stands(self, before: bool, after: bool) -> RunConfig:
+        """The same walk as a scenario that begins or ends in a stand.
+
+        Args:
+            before: whether the robot stands before it walks.
+            after: whether it stops and stands where its steps are done.
+
+        Raises:
+            ParameterError: if a scenario is given: it has its own stands; or a run, or a start.
+            TemplateControlError: if the robot or its gait is not to be had.
+        """
+        if self.scenario is not None:
+            raise ParameterError(
+                "a scenario does not go with from stand or to stand: give it segments that stand"
+            )
+        robot = self.robot.load()
+        gait = self.gait.of(robot)
+        if not isinstance(gait, WalkingGait):
+            raise ParameterError(f"gait {gait.name} does not begin in a stand: give a walk")
+        if before and (self.simulation.start is not None or self.simulation.pose is not None):
+            raise ParameterError("a start does not go with from stand: leave one out")
+        steps = self.simulation.steps or STEPS
+        speed, height, vertical = gait.vlo.tolist()
+        stand = Segment("stand", duration=_STAND)
+        walk = Segment("walk", speed=speed, steps=steps)
+        scenario = Scenario(
+            segments=(*(stand,) * before, walk, *(stand,) * after),
+            parameters=gait.parameters,
+            start=(speed, height, vertical),
+            vlo=(height, vertical),
+            apex_height=height,
+            stand_height=STAND_HEIGHT * gait.parameters.rest_length,
+            name=gait.name,
+        )
+        options = replace(self.simulation, steps=None)
+        return replace(self, gait=GaitChoice(), simulation=options, scenario=scenario)
 
     def _planner(self, gait: WalkingGait | RunningGait) -> Planner:
         if isinstance(self.planner, OwnPlanner):

@@ -18,6 +18,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.section_report import SectionReport
+from template_control.embedding.standing.pose import standing_pose
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
@@ -31,7 +32,7 @@ from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.maps.section import APEX, VLO
+from template_control.slip.maps.section import APEX, REST, VLO
 from template_control.slip.scenario.catching import CatchingRoute
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
@@ -40,7 +41,8 @@ Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 
-_STEPS = 50  # of a run on a route that does not end, where the options do not say
+STEPS = 50
+"""Steps of a run on a route that does not end, where the options do not say."""
 
 
 @checked
@@ -152,6 +154,8 @@ def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array
     z = route.start if o.start is None else np.array(o.start)
     if pose is None and route.section == APEX:
         pose = _apex_pose(controller, z[: APEX.dimension])
+    if pose is None and route.section == REST:
+        pose = standing_pose(route.parameters)
     if pose is not None:
         q, v = state_in(robot, pose)
         controller.start(pose.rear, pose.swung)
@@ -184,8 +188,8 @@ def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
         return o.steps  # the options have looked at the pushes
     if not controller.planning.route.endless:
         return np.inf
-    check_pushes(o.pushes, _STEPS)
-    return _STEPS
+    check_pushes(o.pushes, STEPS)
+    return STEPS
 
 
 def _loop(

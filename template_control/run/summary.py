@@ -19,6 +19,14 @@ Array = NDArray[np.float64]
 STRIDES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
 """The kinds of stride in words."""
 
+STANDING = {
+    "s": "standing",
+    "sw": "stand to walk",
+    "ws": "walk to stand",
+    "ww": "to another speed",
+}
+"""The kinds of stride of a scenario that stands."""
+
 _STATE = ("speed", "height", "vertical_speed")
 _LAST = 50  # strides that a gait is judged by
 _NEAR = 0.02  # of sqrt(g l0): a plan that ends so near the wanted speed aims at it
@@ -50,7 +58,8 @@ def completed_strides(record: Record) -> dict[str, int]:
         record: the run.
     """
     kinds = Counter(record.metadata["strides"][i] for i in record.stride[:-1])
-    return {STRIDES.get(kind, kind): count for kind, count in kinds.items()}
+    names = STRIDES | STANDING
+    return {names.get(kind, kind): count for kind, count in kinds.items()}
 
 
 def _flight_share(record: Record) -> dict[str, float | None]:

@@ -56,6 +56,7 @@ from .parameters import SlipParameters as SlipParameters
 from .scenario.catching import BreakingRoute as BreakingRoute
 from .scenario.catching import CatchingRoute as CatchingRoute
 from .scenario.catching import CatchOptions as CatchOptions
+from .scenario.paces import PaceOptions as PaceOptions
 from .scenario.record import ScenarioRecord as ScenarioRecord
 from .scenario.route import Route as Route
 from .scenario.route import ScenarioRoute as ScenarioRoute

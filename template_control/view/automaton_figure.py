@@ -27,8 +27,12 @@ GAIT_NAMES = {
     "wr": "walk-to-run",
     "rw": "run-to-walk",
     "wr*": "walk-to-run, simplified",
+    "s": "standing",
+    "sw": "start",
+    "ws": "stop",
+    "ww": "to another speed",
 }
-"""Gaits by the superscripts of Table I."""
+"""Gaits by the superscripts of Table I, and of standing."""
 
 _PHASES = {
     Phase.F: ("#eef2f6", "flight"),
@@ -113,7 +117,7 @@ def layout(automaton: Automaton) -> dict[str, Array]:
 
     A gait that returns to itself is a circle, at the left and the right in turn, its start
     facing the middle. The others are rows between: above if they lead to the right, else
-    below, from the side they start on.
+    below, from the side they start on; below too if they begin or end at a lower circle.
     """
     members = gaits(automaton)
     ends = [
@@ -142,10 +146,14 @@ def layout(automaton: Automaton) -> dict[str, Array]:
         source = centre.get(came_from.get(names[0], ""))
         way = 1 if source is None or source[0] < 0 else -1
         last = automaton.node(names[-1])
-        through = len(names) > 1 and any(e.section for e in last.edges)
+        goal = next((centre[str(e.target)] for e in last.edges if e.target in centre), None)
+        across = goal is None or goal[0] * way > 0.0
+        through = len(names) > 1 and any(e.section for e in last.edges) and across
         pitch = 2 * half / (len(names) - 1) if through else _PITCH
-        height = way * _ROW * (0.5 + level[way])
-        level[way] += 1
+        low = any(end is not None and end[1] < -_ROW for end in (source, goal))
+        side = -1 if low else way
+        height = side * _ROW * (0.5 + level[side])
+        level[side] += 1
         for j, name in enumerate(names):
             centre[name] = np.array([way * (j * pitch - half), height])
     return centre

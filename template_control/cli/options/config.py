@@ -61,6 +61,9 @@ def prepared(
         TemplateControlError: naming the option or the key that is wrong.
     """
     config = config_from(options, default or RunConfig())
+    before, after = getattr(options, "from_stand", False), getattr(options, "to_stand", False)
+    if before or after:
+        config = config.with_stands(before, after)
     if options.seed is not None and config.scenario is not None:
         raise ParameterError("--seed does not go with a scenario: leave one out")
     ready = config.prepare()

@@ -58,6 +58,18 @@ def add_gait_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_stand_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--from-stand`` and ``--to-stand``."""
+    parser.add_argument(
+        "--from-stand", action="store_true", help="stand for 2 s, and start to walk from there"
+    )
+    parser.add_argument(
+        "--to-stand",
+        action="store_true",
+        help="stop after the steps, and stand for 2 s; steps of start and stop come on top",
+    )
+
+
 def add_running_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--speed`` and ``--apex`` of a run."""
     parser.add_argument(

@@ -12,6 +12,7 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.run.options import Push, SimulationOptions
+from template_control.run.simulation import STEPS
 
 _PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions, IdealOptions)}
 _DEFAULT = SimulationOptions()
@@ -25,8 +26,6 @@ _RANGES = {
     "record_every": (1, 1_000_000),
     "seed": (0, 2**63),
 }
-STEPS = 50
-"""Steps of a run that nobody told when to stop."""
 _LONG = 200  # steps beyond which samples are thinned
 
 

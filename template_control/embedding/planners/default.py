@@ -16,6 +16,8 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
+from template_control.embedding.standing.default import standing_planners
+from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.section import APEX
@@ -43,6 +45,14 @@ def _keeping_up(scenario: Scenario) -> RunningOptions:
 
 
 @checked
+def first_speed(route: Route) -> float:
+    """dx/dt that the gait has with which a route begins, after a stand where it has one [m/s]."""
+    if isinstance(route, ScenarioRoute):
+        return route.scenario.walking_speed
+    return float(route.start[0])
+
+
+@checked
 def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 
@@ -55,7 +65,7 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     Raises:
         GaitError: if there is no gait at the speed the route begins with.
     """
-    p, speed = route.parameters, float(route.start[0])
+    p, speed = route.parameters, first_speed(route)
     slowest, fastest = running_speeds(p)
 
     def runs(speed: float) -> RunningGait:
@@ -63,15 +73,19 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
 
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
-    walk = walking or LqrPlanner(walking_gait(p, speed))
-    options = _CATCHING
     followed = route.followed if isinstance(route, CatchingRoute) else route
-    if isinstance(followed, ScenarioRoute):
-        options = _keeping_up(followed.scenario)
+    scenario = followed.scenario if isinstance(followed, ScenarioRoute) else None
+    standing: Planners = {}
+    if scenario is not None and scenario.stands:
+        relative = scenario.stand_height / p.rest_length * REFERENCE.rest_length
+        standing = standing_planners(p, StandingOptions(height=relative))
+    walk = walking or LqrPlanner(walking_gait(p, speed))
+    options = _CATCHING if scenario is None else _keeping_up(scenario)
     run = RunningPlanner(runs(slowest), options)
     return {
         "w": walk,
         "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
         "r": run,
         "rw": TransitionPlanner("rw", run, partial(walking_gait, p), RUN_TO_WALK),
+        **standing,
     }

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Shape
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
+from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 
 Array = NDArray[np.float64]
@@ -114,6 +115,26 @@ class LandingPlanner(Planner, Protocol):
             decision: what holds so far.
             target: (m,) state wanted at the section where the stride ends.
             free: slots of the stiffnesses that the rest depends on.
+        """
+
+
+@runtime_checkable
+class CurvePlanner(Planner, Protocol):
+    """A planner that leads the CoM along a curve in time where no spring carries it."""
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """The rest of a stride.
+
+        Args:
+            node: of the automaton, where the robot is.
+            start: (2, 3) x and y of the CoM, each position, velocity and acceleration.
+            toes: x of the rear and the front foot [m].
+            decision: what holds so far.
+
+        Returns:
+            What holds from now on, and the stride from here.
         """
 
 

@@ -39,17 +39,30 @@ class UnloadOptions(Checked):
 
 
 @compiled
-def leg_forces(
-    meta_row: Array, com_x: float, com_y: float, rest_length: float, forces: Array
-) -> None:
+def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Array) -> None:
     """The template's leg forces (2, 2) [N], rows rear and front, columns x and y.
 
+    Springs push with k (l0 - l). Where none are, both legs carry m (g + y'') so that the centre of
+    pressure is x - y x'' / (g + y''), or the foot next to it; each force acts along its leg.
+
     Args:
-        meta_row: (7,) toes and stiffnesses of the path's segment.
-        com_x, com_y: the template's CoM in the world [m].
-        rest_length: l0 [m].
+        meta_row: (7,) toes and stiffnesses of the path's segment; NaN for legs without springs.
+        toe: where x of the CoM is taken from [m].
+        com: (6,) x and y of the template's CoM, and their first and second derivatives.
+        body: (3,) m, g, l0 [kg, m/s^2, m].
         forces: overwritten; zero for a leg in the air.
     """
+    com_x, com_y, rest_length = com[0] + toe, com[1], body[2]
+    if np.isnan(meta_row[5]):
+        lift = max(body[1] + com[5], 1e-6)  # legs do not pull
+        rear, front = meta_row[3], meta_row[4]
+        share = (com_x - com_y * com[4] / lift - rear) / (front - rear)
+        share = min(max(share, 0.0), 1.0)
+        for leg in range(2):
+            load = body[0] * lift * (share if leg == 1 else 1.0 - share)
+            forces[leg, 0] = load * (com_x - meta_row[3 + leg]) / com_y
+            forces[leg, 1] = load
+        return
     for leg in range(2):
         k = meta_row[5 + leg]
         dx = com_x - meta_row[3 + leg]

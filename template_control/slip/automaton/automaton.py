@@ -35,6 +35,7 @@ _RUNNING_STANCE_FAILURES = (
     Edge(Event.FALL, Outcome.FALL),
     Edge(Event.BACKWARD, Outcome.BACKWARD),
 )
+_CURVE_FAILURES = (Edge(Event.FALL, Outcome.FALL),)
 _FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
 
 
@@ -271,6 +272,64 @@ def _run_to_walk() -> tuple[Node, ...]:
     )
 
 
+def _standing() -> tuple[Node, ...]:
+    """Standing, and the strides from it, to it and between two walking speeds.
+
+    No springs carry their double stances: the CoM follows a curve in time there. The template's
+    own simulator falls through them.
+    """
+    return (
+        Node(
+            "DS_ar^s",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^s", section=True), *_CURVE_FAILURES),
+        ),
+        Node(
+            "DS_ar^sw",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^sw"), *_CURVE_FAILURES),
+        ),
+        Node(
+            "SS_av^ws",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_br^ws", Reset.PLACE_FRONT, "G_t^ws"),
+                *_AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_br^ws",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^ws", section=True), *_CURVE_FAILURES),
+        ),
+        Node(
+            "SS_av^ww",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_bl^ww", Reset.PLACE_FRONT, "G_t^ww"),
+                *_AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_bl^ww",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^ww"), *_CURVE_FAILURES),
+        ),
+    )
+
+
 AUTOMATON = Automaton(
     nodes=(
         *_walking(),
@@ -278,6 +337,7 @@ AUTOMATON = Automaton(
         *_walk_to_run(),
         *_run_to_walk(),
         *_simplified_walk_to_run(),
+        *_standing(),
     ),
     starts={
         "w": "SS_av^w",
@@ -285,6 +345,10 @@ AUTOMATON = Automaton(
         "wr": "SS_av^wr",
         "rw": "F_aa^rw",
         "wr*": "SS_av^wr*",
+        "s": "DS_ar^s",
+        "sw": "DS_ar^sw",
+        "ws": "SS_av^ws",
+        "ww": "SS_av^ww",
     },
 )
 """The one automaton of the library."""

@@ -14,6 +14,10 @@ from template_control.slip.automaton.vocabulary import MAX_EDGES, Event, Outcome
 __all__ = ["Automaton", "Edge", "Node"]
 
 
+_BEGINS = {Phase.F: Event.APEX, Phase.SS: Event.VLO, Phase.DS: Event.REST}
+"""The section at which a stride begins, by the phase of its first node."""
+
+
 @dataclass(frozen=True)
 class Automaton:
     """Nodes of gaits and of the strides between them.
@@ -73,12 +77,12 @@ class Automaton:
         return tuple(found)
 
     def sections(self, start: str) -> tuple[Event, Event]:
-        """Sections (VLO or APEX) at which a stride from ``start`` begins and ends.
+        """Sections (VLO, APEX or REST) at which a stride from ``start`` begins and ends.
 
         Raises:
             ParameterError: if no section ends it.
         """
-        begin = Event.APEX if self.node(start).phase is Phase.F else Event.VLO
+        begin = _BEGINS[self.node(start).phase]
         ends = [edge.event for node in self.stride(start) for edge in node.edges if edge.section]
         if not ends:
             raise ParameterError(f"no section ends a stride from {start}: mark one of its edges")

@@ -58,6 +58,7 @@ class Event(IntEnum):
     PASSED_FRONT_FOOT    x - c2: the CoM is over the front foot, rear leg still down
     FALL                 -y
     BACKWARD             -dx/dt
+    REST                 -((dx/dt)^2 + (dy/dt)^2): the CoM stands still
     ===================  =====================================================
     """
 
@@ -71,6 +72,7 @@ class Event(IntEnum):
     PASSED_FRONT_FOOT = 7
     FALL = 8
     BACKWARD = 9
+    REST = 10
 
 
 NUM_EVENTS = len(Event)

@@ -24,6 +24,7 @@ _VLO = int(Event.VLO)
 _PASSED_FRONT_FOOT = int(Event.PASSED_FRONT_FOOT)
 _FALL = int(Event.FALL)
 _BACKWARD = int(Event.BACKWARD)
+_REST = int(Event.REST)
 
 
 @inner
@@ -58,6 +59,8 @@ def guard(
         return x - toes[1]
     if event == _FALL:
         return -y
+    if event == _REST:
+        return -(u * u + v * v)
     return -u
 
 
@@ -88,6 +91,7 @@ def all_guards(
     values[_PASSED_FRONT_FOOT] = front
     values[_FALL] = -y
     values[_BACKWARD] = -u
+    values[_REST] = -(u * u + v * v)
 
 
 @inner
@@ -112,4 +116,6 @@ def guard_rate(event: int, path: Array, toes: Array) -> float:
         return u * u + v * v + (x - pivot) * path[4] + y * path[5]
     if event == _BACKWARD:
         return -path[4]
+    if event == _REST:
+        return -2.0 * (u * path[4] + v * path[5])
     return u

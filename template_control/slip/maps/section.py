@@ -22,10 +22,10 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 @dataclass(frozen=True)
 class Section:
-    """Where one stride ends and the next begins; :data:`VLO` and :data:`APEX` are the two.
+    """Where one stride ends and the next begins; :data:`VLO`, :data:`APEX`, :data:`REST`.
 
     A state z at the section is (n,): dx/dt, y, dy/dt [m/s, m, m/s] at VLO (8), where the
-    stance leg is vertical, and dx/dt, y [m/s, m] at apex (4), where dy/dt is 0.
+    stance leg is vertical, and at :data:`REST`; dx/dt, y [m/s, m] at apex (4), where dy/dt is 0.
 
     Attributes:
         event: the guard that fires there.
@@ -42,7 +42,7 @@ class Section:
 
     @property
     def name(self) -> str:
-        """``"VLO"`` or ``"APEX"``."""
+        """``"VLO"``, ``"APEX"`` or ``"REST"``."""
         return self.event.name
 
     def of(self, state: ArrayLike) -> Array:
@@ -143,7 +143,10 @@ VLO = Section(Event.VLO, (2, 1, 3))
 APEX = Section(Event.APEX, (2, 1))
 """Highest point of the flight: where running strides begin and end."""
 
-_SECTIONS = {section.event: section for section in (VLO, APEX)}
+REST = Section(Event.REST, (2, 1, 3))
+"""Both feet on the ground and the CoM at rest, as far as it is: where standing begins and ends."""
+
+_SECTIONS = {section.event: section for section in (VLO, APEX, REST)}
 
 
 def section_of(event: Event) -> Section:

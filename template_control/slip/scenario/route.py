@@ -19,9 +19,10 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.dynamics.stride import finite
 from template_control.slip.gaits.gait import Gait as PeriodicGait
-from template_control.slip.maps.section import APEX, VLO, Section, section_of
+from template_control.slip.maps.section import APEX, REST, VLO, Section, section_of
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.scenario.scenario import Gait, Scenario, Segment
+from template_control.slip.scenario.paces import PaceOptions
+from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segment
 
 Array = NDArray[np.float64]
 
@@ -30,13 +31,21 @@ _STRIDES: dict[tuple[Section, Gait], str] = {
     (VLO, "run"): "wr",
     (APEX, "run"): "r",
     (APEX, "walk"): "rw",
+    (REST, "stand"): "s",
+    (REST, "walk"): "sw",
+    (VLO, "stand"): "ws",
 }
-_TRANSITIONS = ("wr", "rw")
+_CHANGE = "ww"
+_TRANSITIONS = ("wr", "rw", "sw", "ws", _CHANGE)
 _LEADS_TO: dict[str, tuple[Section, Gait]] = {
     "w": (VLO, "walk"),
     "wr": (APEX, "run"),
     "r": (APEX, "run"),
     "rw": (VLO, "walk"),
+    "s": (REST, "stand"),
+    "sw": (VLO, "walk"),
+    "ws": (REST, "stand"),
+    _CHANGE: (VLO, "walk"),
 }
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
 
@@ -177,6 +186,7 @@ class _Progress:
         strides: done in the segment, transitions not counted.
         duration: of the last stride of each kind [s].
         last: kind of the stride under way, and when it began; None at the start.
+        walking: the walk has come to its speed since the last stand.
         took: how long it took, None if the times are to tell [s].
         over: past the last segment.
     """
@@ -187,6 +197,7 @@ class _Progress:
     strides: int = 0
     duration: Mapping[str, float] = field(default_factory=dict)
     last: tuple[str, float] | None = None
+    walking: bool = True
     took: float | None = None
     over: bool = False
 
@@ -197,7 +208,7 @@ class _Progress:
         kind, left = self.last
         took = now - left if self.took is None else self.took
         here = replace(self, duration={**self.duration, kind: took}, last=None, took=None)
-        if kind in _TRANSITIONS:
+        if kind in _TRANSITIONS and not (kind == _CHANGE and self.walking):
             # The transition leads to where the segment's profile begins.
             return replace(here, began=now)
         return replace(here, strides=self.strides + 1)
@@ -236,19 +247,27 @@ class ScenarioRoute:
     Args:
         scenario: the profile.
         apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
+        paces: when a walk changes its speed by a stride of its own.
     """
 
     @checked
     def __init__(
-        self, scenario: Scenario, apex_height: Callable[[float], float] | None = None
+        self,
+        scenario: Scenario,
+        apex_height: Callable[[float], float] | None = None,
+        paces: PaceOptions | None = None,
     ) -> None:
         self.scenario = scenario
+        self.paces = paces or PaceOptions()
         self._apex_height = apex_height or (lambda speed: scenario.apex_height)
         self.parameters = scenario.parameters
-        self.section = VLO
-        self.start = np.array(scenario.start, dtype=float)
+        stands = scenario.segments[0].gait == STAND
+        self.section = REST if stands else VLO
+        start = (0.0, scenario.stand_height, 0.0) if stands else scenario.start
+        self.start = np.array(start, dtype=float)
         p = self.parameters
         self._guess = _FIRST_DURATION * np.sqrt(p.rest_length / p.gravity)
+        self._unit = float(np.sqrt(p.rest_length * p.gravity))
         self.reset()
 
     @property
@@ -258,7 +277,8 @@ class ScenarioRoute:
 
     def reset(self) -> None:
         """Back to the beginning."""
-        self._progress = _Progress(self.scenario.segments[0].speed or 0.0)
+        first = self.scenario.segments[0]
+        self._progress = _Progress(first.speed or 0.0, walking=first.gait != STAND)
 
     def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
         """See :meth:`Route.next`."""
@@ -284,13 +304,35 @@ class ScenarioRoute:
         s = self.scenario
         segment = s.segments[here.index]
         kind = _STRIDES[section, segment.gait]
+        if kind in ("ws", "w"):
+            here, kind = self._reached(here, kind, float(z[0]), now)
         # A transition aims at where the profile begins, the others at where they will end.
-        ahead = 0.0 if kind in _TRANSITIONS else here.duration.get(kind, self._guess)
+        aims = kind not in _TRANSITIONS or (kind == _CHANGE and here.walking)
+        ahead = here.duration.get(kind, self._guess) if aims else 0.0
         speed = here.wanted(segment, now + ahead)
+        if segment.gait == STAND:
+            speed = self.paces.slowed * self._unit if kind == _CHANGE else 0.0
         runs = segment.gait == "run"
         target = (speed, self._apex_height(speed)) if runs else (speed, *s.vlo)
+        if _LEADS_TO[kind][0] is REST:
+            target = (0.0, s.stand_height, 0.0)
         goal = StrideGoal(kind, np.array(target), speed, here.index, self._then(kind, here.index))
         return replace(here, last=(kind, now)), goal
+
+    def _reached(
+        self, here: _Progress, kind: str, speed: float, now: float
+    ) -> tuple[_Progress, str]:
+        """The stride at VLO with ``speed``: one to another speed comes first where it must."""
+        segment = self.scenario.segments[here.index]
+        if segment.gait == STAND:
+            slow = speed <= self.paces.stoppable * self._unit
+            return replace(here, walking=False), kind if slow else _CHANGE
+        if not self.scenario.stands:
+            return here, kind
+        most = self.paces.behind if here.walking else self.paces.alike
+        if abs(speed - here.wanted(segment, now)) <= most * self._unit:
+            return replace(here, walking=True), kind
+        return here, _CHANGE
 
     def _then(self, kind: str, index: int) -> str | None:
         """The next kind of stride after those of ``kind`` in segment ``index``."""
@@ -307,7 +349,8 @@ class ScenarioRoute:
             wanted = here.wanted(segments[here.index], now)
             if here.index + 1 == len(segments):
                 return replace(here, over=True)
-            given = segments[here.index + 1].speed
+            stands = segments[here.index + 1].gait == STAND
+            given = 0.0 if stands else segments[here.index + 1].speed
             here = replace(
                 here,
                 speed=wanted if given is None else given,

@@ -106,13 +106,16 @@ def simulate_scenario(
 ) -> ScenarioRecord:
     """Go through a scenario; a failed stride ends it, is recorded and raises nothing.
 
+    The template cannot stand: stands are left out, and the walk after one begins in its gait.
+
     Args:
         scenario: the profile and the controllers' map.
         progress: called with the simulated time [s] after each stride.
 
     Raises:
-        ScenarioError: if a target of the profile is beyond any stride.
+        ScenarioError: if a target of the profile is beyond any stride, or no segment moves.
     """
+    scenario = _in_motion(scenario)
     p = scenario.parameters
     route, controllers, simulator = (
         ScenarioRoute(scenario),
@@ -151,6 +154,13 @@ def simulate_scenario(
             break
         section = section_of(AUTOMATON.sections(start)[1])
     return _record(scenario, log, failure)
+
+
+def _in_motion(scenario: Scenario) -> Scenario:
+    moving = scenario.in_motion()
+    if moving is None:
+        raise ScenarioError("the template cannot stand: give the scenario a segment that walks")
+    return moving
 
 
 def _padded(states: list[Array]) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from dataclasses import MISSING, dataclass, field, fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,11 +14,18 @@ from template_control.errors import ScenarioError, TemplateControlError
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.parameters import SlipParameters
 
-Gait = Literal["walk", "run"]
+Gait = Literal["walk", "run", "stand"]
 Walking = Literal["modified", "active"]
+
+STAND = "stand"
+"""The gait of a segment in which the robot stands."""
+
+STAND_HEIGHT = 0.97
+"""Height at which a robot stands, over l0."""
 
 MOST_STRIDES = 10_000
 """How many strides a scenario may have."""
+_OF_MOTION = ("speed", "acceleration", "until_speed", "steps")
 _LONGEST = 3600.0  # [s] of a scenario
 _FASTEST = 100.0  # [m/s]
 _HARDEST = 100.0  # [m/s^2]
@@ -28,13 +36,13 @@ class Segment(Checked):
     """A stretch of the profile; it ends with whichever of its ends comes first.
 
     Attributes:
-        gait: "walk" or "run". Where it differs from the segment before, the first stride is
-            the transition.
-        speed: wanted at the segment's start [m/s]; None goes on from the profile.
+        gait: "walk", "run" or "stand". Where it differs from the segment before, the first
+            stride is the transition.
+        speed: wanted at the segment's start [m/s]; None goes on from the profile. A stand has none.
         acceleration: of the wanted speed [m/s^2].
         until_speed: ends when the wanted speed gets there, and the template's own is there
             too if the profile slows down [m/s].
-        duration: [s].
+        duration: [s]; of a stand from when the robot is at rest.
         steps: number of strides after the transition.
 
     Raises:
@@ -53,7 +61,7 @@ class Segment(Checked):
 
 @dataclass(frozen=True)
 class Scenario(Checked):
-    """What the template is to do, from a VLO on; the defaults are Table IV's.
+    """What the template is to do, from a VLO or a stand on; the defaults are Table IV's.
 
     Attributes:
         segments: the profile.
@@ -63,6 +71,7 @@ class Scenario(Checked):
         touchdown_angle: first guess of walking [deg].
         vlo: (2,) y and dy/dt wanted at VLO [m, m/s]. The wanted dx/dt is a segment's speed.
         apex_height: y wanted at apex [m].
+        stand_height: y wanted where the robot stands [m].
         walking: "modified" (38) or "active" (37) walking controller.
         name: for titles and files.
 
@@ -79,6 +88,7 @@ class Scenario(Checked):
     touchdown_angle: float = 70.0
     vlo: tuple[float, float] = (0.98, 0.0)
     apex_height: float = 0.98
+    stand_height: float = STAND_HEIGHT
     walking: Walking = "modified"
     name: str = "scenario"
 
@@ -99,12 +109,37 @@ class Scenario(Checked):
             start=(speed, height * ratio, vertical),
             vlo=(self.vlo[0] * ratio, self.vlo[1]),
             apex_height=self.apex_height * ratio,
+            stand_height=self.stand_height * ratio,
         )
 
     @property
     def gaits(self) -> frozenset[Gait]:
         """The gaits of its segments."""
         return frozenset(segment.gait for segment in self.segments)
+
+    @property
+    def walking_speed(self) -> float:
+        """dx/dt at VLO that the first walk begins with [m/s]; the start's where none says it."""
+        if self.segments[0].gait != STAND:
+            return self.start[0]
+        return next((s.speed for s in self.segments if s.speed is not None), self.start[0])
+
+    @property
+    def stands(self) -> bool:
+        """Whether a segment is a stand."""
+        return STAND in self.gaits
+
+    def in_motion(self) -> Scenario | None:
+        """The scenario without its stands, from a VLO on; None where nothing is left."""
+        if not self.stands:
+            return self
+        moving = tuple(segment for segment in self.segments if segment.gait != STAND)
+        if not moving:
+            return None
+        start = self.start
+        if self.segments[0].gait == STAND:
+            start = (moving[0].speed or start[0], *self.vlo)
+        return replace(self, segments=moving, start=start)
 
 
 def _number(where: str, value: float, low: float, high: float) -> None:
@@ -127,14 +162,31 @@ def _check(scenario: Scenario) -> None:
         _number(f"{name} dy/dt", speed, -_FASTEST, _FASTEST)
     for name, height in (("start height", s.start[1]), ("vlo height", s.vlo[0])):
         _number(name, height, 0.0, length)
+    _number("stand_height", s.stand_height, 0.0, length)
     _number("apex_height", s.apex_height, 0.0, 100.0 * length)
     if not s.segments:
         raise ScenarioError("the scenario has no segments: give at least one [[segment]]")
     for i, segment in enumerate(s.segments, 1):
         _check_segment(f"segment {i}", segment)
-    if s.segments[0].gait != "walk" or s.segments[0].speed is None:
-        raise ScenarioError("segment 1 must walk at a given speed: the start is a VLO")
+    first = s.segments[0]
+    if first.gait != STAND and (first.gait != "walk" or first.speed is None):
+        raise ScenarioError(
+            "segment 1 must stand, or walk at a given speed: the start is a stand or a VLO"
+        )
+    _check_stands(s.segments)
     _check_profile(s.segments)
+
+
+def _check_stands(segments: tuple[Segment, ...]) -> None:
+    """Check that stands are entered from a walk, and left for a walk of a given speed."""
+    for i, (one, other) in enumerate(pairwise(segments), 1):
+        if {one.gait, other.gait} == {STAND, "run"}:
+            raise ScenarioError(
+                f"segments {i} and {i + 1} {one.gait} and {other.gait}: put one between them that"
+                " walks"
+            )
+        if one.gait == STAND and other.gait == "walk" and other.speed is None:
+            raise ScenarioError(f"segment {i + 1} walks after a stand: give it a speed")
 
 
 def _check_profile(segments: tuple[Segment, ...]) -> None:
@@ -144,7 +196,9 @@ def _check_profile(segments: tuple[Segment, ...]) -> None:
     """
     total, speed = 0.0, None
     for i, segment in enumerate(segments, 1):
-        if segment.speed is not None:
+        if segment.gait == STAND:
+            speed = 0.0
+        elif segment.speed is not None:
             speed = segment.speed
         ends = [] if segment.duration is None else [segment.duration]
         until, rate = segment.until_speed, segment.acceleration
@@ -168,6 +222,10 @@ def _check_profile(segments: tuple[Segment, ...]) -> None:
 
 
 def _check_segment(where: str, segment: Segment) -> None:
+    if segment.gait == STAND:
+        moves = [name for name in _OF_MOTION if getattr(segment, name)]
+        if moves:
+            raise ScenarioError(f"{where} stands and has {moves[0]}: give it a duration only")
     _number(f"{where} acceleration", segment.acceleration, -_HARDEST, _HARDEST)
     for name, most in (("speed", _FASTEST), ("until_speed", _FASTEST), ("duration", math.inf)):
         value = getattr(segment, name)

@@ -1,0 +1,85 @@
+"""Tuning of standing, of starting to walk and of stopping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Angle, Count, Interval, NotNegative, Positive, Share
+from template_control.errors import ParameterError
+from template_control.slip.scenario.scenario import STAND_HEIGHT
+from template_control.slip.similarity import LENGTH, SPEED, TIME, tuned
+
+
+@dataclass(frozen=True)
+class StandingOptions(Checked):
+    """How a robot stands, and which curves of the CoM it may follow between its feet.
+
+    Attributes:
+        height: of the CoM over the ground [m].
+        spacing: of the feet where a run begins [m].
+        place: of the CoM between the feet, as a share of their spacing from the rear one.
+        beat: a stand is planned anew, and the route asked, after this time [s].
+        shifts: places, as shares of the spacing, from which a start may set off.
+        durations: shortest and longest quintic [s].
+        trials: number of durations tried between them, and of rest places.
+        slack: the centre of pressure may be this far outside the feet [m]; the QP keeps it
+            inside, and the CoM a little off its curve.
+        margin: a rest place is this far from either foot [m].
+        reach: longest way from a foot on the ground to the CoM, over l0.
+        calm: duration of a quintic that is liked best [s].
+        pace: a second more or less counts as this much excess [m/s].
+        single: shortest and longest way of the CoM in single stance before VLO [s].
+        landing: bounds of the shortest time from VLO to a touchdown [s].
+        swiftness: between them that time lets the foot come to its foothold with this mean speed,
+            over the CoM's at VLO.
+        vault: stiffness of the leg that slowly passes under the CoM, k l0 / (m g).
+        slowest: speed at VLO of the slowest step, over sqrt(g l0).
+        steps: shortest and longest step [m].
+        loads: shares of the load that the front foot may take up at once where it has landed.
+        fall: largest downward acceleration that a curve begins with, over g.
+        closing: the feet should stand this far apart where a walk ends [m].
+        narrow: a metre further apart counts as this much excess.
+        angles: touchdown angles tried, and the flattest [rad].
+        stiffness: least and greatest of the leg before touchdown, over k0.
+        yielding: its stiffnesses tried, over that with which it keeps its length. The CoM sinks
+            over a softer leg, and the foot lands further ahead of it.
+
+    Raises:
+        ParameterError: if the shortest quintic, or the shortest single stance, lasts no time.
+    """
+
+    height: Positive = tuned(STAND_HEIGHT, LENGTH)
+    spacing: Positive = tuned(0.3, LENGTH)
+    place: Share = tuned(0.5)
+    beat: Positive = tuned(0.5, TIME)
+    shifts: tuple[Share, ...] = tuned((0.05, 0.15, 0.25, 0.35, 0.45))
+    durations: Interval = tuned((0.1, 1.2), TIME)
+    calm: Positive = tuned(0.3, TIME)
+    trials: tuple[Count, Count] = tuned((14, 9))
+    slack: NotNegative = tuned(0.005, LENGTH)
+    margin: NotNegative = tuned(0.01, LENGTH)
+    reach: Positive = tuned(1.025)
+    pace: NotNegative = tuned(0.002, SPEED)
+    single: Interval = tuned((0.15, 0.5), TIME)
+    landing: Interval = tuned((0.16, 0.35), TIME)
+    swiftness: Positive = tuned(3.2)
+    vault: Positive = tuned(64.0)
+    slowest: Positive = tuned(0.05)
+    steps: Interval = tuned((0.15, 0.65), LENGTH)
+    loads: tuple[Share, ...] = tuned((0.33, 0.67, 1.0))
+    fall: Share = tuned(0.5)
+    closing: Positive = tuned(0.25, LENGTH)
+    narrow: NotNegative = tuned(0.02)
+    angles: tuple[Count, Angle] = tuned((12, 1.08))
+    stiffness: Interval = tuned((0.5, 4.0))
+    yielding: tuple[Positive, ...] = tuned((1.0, 0.85, 0.7))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("durations", "single"):
+            if getattr(self, name)[0] <= 0.0:
+                raise ParameterError(
+                    f"StandingOptions.{name} begins with {getattr(self, name)[0]:g} s: give a time"
+                    " over 0"
+                )

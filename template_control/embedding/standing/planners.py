@@ -1,0 +1,243 @@
+"""Planners of standing, of starting to walk, of changing a walk's speed and of stopping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.references.timed import Quintic, chained, timed_stride
+from template_control.embedding.standing.curves import BetweenFeet, Found
+from template_control.embedding.standing.options import StandingOptions
+from template_control.embedding.standing.vaults import Touchdown, Vault, Vaults
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
+from template_control.slip.dynamics.stride import Stride, controls
+from template_control.slip.maps.section import PADDED
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+_TRIALS = 6  # of speeds, where a step's angle is chosen
+_STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
+
+
+@dataclass(frozen=True)
+class StandingGait:
+    """To stand still, as a gait: a stride that returns to its state.
+
+    Attributes:
+        parameters: the template.
+        state: (3,) dx/dt, y, dy/dt at rest.
+        controls: (5,) zero: no spring carries.
+        step_duration: of a beat [s].
+        step_length: 0 [m].
+        stride: its kind.
+        name: for tables and records.
+    """
+
+    parameters: SlipParameters
+    state: Array
+    controls: Array
+    step_duration: float
+    step_length: float = 0.0
+    stride: str = "s"
+    name: str = "standing"
+
+    @classmethod
+    def of(cls, parameters: SlipParameters, options: StandingOptions) -> StandingGait:
+        """The stand of a template.
+
+        Args:
+            parameters: the template.
+            options: tuning, for that template.
+        """
+        state = np.array([0.0, options.height, 0.0])
+        return cls(parameters, state, np.zeros(NUM_SLOTS), options.beat)
+
+
+class _Curves:
+    """What the planners here have in common: they learn nothing, and plan curves.
+
+    Args:
+        vaults: passes over a leg.
+        automaton: of the strides.
+    """
+
+    def __init__(self, vaults: Vaults, automaton: Automaton = AUTOMATON) -> None:
+        self.parameters, self.options = vaults.parameters, vaults.options
+        self.vaults, self.automaton = vaults, automaton
+        self.gait = StandingGait.of(self.parameters, self.options)
+        self.offset: Array = np.zeros(PADDED)
+
+    def reset(self) -> None:
+        """See :class:`~.planner.Planner`."""
+
+    def observe(self, decision: Decision, z: Array) -> None:
+        """See :meth:`~.planner.Planner.observe`."""
+
+    def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
+        """The decision for a step (None: there is none) to a state ``end`` (3,)."""
+        angle, before = (_STEEP, self.parameters.leg_stiffness) if step is None else step[:2]
+        u = controls(angle, before, stiffness)
+        return Decision(u, end.copy(), step is not None, True, False)
+
+    def _price(self, step: Touchdown, found: Found) -> float:
+        """Of a step and the curve after it [m]."""
+        return found.cost + self.options.narrow * abs(step.toes[1] - self.options.closing)
+
+    def _between(self, toes: tuple[float, float]) -> BetweenFeet:
+        return BetweenFeet(toes, self.parameters, self.options)
+
+    def _fits(self, found: Found) -> bool:
+        return found.excess <= self.options.slack
+
+    def _away(
+        self, feet: BetweenFeet, start: Array, speeds: list[float], lands: bool
+    ) -> tuple[Found, Vault, Array]:
+        """To a liftoff from which VLO is reached, with the first speed that there is a curve to.
+
+        Args:
+            feet: on the ground.
+            start: (2, 3) x and y, each position, velocity, acceleration.
+            speeds: at VLO [m/s], the best first.
+            lands: see :meth:`BetweenFeet.to_liftoff`.
+
+        Returns:
+            The curve, the VLO, and the (2, 3) state at liftoff.
+        """
+        ways = []
+        for speed in speeds:
+            vault = self.vaults.at(speed)
+            ends = self.vaults.approach(vault, feet.toes[1])
+            found, i = feet.to_liftoff(start, ends, lands)
+            ways.append((found, vault, ends[i]))
+            if self._fits(found):
+                return ways[-1]
+        return min(ways, key=lambda way: way[0].cost)
+
+    def _leaving(
+        self, node: str, feet: BetweenFeet, way: tuple[Found, Vault, Array], u: Array
+    ) -> tuple[Array, Stride]:
+        """Controls and stride of a curve to a liftoff, and on to VLO."""
+        found, vault, liftoff = way
+        changed = u.copy()
+        changed[Slot.K_SD] = vault.stiffness
+        first = timed_stride(self.automaton, node, found.pieces, feet.toes)
+        state = liftoff[:, :2].T.ravel()
+        second = self.vaults.arriving(first.node, state, changed, first.toes)
+        return changed, chained(first, second)
+
+
+class StandPlanner(_Curves):
+    """Stands: the CoM comes to rest between the feet, and stays there."""
+
+    lands = False
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`."""
+        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :class:`~.planner.CurvePlanner`."""
+        found = self._between(toes).to_rest(start, self.lands)
+        pieces = [*found.pieces]
+        left = self.options.beat - sum(piece.duration for piece in pieces)
+        if left > 0.0:
+            still = np.zeros_like(pieces[-1].coefficients)
+            still[:, 0] = pieces[-1].end()[:, 0]
+            pieces.append(Quintic(still, left))
+        stride = timed_stride(self.automaton, node, pieces, toes)
+        return replace(decision, feasible=self._fits(found)), stride
+
+
+class StartPlanner(_Curves):
+    """Starts to walk: back, and forward to where the rear foot lifts off."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`."""
+        wanted = self.gait.state if target is None else target
+        return Decision(controls(_STEEP, 0.0, 0.0), np.array(wanted), True, True, False)
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :class:`~.planner.CurvePlanner`."""
+        feet = self._between(toes)
+        speeds = self.vaults.between(float(decision.predicted[0]), 0.0)
+        way = self._away(feet, start, speeds, False)
+        u, stride = self._leaving(node, feet, way, decision.controls)
+        return replace(decision, controls=u, feasible=self._fits(way[0])), stride
+
+
+class StopPlanner(StandPlanner):
+    """Makes the last step, and comes to rest."""
+
+    lands = True
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`: the step after which the CoM comes to rest best."""
+
+        def cost(step: Touchdown) -> float:
+            found = self._between(step.toes).to_rest(step.state, True)
+            return self._price(step, found)
+
+        steps = self.vaults.touchdowns(z, angles)
+        return self._step(min(steps, key=cost) if steps else None, self.gait.state, 0.0)
+
+
+class ChangePlanner(_Curves):
+    """Makes a step to another speed."""
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`: the step after which the speed can be had best."""
+        present = float(z[0])
+        wanted = present if target is None else float(target[0])
+        steps = self.vaults.touchdowns(z, angles)
+        speeds = self.vaults.between(wanted, present)
+        if not steps:
+            vault = self.vaults.at(speeds[0])
+            return self._step(None, vault.vlo, vault.stiffness)
+        step, vault = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS])
+        return self._step(step, vault.vlo, vault.stiffness)
+
+    def _towards(self, steps: list[Touchdown], speeds: list[float]) -> tuple[Touchdown, Vault]:
+        """The step after which the first of the speeds can be had, and the VLO it leads to."""
+        best = (np.inf, steps[0], self.vaults.at(speeds[0]))
+        for speed in speeds:
+            vault = self.vaults.at(speed)
+            fits = False
+            for step in steps:
+                ends = self.vaults.approach(vault, step.toes[1])
+                found, _ = self._between(step.toes).to_liftoff(step.state, ends, True)
+                fits = fits or self._fits(found)
+                price = self._price(step, found)
+                if price < best[0]:
+                    best = price, step, vault
+            if fits:
+                break
+        return best[1:]
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :class:`~.planner.CurvePlanner`."""
+        feet = self._between(toes)
+        present = float(start[0, 1])
+        speeds = self.vaults.between(float(decision.predicted[0]), present)
+        way = self._away(feet, start, speeds, True)
+        u, stride = self._leaving(node, feet, way, decision.controls)
+        return replace(decision, controls=u, feasible=self._fits(way[0])), stride
