@@ -27,6 +27,10 @@ K0 = P.leg_stiffness
 RUN = controls(np.radians(70.0), 26e3, 30e3)
 STRIDES = {
     "w": ([1.1, 0.978, 0.02], controls(np.radians(66.0), K0, 1.05 * K0)),
+    "wp": (
+        [1.1, 0.978, 0.02],
+        controls(np.radians(66.0), K0, 1.05 * K0, k_push=1.15 * K0),
+    ),
     "r": ([4.8, 0.98], RUN),
     "wr": ([1.101, 0.9797, -0.0442], controls(np.radians(71.94), K0, K0, 9.86e3, 48.51e3)),
     "rw": ([1.754, 0.9766], controls(np.radians(71.53), 66.97e3, 18.35e3)),
@@ -84,7 +88,7 @@ def test_dynamic_similarity(stride, kind, mass, length, gravity):
     other = SlipParameters(mass, gravity, length, K0 * stiffness)
     scale = np.full(len(z), np.sqrt(gravity * length / (P.gravity * P.rest_length)))
     scale[1] = length / P.rest_length
-    u_other = np.array(u) * [1.0, *[stiffness] * 4]
+    u_other = np.array(u) * [1.0, *[stiffness] * (len(u) - 1)]
     here, there = ReturnMap(P, stride, kind), ReturnMap(other, stride, kind)
     expected = here(z, u).state
     out = np.ones(here.dimensions[1])
@@ -211,7 +215,7 @@ def test_no_state_and_no_controls_raise(stride, kind):
     n = step.dimensions[0]
     for _ in range(150):
         z = np.array([rng.normal(1.0, 2.0), rng.uniform(0.5, 1.2), rng.normal()])[:n]
-        stiffness = rng.choice([0.0, K0, 1e5], 4) * rng.uniform(0.3, 2.0, 4)
+        stiffness = rng.choice([0.0, K0, 1e5], 5) * rng.uniform(0.3, 2.0, 5)
         u = controls(rng.uniform(0.3, 1.57), *stiffness)
         mapped, linear = step(z, u), step.linearise(z, u)
         # A closed form may carry the CoM into its own foot, and out at any speed.

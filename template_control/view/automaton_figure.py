@@ -27,6 +27,7 @@ GAIT_NAMES = {
     "wr": "walk-to-run",
     "rw": "run-to-walk",
     "wr*": "walk-to-run, simplified",
+    "wp": "walking with push-off",
 }
 """Gaits by the superscripts of Table I."""
 
