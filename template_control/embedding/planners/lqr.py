@@ -36,6 +36,7 @@ from template_control.embedding.planners.step_search import (
 )
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.parts import ready
+from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WalkingGait, control_units, vlo_jacobians
@@ -196,7 +197,7 @@ class LqrPlanner:
         self.offset: Array = np.zeros(3)
         self._family = WalkingFamily(gait)
         self._scratch = new_scratch()
-        self._pushes = gait.stride == "wp"
+        self._pushes = int(Slot.K_PUSH) in control_units(gait)[0]
         grid, spread = self.options.search, self.options.spread
         points = (*grid.coarse, self.options.push_off.points)[: 4 if self._pushes else 3]
         self._grid = Grid(np.array(points), grid.fine, grid.rounds, *spread, grid.narrowing)
