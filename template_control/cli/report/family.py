@@ -101,17 +101,16 @@ def _print(chains: Chains, paths: list[Path]) -> None:
         if gait.mean_speed < wanted:
             continue
         wanted = _TABLE_STEP * (np.floor(gait.mean_speed / _TABLE_STEP) + 1.0)
-        table.add_row(
+        cells = (
             f"{gait.mean_speed:.3f}",
             f"{1e-3 * gait.parameters.leg_stiffness:.2f}",
             f"{np.degrees(gait.controls[Slot.TOUCHDOWN_ANGLE]):.2f}",
             f"{gait.vlo[1]:.4f}",
             f"{gait.step_length:.3f}",
             f"{gait.step_duration:.3f}",
-            f"{f.passive:.2f}",
-            f"{f.without:.2f}",
-            f"{f.closed:.2f}",
+            *(f"{size:.2f}" for size in (f.passive, f.without, f.closed)),
         )
+        table.add_row(*cells)
     console = plain_console()
     console.print(table)
     for path in paths:

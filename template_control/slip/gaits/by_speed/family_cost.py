@@ -84,6 +84,10 @@ class Figures(NamedTuple):
 def gait_figures(gait: WalkingGait, weights: FamilyCost) -> Figures:
     """Figures and cost of a gait with push-off, on the reference template.
 
+    Args:
+        gait: of the family.
+        weights: of its cost.
+
     Raises:
         GaitError: if no control holds it.
     """
@@ -103,7 +107,15 @@ def gait_figures(gait: WalkingGait, weights: FamilyCost) -> Figures:
         + weights.step * np.log(gait.step_length / suited) ** 2
     )
     without = _controlled(*vlo_jacobians(without_push_off(gait)))[1]
-    return Figures(closed, without, passive, authority, torque, double_stance, float(cost))
+    return Figures(
+        closed=closed,
+        without=without,
+        passive=passive,
+        authority=authority,
+        torque=torque,
+        double_stance=double_stance,
+        cost=float(cost),
+    )
 
 
 def _controlled(a: Array, b: Array) -> tuple[Array, float]:

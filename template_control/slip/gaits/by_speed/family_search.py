@@ -77,7 +77,12 @@ class SearchEffort:
 
 
 class Member(NamedTuple):
-    """A gait of the chain and its figures."""
+    """A gait of the chain and its figures.
+
+    Attributes:
+        gait: on the reference template, in steps with push-off.
+        figures: its stability and cost.
+    """
 
     gait: WalkingGait
     figures: Figures
@@ -200,7 +205,12 @@ def chain_of(members: list[Member]) -> Chain:
 
 
 def family_data(chains: tuple[list[Member], ...], weights: FamilyCost) -> dict[str, Any]:
-    """The family and how it was made, as its file holds it."""
+    """The family and how it was made, as its file holds it.
+
+    Args:
+        chains: the members of each.
+        weights: of the cost that they were made with.
+    """
     return {
         "made by": "template-control gaits --family",
         "units": "l0, sqrt(l0 / g), m g; angles in rad",

@@ -65,7 +65,15 @@ class Chain:
         return nearest_gait(parameters, vlo_speed, self._curve(speed))
 
     def gait_for(self, parameters: SlipParameters, mean_speed: float) -> WalkingGait:
-        """The gait with a mean speed that lies between those of two knots; as :meth:`gait`."""
+        """The gait with a mean speed that lies between those of two knots.
+
+        Args:
+            parameters: the template; its stiffness k0 counts for nothing, the gait has its own.
+            mean_speed: step length over step duration [m/s].
+
+        Raises:
+            GaitError: if there is none near the curve.
+        """
         p, unit = parameters, _unit(parameters)
         wanted = mean_speed / unit
         knot = int(np.clip(np.searchsorted(self.mean_speed, wanted) - 1, 0, len(self.height) - 2))
