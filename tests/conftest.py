@@ -49,7 +49,7 @@ def default_gait():
 @pytest.fixture(scope="session")
 def brisk_gait():
     """1.2 m/s on average, for tests that draw many states and cannot make it for each."""
-    return tc.gait_for_speed(tc.SlipParameters(), 1.2)
+    return tc.gait_for_speed(tc.SlipParameters(), 1.2, touchdown_angle=np.radians(66.0))
 
 
 @pytest.fixture(scope="session")

@@ -206,6 +206,8 @@ def test_transitions_are_chosen_at_their_own_section():
     assert set(choices(AUTOMATON)) == {
         (starts["w"], starts["wr"]),
         (starts["w"], starts["wr*"]),
+        (starts["wp"], starts["wr"]),
+        (starts["wp"], starts["wr*"]),
         (starts["r"], starts["rw"]),
         (starts["w"], starts["ws"]),
         (starts["w"], starts["ww"]),

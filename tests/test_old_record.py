@@ -24,6 +24,7 @@ def old(short_walk, tmp_path):
     }
     swing = short_walk.swing_reference[np.arange(len(short_walk.time)), 1 - short_walk.rear]
     held["swing_reference"] = np.nan_to_num(swing)
+    held["vlo_controls"] = short_walk.section_controls[:, :5]
     metadata = dict(short_walk.metadata, format="template-control run 2")
     metadata["gait_vlo"] = metadata.pop("gait_state")
     for name in ("sections", "strides"):
@@ -55,3 +56,15 @@ def test_an_old_record_with_a_field_missing_is_refused(old, tmp_path):
         np.savez(tmp_path / "less.npz", **{k: data[k] for k in data.files if k != "vlo_time"})
     with pytest.raises(RecordError, match="no recorded run"):
         Record.load(tmp_path / "less.npz")
+
+
+def test_a_record_without_push_off_opens(short_walk, tmp_path):
+    short_walk.save(tmp_path / "new.npz")
+    with np.load(tmp_path / "new.npz") as data:
+        held = {name: data[name] for name in data.files}
+    metadata = json.loads(str(held["metadata"])) | {"format": "template-control run 3"}
+    held["metadata"] = np.array(json.dumps(metadata))
+    held["section_controls"] = held["section_controls"][:, :5]
+    np.savez(tmp_path / "old.npz", **held)
+    record = Record.load(tmp_path / "old.npz")
+    np.testing.assert_array_equal(record.section_controls, short_walk.section_controls)

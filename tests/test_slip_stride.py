@@ -48,16 +48,17 @@ def integrate(state, toes, stiffness, guard):
     return solution.t_events[0][0], solution.y_events[0][0]
 
 
-def walk_by_scipy(state, alpha, k1, k2):
+def walk_by_scipy(state, alpha, k1, k2, push=None):
     """Event times and final state of one walking step, phase by phase."""
     l0 = P.rest_length
+    rear = (k1, k2) if push is None else (push, push)
     times = []
     t, s = integrate(state, [0.0], [k1], lambda s: l0 * np.sin(alpha) - s[1])
     times.append(t)
     toe = s[0] + l0 * np.cos(alpha)
-    t, s = integrate(s, [0.0, toe], [k1, k1], lambda s: (s[0] - toe / 2) * s[2] + s[1] * s[3])
+    t, s = integrate(s, [0.0, toe], [rear[0], k1], lambda s: (s[0] - toe / 2) * s[2] + s[1] * s[3])
     times.append(t)
-    t, s = integrate(s, [0.0, toe], [k2, k2], lambda s: np.hypot(s[0], s[1]) - l0)
+    t, s = integrate(s, [0.0, toe], [rear[1], k2], lambda s: np.hypot(s[0], s[1]) - l0)
     times.append(t)
     t, s = integrate(s, [toe], [k2], lambda s: s[0] - toe)
     times.append(t)
@@ -68,6 +69,16 @@ def walk_by_scipy(state, alpha, k1, k2):
 def test_step_agrees_with_dop853(k2):
     stride = simulate_stride(P, STRIDE_START["w"], START, controls(ALPHA, 16.5e3, k2))
     times, state = walk_by_scipy(START, ALPHA, 16.5e3, k2)
+    assert stride.completed
+    np.testing.assert_allclose([e.time for e in stride.events], times, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(stride.state, state, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("push", [13e3, 19e3])
+def test_step_with_push_off_agrees_with_dop853(push):
+    u = controls(ALPHA, 16.5e3, 17e3, k_push=push)
+    stride = simulate_stride(P, STRIDE_START["wp"], START, u)
+    times, state = walk_by_scipy(START, ALPHA, 16.5e3, 17e3, push)
     assert stride.completed
     np.testing.assert_allclose([e.time for e in stride.events], times, rtol=0, atol=1e-9)
     np.testing.assert_allclose(stride.state, state, rtol=0, atol=1e-9)

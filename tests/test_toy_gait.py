@@ -126,7 +126,7 @@ class Deadbeat:
     """The controls that lead to the target in one hop, by least squares on the exact map."""
 
     def __init__(self, height):
-        u = np.array([0.5 * np.pi, P.leg_stiffness, P.leg_stiffness, 0.0, 0.0])
+        u = np.array([0.5 * np.pi, P.leg_stiffness, P.leg_stiffness, 0.0, 0.0, 0.0])
         z = np.array([0.0, height])
         stride = simulate_stride(P, "F_aa^hop", APEX.state(z), u, automaton=HOPPING)
         self.gait = Hop(z, u, stride.duration)
@@ -141,7 +141,7 @@ class Deadbeat:
         low, high = np.maximum(angles[0], 1.3), np.minimum(angles[1], np.pi - 1.3)
 
         def controls(x):
-            return np.array([x[0], x[1] * P.leg_stiffness, x[2] * P.leg_stiffness, 0.0, 0.0])
+            return np.array([x[0], x[1] * P.leg_stiffness, x[2] * P.leg_stiffness, 0.0, 0.0, 0.0])
 
         def errors(x):
             end, outcome = self._map.step(z, controls(x))

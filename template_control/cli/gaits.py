@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from template_control.cli.report.family import make_family
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.control.controllers import ActiveRunning, ModifiedWalking
 from template_control.slip.control.section_target import VARIED, section_target, targeted
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.branch import QUANTITIES, BranchPoint
+from template_control.slip.gaits.by_speed.family_search import SearchEffort
 from template_control.slip.gaits.controlled_branch import ControlledFamily
 from template_control.slip.gaits.gait_branch import Family
 from template_control.slip.maps.return_map import ReturnMap
@@ -78,6 +80,7 @@ _COLUMNS = {
 _STRIDES = {"walk": "w", "run": "r"}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER)}
 _TABLE_ROWS = 14
+_MOST_ROUNDS = 100
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -92,6 +95,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument("--gait", choices=tuple(_STRIDES), default="walk")
+    parser.add_argument(
+        "--family",
+        action="store_true",
+        help="make the family of walking gaits by speed anew instead: its file, as the library"
+        " ships it, a figure and a table; about a minute",
+    )
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        default=0,
+        help="of descent on the cost of a family's gaits, which its file states",
+    )
     parser.add_argument(
         "--fix",
         action="append",
@@ -129,6 +144,13 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ParameterError: naming the option that is out of its range or does not fit another.
     """
+    if options.family:
+        folder = None if options.no_figures else writable(options.output)
+        if not 0 <= options.rounds <= _MOST_ROUNDS:
+            raise ParameterError(
+                f"--rounds is {options.rounds}: give a number from 0 to {_MOST_ROUNDS}"
+            )
+        return make_family(folder, options.json, SearchEffort(rounds=options.rounds))
     defaults = _DEFAULTS[options.gait]
     given = _quantities("--fix", options.fix)
     limits = (options.limits[0], options.limits[1]) if options.limits else defaults.limits

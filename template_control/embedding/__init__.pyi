@@ -11,6 +11,7 @@ from .phases import PhaseControl as PhaseControl
 from .planners.default import default_planners as default_planners
 from .planners.lqr import LqrOptions as LqrOptions
 from .planners.lqr import LqrPlanner as LqrPlanner
+from .planners.lqr import PushOffOptions as PushOffOptions
 from .planners.modified import ModifiedOptions as ModifiedOptions
 from .planners.modified import ModifiedPlanner as ModifiedPlanner
 from .planners.planner import BreakingPlanner as BreakingPlanner

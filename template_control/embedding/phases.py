@@ -78,8 +78,9 @@ _RUNNING_STANCE = PhaseControl(
     swing=_RUNNING_SWING,
 )
 
-# As in walking, but a stride that is made once has nothing to be trimmed by.
-_LEAVING_THE_GROUND = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,))
+# A stride that is made once has nothing to be trimmed by, and a planner with push-off leaves the
+# trim nothing to do.
+_UNTRIMMED = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,))
 
 # Nobody walks: time passes, and both feet carry.
 _STANDING = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, curved=True)
@@ -107,8 +108,10 @@ PHASES: Phases = {
     Phase.DS: PhaseControl(
         tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,), trims=True
     ),
-    "DS_sc^wr": replace(_LEAVING_THE_GROUND, lands=True),
-    "DS_sd^wr": _LEAVING_THE_GROUND,
+    "DS_sc^wp": _UNTRIMMED,
+    "DS_sd^wp": _UNTRIMMED,
+    "DS_sc^wr": replace(_UNTRIMMED, lands=True),
+    "DS_sd^wr": _UNTRIMMED,
     "SS_sc^wr": replace(_RUNNING_STANCE, lands=True),
     "SS_sd^wr": _RUNNING_STANCE,
     "SS_sc^rw": replace(_RUNNING_STANCE, lands=True),

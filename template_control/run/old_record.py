@@ -1,4 +1,7 @@
-"""Records of an earlier version, which knew one section, VLO, and one stride, the walking step."""
+"""Records of earlier versions.
+
+Format 2 knew one section, VLO, and one stride, the walking step; format 3 knew no push-off.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.scenario.record import padded_controls
 
 RENAMED = {
     "vlo_time": "section_time",
@@ -20,6 +24,18 @@ RENAMED = {
     "vlo_trim": "section_trim",
 }
 """Fields of format 2, as they are called now."""
+
+
+def from_five_slots(fields: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a record as they are now, from those of format 3.
+
+    Args:
+        fields: arrays and the metadata by their names.
+
+    Raises:
+        KeyError: if one of them is missing.
+    """
+    return {**fields, "section_controls": padded_controls(fields["section_controls"])}
 
 
 def from_walk(fields: dict[str, Any]) -> dict[str, Any]:
@@ -46,4 +62,4 @@ def from_walk(fields: dict[str, Any]) -> dict[str, Any]:
     now["metadata"] = metadata
     now["section"] = now["stride"] = np.zeros(count, dtype=np.int64)
     now["section_target"] = np.tile(target, (count, 1))
-    return now
+    return from_five_slots(now)

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from template_control import storage
 from template_control.checks.checked import checked
 from template_control.run.data_frame import to_dataframe
-from template_control.run.old_record import from_walk
+from template_control.run.old_record import from_five_slots, from_walk
 
 Array = NDArray[np.float64]
 
-FORMAT = "template-control run 3"
+FORMAT = "template-control run 4"
+_FIVE_SLOTS = "template-control run 3"  # without push-off
 _WALKS = "template-control run 2"  # which knew VLO and walking steps only
 _LAYOUT = storage.Layout(
     fields={
@@ -48,7 +49,7 @@ _LAYOUT = storage.Layout(
         "stride": "S <strides",
         "section_target": "S 3",
         "section_predicted": "S 3",
-        "section_controls": "S 5",
+        "section_controls": "S 6",
         "section_offset": "S 3",
         "section_nominal": "S",
         "section_feasible": "S",
@@ -98,7 +99,7 @@ class Record:
         stride: (S,) index into ``metadata["strides"]`` of the kind of stride that begins there.
         section_target: (S, 3) state that the stride is to end in.
         section_predicted: (S, 3) state the planner expected it to end in.
-        section_controls: (S, 5) controls of the stride, by Slot.
+        section_controls: (S, NUM_SLOTS) controls of the stride, by Slot.
         section_offset: (S, 3) the planner's offset estimate.
         section_nominal: (S,) False where the planner left its own law.
         section_feasible: (S,) False where the template cannot complete the stride at all.
@@ -213,7 +214,9 @@ class Record:
         Raises:
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
-        return storage.load(cls, path, FORMAT, _LAYOUT, {_WALKS: from_walk})
+        return storage.load(
+            cls, path, FORMAT, _LAYOUT, {_WALKS: from_walk, _FIVE_SLOTS: from_five_slots}
+        )
 
 
 class RunInterrupted(KeyboardInterrupt):

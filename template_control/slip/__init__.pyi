@@ -29,12 +29,16 @@ from .gaits.basin import velocity_angle as velocity_angle
 from .gaits.basin import vlo_state as vlo_state
 from .gaits.branch import BranchPoint as BranchPoint
 from .gaits.branch import Special as Special
+from .gaits.by_speed.speed_family import SpeedFamily as SpeedFamily
+from .gaits.by_speed.speed_family import walking_by_speed as walking_by_speed
 from .gaits.controlled_branch import ControlledFamily as ControlledFamily
 from .gaits.controlled_branch import controlled_fixed_point as controlled_fixed_point
 from .gaits.gait import Gait as Gait
 from .gaits.gait import WalkingGait as WalkingGait
 from .gaits.gait import gait_at as gait_at
 from .gaits.gait import gait_from_energy as gait_from_energy
+from .gaits.gait import with_push_off as with_push_off
+from .gaits.gait import without_push_off as without_push_off
 from .gaits.gait_branch import Family as Family
 from .gaits.mean_speed import gait_for_speed as gait_for_speed
 from .gaits.mean_speed import mean_speed_range as mean_speed_range

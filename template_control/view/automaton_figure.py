@@ -31,6 +31,7 @@ GAIT_NAMES = {
     "sw": "start",
     "ws": "stop",
     "ww": "to another speed",
+    "wp": "walking with push-off",
 }
 """Gaits by the superscripts of Table I, and of standing."""
 

@@ -164,3 +164,30 @@ def deadbeat_figure(
     right.set(xlabel="alpha_min [deg]", ylabel="Pz_in [%]")
     right.legend(loc="lower right")
     return figure
+
+
+@checked
+def speed_family_figure(
+    quantities: Mapping[str, Sequence[Array]], pairs: Mapping[str, Mapping[str, Sequence[Array]]]
+) -> Figure:
+    """Gaits against their mean speed, one line for each chain of a family.
+
+    Args:
+        quantities: by the axis' label, values of each chain; "mean speed [m/s]" is the horizontal
+            axis of all panels.
+        pairs: by the axis' label and the curve's, values that share a panel.
+    """
+    x = quantities["mean speed [m/s]"]
+    panels = {k: {"": v} for k, v in quantities.items() if k != "mean speed [m/s]"} | dict(pairs)
+    columns = -(-len(panels) // 2)
+    figure = Figure(figsize=(2.6 * columns, 4.6), layout="constrained")
+    for axes, (label, curves) in zip(
+        figure.subplots(2, columns).flat, panels.items(), strict=False
+    ):
+        for colour, (name, chains) in zip(_MAPS, curves.items(), strict=False):
+            for i, (speeds, values) in enumerate(zip(x, chains, strict=True)):
+                axes.plot(speeds, values, color=colour, label=name if name and i == 0 else None)
+        axes.set(xlabel="mean speed [m/s]", ylabel=label)
+        if len(curves) > 1:
+            axes.legend(fontsize="small")
+    return figure

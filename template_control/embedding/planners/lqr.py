@@ -36,9 +36,10 @@ from template_control.embedding.planners.step_search import (
 )
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.parts import ready
+from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
-from template_control.slip.gaits.gait import WALKING_SLOTS, WalkingGait, vlo_jacobians
+from template_control.slip.gaits.gait import WalkingGait, control_units, vlo_jacobians
 from template_control.slip.gaits.walking_family import WalkingFamily
 from template_control.slip.similarity import (
     LENGTH,
@@ -78,6 +79,38 @@ class SearchOptions(Checked):
     narrowing: Annotated[float, Range(0.0, 0.5, above=True)] = tuned(0.4)
 
 
+_Four = tuple[float, NotNegative, NotNegative, NotNegative]
+
+
+@dataclass(frozen=True)
+class PushOffOptions(Checked):
+    """Tuning of the fourth control, kappa_p: the rear leg's own stiffness in double stance.
+
+    It counts in steps with push-off, stride "wp". There kappa_p has the bounds of the other
+    stiffnesses.
+
+    Attributes:
+        cost: of the LQR on kappa_p, as a share of k0.
+        points: of kappa_p in the coarse grid of the search.
+        second_steps: what :attr:`LqrOptions.second_steps` are in other steps: alpha relative to
+            the gait's [rad], kappa_1, kappa_2 and kappa_p over k0. A stiff push-off puts energy in.
+    """
+
+    cost: Positive = tuned(2.0)
+    points: Count = tuned(3)
+    second_steps: tuple[_Four, ...] = tuned(
+        (
+            (0.0, 1.5, 1.0, 0.75),
+            (-0.058, 1.0, 0.75, 0.75),
+            (0.025, 1.5, 1.0, 1.0),
+            (-0.058, 1.25, 0.75, 1.0),
+            (-0.03, 0.75, 1.0, 1.0),
+            (0.0, 1.0, 1.25, 1.25),
+            (0.045, 0.75, 0.75, 1.25),
+        )
+    )
+
+
 _VLO_STATE = (SPEED, LENGTH, SPEED)
 
 
@@ -110,6 +143,7 @@ class LqrOptions(Checked):
         second_steps: second steps that the search reckons with beside the law's own: alpha relative
             to the gait's [rad], kappa_1 and kappa_2 over k0. A leg that is stiffer before its
             virtual bottom than after takes energy out, the reverse puts some in.
+        push_off: tuning of the fourth control, in steps that have it.
     """
 
     kind: ClassVar[str] = "lqr"
@@ -140,6 +174,7 @@ class LqrOptions(Checked):
             (0.045, 0.5, 0.75),
         )
     )
+    push_off: PushOffOptions = field(default_factory=PushOffOptions)
 
 
 class LqrPlanner:
@@ -152,7 +187,7 @@ class LqrPlanner:
     Attributes:
         gait: the one of the last target.
         offset: (3,) the estimate of d.
-        a, b: (3, 3) state and control Jacobians of the VLO map at the gait.
+        a, b: (3, 3), (3, c) state and control Jacobians of the VLO map at the gait.
     """
 
     @checked
@@ -162,8 +197,10 @@ class LqrPlanner:
         self.offset: Array = np.zeros(3)
         self._family = WalkingFamily(gait)
         self._scratch = new_scratch()
+        self._pushes = int(Slot.K_PUSH) in control_units(gait)[0]
         grid, spread = self.options.search, self.options.spread
-        self._grid = Grid(grid.coarse, grid.fine, grid.rounds, *spread, grid.narrowing)
+        points = (*grid.coarse, self.options.push_off.points)[: 4 if self._pushes else 3]
+        self._grid = Grid(np.array(points), grid.fine, grid.rounds, *spread, grid.narrowing)
         self._settle_on(gait)
 
     def _settle_on(self, gait: WalkingGait) -> None:
@@ -171,7 +208,8 @@ class LqrPlanner:
         self.gait = gait
         self.a, self.b = vlo_jacobians(gait)
         o = self.options
-        q, r = np.diag(o.state_cost), np.diag(o.control_cost)
+        costs = (*o.control_cost, o.push_off.cost) if self._pushes else o.control_cost
+        q, r = np.diag(o.state_cost), np.diag(costs)
         self._cost = solve_discrete_are(self.a, self.b, q, r)
         self._gain = np.linalg.solve(
             r + self.b.T @ self._cost @ self.b, self.b.T @ self._cost @ self.a
@@ -191,21 +229,25 @@ class LqrPlanner:
         """The linear law about the fixed point the robot has with the present offset."""
         p, o = self.gait.parameters, self.options
         shift = self._settling @ self.offset
-        nominal = self.gait.controls[WALKING_SLOTS] / [1.0, p.leg_stiffness, p.leg_stiffness]
+        slots, units = control_units(self.gait)
+        nominal, others = self.gait.controls[slots] / units, len(slots) - 1
+        steps = o.push_off.second_steps if self._pushes else o.second_steps
+        relative_to = (nominal[0], *[0.0] * others)
         return Law(
             target=self.gait.vlo + shift[:3],
             control=nominal + shift[3:],
             gain=self._gain,
             cost=self._cost,
             offset=self.offset,
-            lower=np.array([nominal[0] + o.angle_range[0], *[o.stiffness_range[0]] * 2]),
-            upper=np.array([nominal[0] + o.angle_range[1], *[o.stiffness_range[1]] * 2]),
-            second_steps=np.add(np.array(o.second_steps).reshape(-1, 3), (nominal[0], 0.0, 0.0)),
+            lower=np.array([nominal[0] + o.angle_range[0], *[o.stiffness_range[0]] * others]),
+            upper=np.array([nominal[0] + o.angle_range[1], *[o.stiffness_range[1]] * others]),
+            slots=np.array(slots),
+            second_steps=np.add(np.array(steps).reshape(-1, len(slots)), relative_to),
             enough=o.trusted_price,
             first_weight=o.search.first_weight,
             top_margin=o.top_margin,
             stiffness=p.leg_stiffness,
-            kernel=stride_kernel(p, "w"),
+            kernel=stride_kernel(p, self.gait.stride),
         )
 
     def decide(
@@ -226,14 +268,15 @@ class LqrPlanner:
             lower[0] = min(max(lower[0], angles[0]), upper[0])
             upper[0] = max(min(upper[0], angles[1]), lower[0])
             law = law._replace(lower=lower, upper=upper)
-        u, first = np.empty(3), np.empty(3)
+        slots, units = control_units(self.gait)
+        u, first = np.empty(len(slots)), np.empty(3)
         linear(law, z, u)
         cost = price(law, True, s, z, u, np.inf, first)
         nominal = cost < self.options.trusted_price
         if not nominal:
             cost = search(law, self._grid, s, z, u, first)
         controls = self.gait.controls.copy()
-        controls[WALKING_SLOTS] = u * [1.0, law.stiffness, law.stiffness]
+        controls[slots] = u * units
         nominal = nominal and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
 
@@ -250,16 +293,17 @@ class LqrPlanner:
 
 
 def _settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:
-    """(6, 3) map from an offset d to the shift (dz, du) of the fixed point.
+    """(3 + c, 3) map from an offset d to the shift (dz, du) of the fixed point.
 
-    Minimises |dz / tolerance|^2 + control_weight |du|^2 subject to (I - A) dz = B du + d. The three
-    controls act in two directions only, so not every offset can be cancelled with dz = 0.
+    Minimises |dz / tolerance|^2 + control_weight |du|^2 subject to (I - A) dz = B du + d. Without
+    push-off the controls act in two directions only, so not every offset can be cancelled with
+    dz = 0.
     """
-    weight = np.concatenate((1.0 / tolerance**2, np.full(3, control_weight)))
-    constraint = np.hstack((np.eye(3) - a, -b))
-    kkt = np.zeros((9, 9))
-    kkt[:6, :6] = np.diag(weight)
-    kkt[6:, :6] = constraint
-    kkt[:6, 6:] = constraint.T
-    solution = np.linalg.solve(kkt, np.vstack((np.zeros((6, 3)), np.eye(3))))
-    return np.asarray(solution[:6], dtype=np.float64)
+    weight = np.concatenate((1.0 / tolerance**2, np.full(b.shape[1], control_weight)))
+    constraint, n = np.hstack((np.eye(3) - a, -b)), len(weight)
+    kkt = np.zeros((n + 3, n + 3))
+    kkt[:n, :n] = np.diag(weight)
+    kkt[n:, :n] = constraint
+    kkt[:n, n:] = constraint.T
+    solution = np.linalg.solve(kkt, np.vstack((np.zeros((n, 3)), np.eye(3))))
+    return np.asarray(solution[:n], dtype=np.float64)

@@ -15,7 +15,7 @@ from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
-from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.gait import WalkingGait, without_push_off
 from template_control.slip.gaits.walking_family import WalkingFamily
 from template_control.slip.maps.section_map import closed_form
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
@@ -49,7 +49,7 @@ class ModifiedPlanner:
     """kappa_1 = k0, kappa_2 by equation (38), alpha by search on a return map.
 
     Args:
-        gait: to reach at the next VLO.
+        gait: to reach at the next VLO, in the paper's steps without push-off.
         options: bounds.
 
     Attributes:
@@ -58,6 +58,7 @@ class ModifiedPlanner:
 
     @checked
     def __init__(self, gait: WalkingGait, options: ModifiedOptions | None = None) -> None:
+        gait = without_push_off(gait)
         self.gait = gait
         self.options = scaled(options or ModifiedOptions(), Scale.of(gait.parameters))
         self.offset: Array = np.zeros(3)

@@ -27,7 +27,7 @@ class Decision(Checked):
     """Controls for the stride that begins at a section.
 
     Attributes:
-        controls: (5,) u by Slot.
+        controls: (NUM_SLOTS,) u by Slot.
         predicted: (3,) dx/dt, y, dy/dt that the stride should end in, offset included.
         feasible: whether the template completes the stride with these controls.
         lasting: whether it also completes the stride after that, as far as the planner looks.
@@ -81,7 +81,7 @@ class Ahead(Protocol):
     """Where the rest of a stride leads."""
 
     def __call__(self, u: Array) -> tuple[Array, Outcome]:
-        """(m,) state at the section where it ends, and how it ends, with (5,) controls ``u``."""
+        """(m,) state at the section where it ends, and how, with (NUM_SLOTS,) controls ``u``."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class Prior:
     """Controls that a stride would have, were there no target.
 
     Attributes:
-        controls: (5,) u by Slot; those that are not free stay.
+        controls: (NUM_SLOTS,) u by Slot; those that are not free stay.
         slots: the f free ones.
         base: (f,) their values.
         change: (f,) changes that count as 1.
@@ -53,7 +53,7 @@ class StrideEnd(Protocol):
     """Where a stride, or the rest of one, ends with given controls."""
 
     def at(self, u: Array) -> tuple[Array, Outcome]:
-        """(m,) state at the section where it ends, and how, with (5,) controls ``u``."""
+        """(m,) state at the section where it ends, and how, with (NUM_SLOTS,) controls ``u``."""
 
     def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
         """As :meth:`at`, with the (m, f) derivatives by the free controls in the middle."""
@@ -126,7 +126,8 @@ def solve_stride(
         tolerance: (m,) errors that count as 1.
 
     Returns:
-        (5,) controls; (m,) where the stride ends, None where none of those tried completes it.
+        (NUM_SLOTS,) controls; (m,) where the stride ends, None where none of those tried completes
+        it.
     """
     u = prior.controls.copy()
     goal, limits = np.array([aim, tolerance]), prior.table

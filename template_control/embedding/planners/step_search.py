@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.section_map import RESULTS, section_map
@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 # Numba would compile once more for a literal int or bool.
 _FAST = np.int64(MapKind.IMPROVED)
 _ON_EXACT, _ON_FAST = np.bool_(True), np.bool_(False)
-_ANGLE, _K_SC, _K_SD = int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
 
@@ -33,14 +32,14 @@ class Grid(NamedTuple):
     """The controls that :func:`search` tries.
 
     Attributes:
-        coarse: numbers of points in alpha, kappa_1, kappa_2 of the first grid, over all bounds.
+        coarse: (c,) numbers of points in each control of the first grid, over all bounds.
         fine: numbers of points in alpha and kappa_2 of the later grids, about the best found.
         rounds: number of later grids.
         width_alpha, width_kappa: half-widths of the first of these [rad, of k0].
         narrowing: half-widths of each grid over those of the one before.
     """
 
-    coarse: tuple[int, int, int]
+    coarse: NDArray[np.int64]
     fine: tuple[int, int]
     rounds: int
     width_alpha: float
@@ -51,14 +50,17 @@ class Grid(NamedTuple):
 class Law(NamedTuple):
     """A bounded linear law u = u_s - K (z - z_s) and what it needs to be judged.
 
+    There are c controls: 3 in the paper's walking step, 4 in one with push-off.
+
     Attributes:
         target: (3,) z_s, dx/dt, y, dy/dt.
-        control: (3,) u_s: alpha [rad], kappa_1/k0, kappa_2/k0.
-        gain: (3, 3) K.
+        control: (c,) u_s: alpha [rad], kappa_1/k0, kappa_2/k0 and, with push-off, kappa_p/k0.
+        gain: (c, 3) K.
         cost: (3, 3) cost-to-go about ``target``.
         offset: (3,) what the robot adds to the template's next VLO state.
-        lower, upper: (3,) bounds of u.
-        second_steps: (n, 3) other controls than u_s - K (z - z_s) for the second step.
+        lower, upper: (c,) bounds of u.
+        slots: (c,) places of u in a stride's controls.
+        second_steps: (n, c) other controls than u_s - K (z - z_s) for the second step.
         enough: a cost below which no other second step is tried.
         first_weight: of the cost-to-go after the first step beside that after the second.
         top_margin: alpha stays this far [rad] below asin(y / l0).
@@ -73,6 +75,7 @@ class Law(NamedTuple):
     offset: Array
     lower: Array
     upper: Array
+    slots: NDArray[np.int64]
     second_steps: Array
     enough: float
     first_weight: float
@@ -84,7 +87,7 @@ class Law(NamedTuple):
 @compiled
 def _copy(source: Array, target: Array) -> None:
     """A slice would take Numba seconds to compile: it prepares what to say of wrong shapes."""
-    for i in range(3):
+    for i in range(source.shape[0]):
         target[i] = source[i]
 
 
@@ -95,9 +98,9 @@ def bounded(law: Law, z: Array, u: Array) -> None:
     Args:
         law: its bounds and its ``top_margin`` count.
         z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0; overwritten.
+        u: (c,) alpha [rad], stiffnesses/k0; overwritten.
     """
-    for i in range(3):
+    for i in range(u.shape[0]):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
     top = np.arcsin(min(z[1] / law.kernel.rest_length, 1.0)) - law.top_margin
     u[0] = min(u[0], top)
@@ -110,9 +113,9 @@ def linear(law: Law, z: Array, u: Array) -> None:
     Args:
         law: u = u_s - K (z - z_s), and the bounds.
         z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        u: (3,) overwritten with alpha [rad], kappa_1/k0, kappa_2/k0.
+        u: (c,) overwritten with alpha [rad], stiffnesses/k0.
     """
-    for i in range(3):
+    for i in range(u.shape[0]):
         u[i] = law.control[i]
         for j in range(3):
             u[i] -= law.gain[i, j] * (z[j] - law.target[j])
@@ -128,15 +131,15 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, z_next: Array) -
         exact: try it on the exact map; else on the improved closed form.
         s: overwritten.
         z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
+        u: (c,) alpha [rad], stiffnesses/k0.
         z_next: (3,) overwritten with the next VLO state.
 
     Returns:
         The Outcome's value; ``z_next`` means nothing where that is not SECTION.
     """
     controls = np.zeros(NUM_SLOTS)
-    controls[_ANGLE] = u[0]
-    controls[_K_SC], controls[_K_SD] = u[1] * law.stiffness, u[2] * law.stiffness
+    for i in range(u.shape[0]):
+        controls[law.slots[i]] = u[i] if i == 0 else u[i] * law.stiffness
     result = np.empty(RESULTS)
     if exact:
         outcome = section_map(law.kernel, None, z, controls, s, result)
@@ -167,11 +170,11 @@ def price(
         exact: see :func:`step`.
         s: overwritten.
         z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        u: (3,) alpha [rad], kappa_1/k0, kappa_2/k0.
+        u: (c,) alpha [rad], stiffnesses/k0.
         limit: a cost known to be too much; the second step is not looked at beyond it.
         first: (3,) overwritten with the state after one step.
     """
-    second, u2 = np.empty(3), np.empty(3)
+    second, u2 = np.empty(3), np.empty(u.shape[0])
     if step(law, exact, s, z, u, first) != 0:
         return 2.0 * FALL_PRICE
     here = _cost_to_go(law, first)
@@ -195,20 +198,19 @@ def price(
 
 @compiled
 def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
-    """Point ``i`` of the grid over all bounds into ``u`` (3,)."""
-    n0, n1, n2 = grid.coarse
-    u[0] = (i // (n1 * n2) + 0.5) / n0
-    u[1] = (i // n2 % n1 + 0.5) / n1
-    u[2] = (i % n2 + 0.5) / n2
-    for j in range(3):
+    """Point ``i`` of the grid over all bounds into ``u`` (c,); the last control varies first."""
+    for j in range(u.shape[0] - 1, -1, -1):
+        count = grid.coarse[j]
+        u[j] = (i % count + 0.5) / count
         u[j] = law.lower[j] + u[j] * (law.upper[j] - law.lower[j])
+        i //= count
 
 
 @compiled
 def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
-    """Point ``i`` of a grid about ``centre`` (3,) into ``u`` (3,).
+    """Point ``i`` of a grid about ``centre`` (c,) into ``u`` (c,).
 
-    A plane of points in alpha and kappa_2, then two in kappa_1.
+    A plane of points in alpha and kappa_2, then two in kappa_1, and two in kappa_p.
     """
     n0, n2 = grid.fine
     _copy(centre, u)
@@ -216,12 +218,13 @@ def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Arr
         u[0] += (i // n2 / (0.5 * (n0 - 1)) - 1.0) * widths[0]
         u[2] += (i % n2 / (0.5 * (n2 - 1)) - 1.0) * widths[1]
     else:
-        u[1] += (2 * (i - n0 * n2) - 1) * widths[1]
+        beside = i - n0 * n2
+        u[1 + beside // 2 * 2] += (2 * (beside % 2) - 1) * widths[1]
 
 
 @compiled
 def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array) -> float:
-    """Improve ``best`` (3,) in place: a coarse grid over all bounds, then finer ones about it.
+    """Improve ``best`` (c,) in place: a coarse grid over all bounds, then finer ones about it.
 
     Far from the gait the good steps (hard braking, say, with a stiff leg before the virtual
     bottom and a soft one after) are not near what the linear law says.
@@ -237,12 +240,15 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
     Returns:
         The price of ``best``.
     """
-    u, end, centre = np.empty(3), np.empty(3), np.empty(3)
+    controls = best.shape[0]
+    u, end, centre = np.empty(controls), np.empty(3), np.empty(controls)
     cheapest = price(law, _ON_FAST, s, z, best, np.inf, first)
-    coarse = grid.coarse[0] * grid.coarse[1] * grid.coarse[2]
+    coarse, fine = 1, grid.fine[0] * grid.fine[1] + 2 * (controls - 2)
+    for j in range(controls):
+        coarse *= grid.coarse[j]
     widths = grid.width_alpha, grid.width_kappa
     for level in range(1 + grid.rounds):
-        count = coarse if level == 0 else grid.fine[0] * grid.fine[1] + 2
+        count = coarse if level == 0 else fine
         for i in range(count):
             if level == 0:
                 _coarse(grid, law, i, u)

@@ -87,6 +87,7 @@ def step_search() -> None:
         offset=np.zeros(3),
         lower=np.ones(3),
         upper=np.ones(3),
+        slots=np.arange(3),
         second_steps=np.ones((1, 3)),
         enough=1.0,
         first_weight=0.3,
@@ -97,7 +98,7 @@ def step_search() -> None:
     scratch, u, first = new_scratch(), np.ones(3), np.empty(3)
     linear(law, _STATE, u)
     price(law, True, scratch, _STATE, u, np.inf, first)
-    search(law, Grid((1, 1, 1), (2, 2), 1, 0.1, 0.1, 0.4), scratch, _STATE, u, first)
+    search(law, Grid(np.ones(3, np.int64), (2, 2), 1, 0.1, 0.1, 0.4), scratch, _STATE, u, first)
 
 
 def references() -> None:

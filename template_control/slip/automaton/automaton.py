@@ -39,49 +39,52 @@ _CURVE_FAILURES = (Edge(Event.FALL, Outcome.FALL),)
 _FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
 
 
-def _walking() -> tuple[Node, ...]:
-    """VLO -> touchdown -> virtual bottom -> rear liftoff -> VLO."""
+def _walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
+    """VLO -> touchdown -> virtual bottom -> rear liftoff -> VLO.
+
+    ``rear`` are the rear leg's stiffnesses in double stance, before and after the bottom.
+    """
     return (
         Node(
-            "SS_av^w",
+            f"SS_av^{gait}",
             Phase.SS,
             Slot.K_SC,
             None,
             (
-                Edge(Event.TOUCHDOWN, "DS_sc^w", Reset.PLACE_FRONT, "G_t^w"),
+                Edge(Event.TOUCHDOWN, f"DS_sc^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
                 *_AWAITING_TOUCHDOWN_FAILURES,
             ),
         ),
         Node(
-            "DS_sc^w",
+            f"DS_sc^{gait}",
             Phase.DS,
-            Slot.K_SC,
+            rear[0],
             Slot.K_SC,
             (
-                Edge(Event.VIRTUAL_BOTTOM, "DS_sd^w", Reset.NONE, "G_b^w"),
+                Edge(Event.VIRTUAL_BOTTOM, f"DS_sd^{gait}", Reset.NONE, f"G_b^{gait}"),
                 # The paper assumes a virtual bottom in every double stance; a short one of a
                 # disturbed walker ends without.
-                Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^w"),
+                Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}"),
                 *_DOUBLE_STANCE_FAILURES,
             ),
         ),
         Node(
-            "DS_sd^w",
+            f"DS_sd^{gait}",
             Phase.DS,
-            Slot.K_SD,
+            rear[1],
             Slot.K_SD,
             (
-                Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^w"),
+                Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}"),
                 *_DOUBLE_STANCE_FAILURES,
             ),
         ),
         Node(
-            "SS_bv^w",
+            f"SS_bv^{gait}",
             Phase.SS,
             Slot.K_SD,
             None,
             (
-                Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^w", section=True),
+                Edge(Event.VLO, f"SS_av^{gait}", Reset.NONE, f"G_v^{gait}", section=True),
                 *_SINGLE_STANCE_FAILURES,
             ),
         ),
@@ -332,12 +335,13 @@ def _standing() -> tuple[Node, ...]:
 
 AUTOMATON = Automaton(
     nodes=(
-        *_walking(),
+        *_walking("w", (Slot.K_SC, Slot.K_SD)),
         *_running(),
         *_walk_to_run(),
         *_run_to_walk(),
         *_simplified_walk_to_run(),
         *_standing(),
+        *_walking("wp", (Slot.K_PUSH, Slot.K_PUSH)),
     ),
     starts={
         "w": "SS_av^w",
@@ -349,9 +353,11 @@ AUTOMATON = Automaton(
         "sw": "DS_ar^sw",
         "ws": "SS_av^ws",
         "ww": "SS_av^ww",
+        "wp": "SS_av^wp",
     },
 )
 """The one automaton of the library."""
 
 STRIDE_START = AUTOMATON.starts
-"""First node of each kind of stride (superscripts of Table I; * the controller's WRT)."""
+"""First node of each kind of stride (superscripts of Table I; * the controller's WRT, wp
+walking with push-off)."""

@@ -28,8 +28,9 @@ class Slot(IntEnum):
     """Places of the control vector u of a stride, in order.
 
     ``TOUCHDOWN_ANGLE`` is alpha [rad] from the ground to the leg. The other slots are leg
-    stiffnesses [N/m]: before and after the stride's (virtual) bottom, and the two of the
-    front leg in a walk-to-run stride.
+    stiffnesses [N/m]: before and after the stride's (virtual) bottom, the two of the
+    front leg in a walk-to-run stride, and that of the rear leg in the double stance of a
+    walking step with push-off.
     """
 
     TOUCHDOWN_ANGLE = 0
@@ -37,6 +38,7 @@ class Slot(IntEnum):
     K_SD = 2
     K_SC_WR = 3
     K_SD_WR = 4
+    K_PUSH = 5
 
 
 NUM_SLOTS = len(Slot)

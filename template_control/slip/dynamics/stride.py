@@ -100,15 +100,21 @@ class Stride:
 
 @checked
 def controls(
-    touchdown_angle: float, k_sc: float, k_sd: float, k_sc_wr: float = 0.0, k_sd_wr: float = 0.0
+    touchdown_angle: float,
+    k_sc: float,
+    k_sd: float,
+    k_sc_wr: float = 0.0,
+    k_sd_wr: float = 0.0,
+    k_push: float = 0.0,
 ) -> Array:
-    """Control vector u (5,) of a stride, by Slot.
+    """Control vector u (NUM_SLOTS,) of a stride, by Slot.
 
     Args:
         touchdown_angle: alpha, from the ground to the leg [rad].
         k_sc: stiffness before the stride's (virtual) bottom [N/m].
         k_sd: stiffness after it [N/m].
         k_sc_wr, k_sd_wr: the same of the front leg in a walk-to-run stride [N/m].
+        k_push: stiffness of the rear leg in double stance, in a walking step with push-off [N/m].
 
     Raises:
         ParameterError: if the angle is not in (0, pi/2) or a stiffness is negative or NaN.
@@ -117,6 +123,7 @@ def controls(
     u[Slot.TOUCHDOWN_ANGLE] = touchdown_angle
     u[Slot.K_SC], u[Slot.K_SD] = k_sc, k_sd
     u[Slot.K_SC_WR], u[Slot.K_SD_WR] = k_sc_wr, k_sd_wr
+    u[Slot.K_PUSH] = k_push
     if not 0.0 < touchdown_angle < np.pi / 2:
         raise ParameterError(
             f"touchdown angle is {touchdown_angle!r} rad: give one between 0 and pi/2"
@@ -184,7 +191,7 @@ class StrideSimulator:
         Args:
             start: first node, usually from ``STRIDE_START``.
             state: (4,) x, y, dx/dt, dy/dt [m, m/s].
-            u: (5,) controls from :func:`controls`.
+            u: (NUM_SLOTS,) controls from :func:`controls`.
             toes: (2,) x of the rear and front toe [m].
 
         Raises:
@@ -250,7 +257,7 @@ def simulate_stride(
         parameters: the template.
         start: first node, usually from ``STRIDE_START``.
         state: (4,) x, y, dx/dt, dy/dt [m, m/s].
-        u: (5,) controls from :func:`controls`.
+        u: (NUM_SLOTS,) controls from :func:`controls`.
         toes: (2,) x of the rear and front toe [m].
         max_time: give up after this time [s]; default 20 sqrt(l0/g).
         automaton: that the stride is of.

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive, Shape, Triple
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
@@ -24,8 +24,11 @@ from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
-WALKING_SLOTS = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
-"""Controls of a walking step: alpha, kappa_1, kappa_2."""
+WALKING_SLOTS = {
+    "w": (Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD),
+    "wp": (Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD, Slot.K_PUSH),
+}
+"""Controls of each kind of walking step: alpha, kappa_1, kappa_2 and, with push-off, kappa_p."""
 
 _SCAN = 120
 _LEVEL, _HEIGHT = 0, 1  # places in what a stride misses
@@ -52,7 +55,7 @@ class Gait(Protocol):
 
     @property
     def controls(self) -> Array:
-        """(5,) touchdown angle [rad] and stiffnesses [N/m] by Slot."""
+        """(NUM_SLOTS,) touchdown angle [rad] and stiffnesses [N/m] by Slot."""
 
     @property
     def step_length(self) -> float:
@@ -71,17 +74,19 @@ class WalkingGait(Checked):
         name: for tables and records.
         parameters: the template.
         vlo: (3,) dx/dt, y, dy/dt at VLO; dy/dt is 0 [m/s, m, m/s].
-        controls: (5,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
+        controls: (NUM_SLOTS,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
         step_length: [m].
         step_duration: [s].
+        stride: kind of its steps, from VLO to VLO: "w" as in the paper, "wp" with push-off.
     """
 
     name: str
     parameters: SlipParameters
     vlo: Triple
-    controls: Annotated[Array, Shape((5,))]
+    controls: Annotated[Array, Shape((NUM_SLOTS,))]
     step_length: float
     step_duration: Positive
+    stride: Literal["w", "wp"] = "w"
 
     def __repr__(self) -> str:
         angle = np.degrees(self.controls[Slot.TOUCHDOWN_ANGLE])
@@ -89,11 +94,6 @@ class WalkingGait(Checked):
             f"<WalkingGait {self.name}: {self.mean_speed:.3f} m/s, touchdown angle {angle:.2f} deg,"
             f" at VLO {self.vlo[0]:.3f} m/s and {self.vlo[1]:.4f} m>"
         )
-
-    @property
-    def stride(self) -> str:
-        """Kind of stride: from VLO to VLO."""
-        return "w"
 
     @property
     def state(self) -> Array:
@@ -111,16 +111,47 @@ class WalkingGait(Checked):
         return float(VLO.energy(self.parameters, self.vlo))
 
 
+def with_push_off(gait: WalkingGait) -> WalkingGait:
+    """The same gait in steps whose rear leg has a stiffness of its own in double stance.
+
+    In a passive gait that is k0, as every other leg's: the motion is the same.
+    """
+    u = gait.controls.copy()
+    u[Slot.K_PUSH] = u[Slot.K_SC]
+    return replace(gait, controls=u, stride="wp")
+
+
+def without_push_off(gait: WalkingGait) -> WalkingGait:
+    """The same gait in the steps of the paper."""
+    u = gait.controls.copy()
+    u[Slot.K_PUSH] = 0.0
+    return replace(gait, controls=u, stride="w")
+
+
+def _kind(gait: Gait) -> str:
+    return gait.stride if gait.stride in WALKING_SLOTS else "w"
+
+
+def control_units(gait: Gait) -> tuple[list[int], Array]:
+    """What a walking step is controlled by; a stride of one's own is taken for the paper's.
+
+    Returns:
+        The slots of its controls, (c,); their units, (c,): 1 rad, and k0 of each stiffness [N/m].
+    """
+    slots = [int(slot) for slot in WALKING_SLOTS[_kind(gait)]]
+    return slots, np.array([1.0, *[gait.parameters.leg_stiffness] * (len(slots) - 1)])
+
+
 def vlo_jacobians(gait: Gait) -> tuple[Array, Array]:
     """Jacobians of the exact VLO map at a gait: A in z and B in the angle and shares of k0.
 
     Returns:
-        A (3, 3); B (3, 3), whose columns are the touchdown angle [1/rad], kappa_1 / k0 and
-        kappa_2 / k0.
+        A (3, 3); B (3, c), whose columns are the touchdown angle [1/rad], kappa_1 / k0,
+        kappa_2 / k0 and, in steps with push-off, kappa_p / k0.
     """
-    linear = ReturnMap(gait.parameters).linearise(gait.state, gait.controls)
-    k0 = gait.parameters.leg_stiffness
-    return linear.state_jacobian, linear.control_jacobian[:, WALKING_SLOTS] * [1.0, k0, k0]
+    linear = ReturnMap(gait.parameters, _kind(gait)).linearise(gait.state, gait.controls)
+    slots, units = control_units(gait)
+    return linear.state_jacobian, linear.control_jacobian[:, slots] * units
 
 
 def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingGait:

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Angle
 from template_control.errors import GaitError
+from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
 from template_control.slip.gaits.gait import WalkingGait, gait_at, root
 from template_control.slip.parameters import SlipParameters
 
-_MEAN_SPEEDS = (0.255, 0.287, 0.351)  # over sqrt(g l0)
-_ANGLES = (69.0, 68.0, 66.0)  # [deg]
 _VLO_SPEEDS = np.linspace(0.2, 0.45, 26)  # over sqrt(g l0): where gaits are looked for
 _XTOL, _RTOL = 1e-10, 8.881784197001252e-16  # of speeds [m/s]; scipy's default
-
-
-def _nominal_angle(mean_speed: float, rest_length: float, gravity: float) -> float:
-    """Touchdown angle [rad] at which a mean speed is walked: steeper when slower.
-
-    66 deg from 1.1 m/s up and 68 deg at 0.9 m/s (for l0 = 1 m), where the steps are long
-    enough in time for a swing leg to follow.
-    """
-    dimensionless = mean_speed / np.sqrt(gravity * rest_length)
-    return float(np.radians(np.interp(dimensionless, _MEAN_SPEEDS, _ANGLES)))
 
 
 @checked
@@ -32,22 +23,20 @@ def mean_speed_range(
 ) -> tuple[float, float] | None:
     """Slowest and fastest mean speed of :func:`gait_for_speed` [m/s], to a centimetre per second.
 
-    They are those of the slowest gait at the steepest angle, and of the fastest at the flattest.
-
     Args:
-        parameters: the template; both legs have its stiffness k0.
-        touchdown_angle: alpha of all gaits [rad]; None: the usual one at each speed.
+        parameters: the template.
+        touchdown_angle: alpha of gaits with the template's stiffness k0 [rad]; None: the range of
+            the family by speed.
 
     Returns:
-        Both speeds, or None if there is no gait at one of these angles.
+        Both speeds, or None if there is no gait at this angle.
     """
-    steep, flat = float(np.radians(_ANGLES[0])), float(np.radians(_ANGLES[-1]))
-    if touchdown_angle is not None:
-        steep = flat = touchdown_angle
+    if touchdown_angle is None:
+        return walking_by_speed().range(parameters)
     unit = np.sqrt(parameters.gravity * parameters.rest_length)
     ends = []
-    for angle, speeds in ((steep, _VLO_SPEEDS), (flat, _VLO_SPEEDS[::-1])):
-        means = (_mean_speed(parameters, angle, unit * s) for s in speeds)
+    for speeds in (_VLO_SPEEDS, _VLO_SPEEDS[::-1]):
+        means = (_mean_speed(parameters, touchdown_angle, unit * s) for s in speeds)
         ends.append(next((mean for mean in means if np.isfinite(mean)), np.nan))
     if not np.isfinite(ends).all():
         return None
@@ -71,11 +60,15 @@ def gait_for_speed(
 ) -> WalkingGait:
     """The symmetric gait with a given mean forward speed.
 
+    Without an angle it is that of the library's family by speed, in steps with push-off: its
+    stiffness varies with the speed, and is that of its own ``parameters``. With an angle both legs
+    keep the template's stiffness k0, and the steps are the paper's.
+
     Args:
-        parameters: the template; both legs have its stiffness k0.
+        parameters: the template.
         mean_speed: step length over step duration [m/s].
         name: of the gait.
-        touchdown_angle: alpha, from the ground to the leg [rad]; None: the usual one at this speed.
+        touchdown_angle: alpha, from the ground to the leg [rad]; None: the family's.
 
     Raises:
         GaitError: naming the range, if there is none, or the speed is not positive.
@@ -83,10 +76,10 @@ def gait_for_speed(
     p = parameters
     if not (np.isfinite(mean_speed) and mean_speed > 0.0):
         raise GaitError(f"speed is {mean_speed!r} m/s: give a positive number")
-    unit = np.sqrt(p.gravity * p.rest_length)
+    if touchdown_angle is None:
+        return replace(walking_by_speed().gait_for(p, mean_speed), name=name)
     angle = touchdown_angle
-    if angle is None:
-        angle = _nominal_angle(mean_speed, p.rest_length, p.gravity)
+    unit = np.sqrt(p.gravity * p.rest_length)
 
     def surplus(vlo_speed: float) -> float:
         return _mean_speed(p, angle, vlo_speed) - mean_speed
@@ -99,13 +92,10 @@ def gait_for_speed(
             speed = root(surplus, (lo, hi), _XTOL, _RTOL)
             if speed is not None:
                 return gait_at(p, angle, speed, name)
-    found = mean_speed_range(p, touchdown_angle)
-    at = "" if touchdown_angle is None else f" and {np.degrees(angle):g} deg at touchdown"
+    found = mean_speed_range(p, angle)
+    at = f" and {np.degrees(angle):g} deg at touchdown"
     if found is not None and not found[0] <= mean_speed <= found[1]:
         hint = f"give one from {found[0]:.2f} to {found[1]:.2f} m/s"
-    elif touchdown_angle is not None:
-        hint = "give another angle, or none"
     else:
-        stiffness = p.leg_stiffness * p.rest_length / (p.mass * p.gravity)
-        hint = f"k0 l0 / (m g) is {stiffness:.3g}, and 21 has gaits at all usual speeds"
+        hint = "give another angle, or none"
     raise GaitError(f"no walking gait at a mean speed of {mean_speed:g} m/s{at}: {hint}")

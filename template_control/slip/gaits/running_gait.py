@@ -36,7 +36,7 @@ class RunningGait:
         name: for tables and records.
         parameters: the template.
         apex: (2,) dx/dt and y at apex [m/s, m].
-        controls: (5,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
+        controls: (NUM_SLOTS,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
         step_length: [m].
         step_duration: from apex to apex [s].
         flight_share: of the duration, without a foot on the ground.

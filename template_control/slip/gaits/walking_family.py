@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import GaitError
+from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
 from template_control.slip.gaits.gait import WalkingGait, gait_at
 from template_control.slip.parameters import SlipParameters
 
@@ -14,6 +17,7 @@ Array = NDArray[np.float64]
 
 _SPEEDS = (0.195, 0.225, 0.29, 0.35, 0.395)  # at VLO, over sqrt(g l0)
 _ANGLES = (70.0, 69.5, 68.0, 66.0, 66.0)  # [deg]
+_PAPER = ("w",)  # strides
 _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 
 
@@ -49,8 +53,22 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
     return gait_at(parameters, float(angle), vlo_speed)
 
 
+def _others(gait: WalkingGait) -> tuple[float, float, Callable[..., WalkingGait]]:
+    """Range of speeds at VLO [m/s], and maker, of the gaits that ``gait`` may give way to.
+
+    The paper's steps keep the stiffness, with push-off they are the family's by speed.
+    """
+    if gait.stride in _PAPER:
+        return *speed_range(gait.parameters), walking_gait
+    chain = walking_by_speed().chain_of(gait)
+    unit = np.sqrt(gait.parameters.gravity * gait.parameters.rest_length)
+    return float(chain.vlo_speed[0] * unit), float(chain.vlo_speed[-1] * unit), chain.gait
+
+
 class WalkingFamily:
     """The gaits that a planner's targets stand for.
+
+    With push-off they are those of the family by speed on the branch of the present gait.
 
     Args:
         gait: the planner's own; its target is its VLO state.
@@ -78,12 +96,13 @@ class WalkingFamily:
         if target is None:
             return present, True
         p = present.parameters
+        low, high, make = _others(present)
         same = _SAME * np.sqrt(p.gravity * p.rest_length)
         wanted = float(target[0])
         for gait in (present, *self._known):
             if abs(gait.vlo[0] - wanted) <= same:
                 return gait, True
-        speed = float(np.clip(wanted, *speed_range(p)))
-        gait = walking_gait(p, speed)
+        speed = float(np.clip(wanted, low, high))
+        gait = make(p, speed)
         self._known.append(gait)
         return gait, abs(speed - wanted) <= same

@@ -69,9 +69,9 @@ class ReturnMap:
 
     Args:
         parameters: the template.
-        stride: key of the automaton's ``starts``: "w" (VLO to VLO), "r" (apex to apex), "wr"
-            (VLO to apex), "rw" (apex to VLO), or "wr*", the walk-to-run stride as its
-            controller simplifies it.
+        stride: key of the automaton's ``starts``: "w" and, with push-off, "wp" (VLO to VLO),
+            "r" (apex to apex), "wr" (VLO to apex), "rw" (apex to VLO), or "wr*", the walk-to-run
+            stride as its controller simplifies it.
         kind: exact, or one of the closed forms.
         automaton: that the stride is of.
 

@@ -1,0 +1,1 @@
+"""Walking gaits that vary continuously with speed, and how they were made."""

@@ -1,0 +1,222 @@
+"""How the family of walking gaits by speed is made: continuation, and descent on a stated cost.
+
+The family is two chains of gaits at equally spaced speeds at VLO, each on one branch: slow gaits
+with a long double stance, and faster ones with a short one. Where the rear leg just reaches its
+rest length within double stance, it lifts off at once or much later: no branch leads across.
+
+A chain begins as a rough line through a few gaits. It is smoothed, and each link is replaced by
+the gait nearest to it, again and again, until it is a smooth line on the surface of symmetric
+gaits. Then, where rounds are asked for, stretches of it are moved, in stiffness or angle, where
+that lowers the sum of the gaits' costs and of the chain's bends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from template_control.errors import GaitError
+from template_control.slip.gaits.by_speed.family_cost import FamilyCost, Figures, gait_figures
+from template_control.slip.gaits.by_speed.nearest import NATURAL, coordinates, nearest_gait
+from template_control.slip.gaits.by_speed.speed_family import Chain
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.similarity import REFERENCE
+
+Array = NDArray[np.float64]
+
+# Where the search begins: dx/dt at VLO [m/s], k [kN/m], alpha [deg] and y at VLO [m] of the
+# reference template, near the cheapest paths through a scan of 16375 gaits.
+_SLOW = (
+    (0.10, 36.5, 77.0, 0.979),
+    (0.16, 35.0, 76.6, 0.9777),
+    (0.22, 34.0, 76.5, 0.9768),
+    (0.28, 36.0, 76.6, 0.9768),
+    (0.345, 40.0, 76.9, 0.978),
+    (0.375, 43.5, 77.1, 0.976),
+)
+_FAST = (
+    (0.30, 41.9, 75.4, 0.9793),
+    (0.32, 40.9, 75.3, 0.9794),
+    (0.38, 38.0, 74.7, 0.9785),
+    (0.42, 36.0, 74.0, 0.9775),
+    (0.46, 34.5, 73.7, 0.9772),
+    (0.61, 28.7, 73.4, 0.9735),
+    (0.72, 23.5, 72.0, 0.970),
+    (0.90, 20.5, 70.7, 0.9687),
+    (1.10, 21.3, 69.1, 0.980),
+    (1.25, 26.5, 69.3, 0.992),
+    (1.44, 42.0, 72.0, 0.9995),
+)
+_STRETCH = 6  # half-width of what is moved at a time, in links
+_TOO_SHORT = 1e3
+_MOVES = np.array([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)])
+
+
+@dataclass(frozen=True)
+class SearchEffort:
+    """How a chain is searched for.
+
+    Attributes:
+        spacing: of a chain's speeds at VLO [m/s].
+        settling: rounds of smoothing, before the descent and after it.
+        rounds: of the descent; each takes a minute or more.
+        moves: how far a gait is moved in the first and in the last round, in natural changes.
+        smoothing: of a round, in squared spacings of the chain.
+    """
+
+    spacing: float = 0.015
+    settling: int = 12
+    rounds: int = 0
+    moves: tuple[float, float] = (0.4, 0.2)
+    smoothing: float = 0.5
+
+
+class Member(NamedTuple):
+    """A gait of the chain and its figures.
+
+    Attributes:
+        gait: on the reference template, in steps with push-off.
+        figures: its stability and cost.
+    """
+
+    gait: WalkingGait
+    figures: Figures
+
+
+def search_family(
+    weights: FamilyCost | None = None,
+    effort: SearchEffort | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[list[Member], ...]:
+    """Make the family of walking gaits by speed.
+
+    Args:
+        weights: of the cost.
+        effort: how to search.
+        progress: told after each round of the descent.
+
+    Returns:
+        The members of each chain on the reference template, from the slowest to the fastest.
+
+    Raises:
+        GaitError: if a chain leaves the surface of gaits.
+    """
+    w, o = weights or FamilyCost(), effort or SearchEffort()
+    return tuple(_search(np.array(rough), w, o, progress) for rough in (_SLOW, _FAST))
+
+
+def _search(
+    rough: Array, w: FamilyCost, o: SearchEffort, progress: Callable[[str], None] | None
+) -> list[Member]:
+    speeds, chain = _rough(rough, o.spacing)
+    for _ in range(o.settling):
+        chain = _smoothed(_on_gaits(speeds, chain), o.smoothing)
+    for number, move in enumerate(np.linspace(*o.moves, o.rounds)):
+        chain = _descended(speeds, _on_gaits(speeds, chain), float(move), w)
+        if progress is not None:
+            progress(f"{len(speeds)} gaits from {speeds[0]:.3g} m/s: round {number + 1} is done")
+    for _ in range(o.settling):
+        chain = _smoothed(_on_gaits(speeds, chain), 0.1 * o.smoothing)
+    gaits = [nearest_gait(REFERENCE, v, x) for v, x in zip(speeds.tolist(), chain, strict=True)]
+    return [Member(gait, gait_figures(gait, w)) for gait in gaits]
+
+
+def _rough(rough: Array, spacing: float) -> tuple[Array, Array]:
+    """Speeds (n,) [m/s] and coordinates (n, 3) of the chain that the search begins with."""
+    p = REFERENCE
+    weight = p.mass * p.gravity / p.rest_length
+    knots = np.column_stack(
+        (np.log(1e3 * rough[:, 1] / weight), np.radians(rough[:, 2]), rough[:, 3] / p.rest_length)
+    )
+    count = 1 + int(np.ceil((rough[-1, 0] - rough[0, 0]) / spacing))
+    speeds = np.linspace(rough[0, 0], rough[-1, 0], count)
+    return speeds, np.asarray(PchipInterpolator(rough[:, 0], knots)(speeds))
+
+
+def _on_gaits(speeds: Array, chain: Array) -> Array:
+    """The chain with each link replaced by the gait nearest to it, where there is one."""
+    found = chain.copy()
+    for i, speed in enumerate(speeds.tolist()):
+        try:
+            found[i] = coordinates(nearest_gait(REFERENCE, speed, chain[i]))
+        except GaitError:
+            continue  # the links beside it pull it back onto the surface
+    return found
+
+
+def _smoothed(chain: Array, amount: float) -> Array:
+    """Whittaker's smoothing: nearest the chain with small second differences."""
+    bends = np.diff(np.eye(len(chain)), 2, axis=0)
+    return np.asarray(np.linalg.solve(np.eye(len(chain)) + amount * bends.T @ bends, chain))
+
+
+def _descended(speeds: Array, chain: Array, move: float, weights: FamilyCost) -> Array:
+    """The chain with stretches moved where that lowers the sum of costs and bends."""
+    costs = np.array([_cost(v, x, weights) for v, x in zip(speeds.tolist(), chain, strict=True)])
+    places = np.arange(len(chain))
+    for centre in places[:: _STRETCH // 2]:
+        bump = np.maximum(1.0 - (places - centre) ** 2 / _STRETCH**2, 0.0) ** 2
+        stretch = np.flatnonzero(bump)
+        for change in move * _MOVES * NATURAL:
+            tried = chain.copy()
+            tried[stretch] += bump[stretch, None] * change
+            tried[stretch] = _on_gaits(speeds[stretch], tried[stretch])
+            new = costs.copy()
+            new[stretch] = [_cost(speeds[i], tried[i], weights) for i in stretch]
+            gain = np.sum(costs - new) + weights.bend * (_bends(chain) - _bends(tried))
+            if gain > 0.0:
+                chain, costs = tried, new
+                break
+    return chain
+
+
+def _cost(speed: float, x: Array, weights: FamilyCost) -> float:
+    """Of the gait nearest ``x``; infinite where there is none or its step is too short."""
+    try:
+        gait = nearest_gait(REFERENCE, speed, x)
+        figures = gait_figures(gait, weights)
+    except GaitError:
+        return np.inf
+    return figures.cost if gait.step_duration >= weights.shortest else _TOO_SHORT
+
+
+def _bends(chain: Array) -> float:
+    """Sum of the squared second differences, in natural changes."""
+    return float(np.sum((np.diff(chain, 2, axis=0) / NATURAL) ** 2))
+
+
+def chain_of(members: list[Member]) -> Chain:
+    """The members of a chain without dimension."""
+    p, gaits = REFERENCE, [member.gait for member in members]
+    unit = float(np.sqrt(p.gravity * p.rest_length))
+    stiffness, angle, height = np.array([coordinates(gait) for gait in gaits]).T
+    return Chain(
+        vlo_speed=np.array([gait.vlo[0] for gait in gaits]) / unit,
+        stiffness=np.exp(stiffness),
+        touchdown_angle=angle,
+        height=height,
+        mean_speed=np.array([gait.mean_speed for gait in gaits]) / unit,
+    )
+
+
+def family_data(chains: tuple[list[Member], ...], weights: FamilyCost) -> dict[str, Any]:
+    """The family and how it was made, as its file holds it.
+
+    Args:
+        chains: the members of each.
+        weights: of the cost that they were made with.
+    """
+    return {
+        "made by": "template-control gaits --family",
+        "units": "l0, sqrt(l0 / g), m g; angles in rad",
+        "cost": asdict(weights),
+        "chains": [
+            {f.name: getattr(chain, f.name).tolist() for f in fields(chain)}
+            for chain in map(chain_of, chains)
+        ],
+    }

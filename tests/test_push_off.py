@@ -1,0 +1,96 @@
+"""The fourth control: the rear leg's own stiffness in double stance."""
+
+import numpy as np
+import pytest
+
+from template_control.embedding.learners.momentum_trim import uncontrolled
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.vocabulary import MapKind, Outcome, Phase, Slot
+from template_control.slip.dynamics.stride import controls
+from template_control.slip.gaits.gait import vlo_jacobians, with_push_off, without_push_off
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.parameters import SlipParameters
+
+P = SlipParameters()
+K0 = P.leg_stiffness
+
+
+@pytest.fixture(scope="module")
+def pushing(gait):
+    return with_push_off(gait)
+
+
+def test_only_the_rear_leg_of_double_stance_has_it():
+    for node in AUTOMATON.stride(STRIDE_START["wp"]):
+        assert (node.rear is Slot.K_PUSH) == (node.phase is Phase.DS)
+        assert node.front is not Slot.K_PUSH
+        twin = AUTOMATON.node(node.name.removesuffix("p"))
+        assert [edge.event for edge in node.edges] == [edge.event for edge in twin.edges]
+
+
+@pytest.mark.parametrize("kind", list(MapKind))
+def test_equal_stiffness_is_the_step_of_the_paper(gait, kind):
+    z = gait.vlo + [0.03, 0.002, -0.04]
+    u = controls(np.radians(66.5), K0, K0, k_push=K0)
+    paper, ours = (ReturnMap(P, stride, kind).step(z, u) for stride in ("w", "wp"))
+    np.testing.assert_array_equal(ours[0], paper[0])
+    assert ours[1] is paper[1] is Outcome.SECTION
+
+
+@pytest.mark.parametrize("push", [0.6, 0.85, 1.2, 1.4])
+def test_the_improved_map_knows_unequal_legs(gait, push):
+    u = controls(np.radians(66.0), K0, K0, k_push=push * K0)
+    exact, improved = (ReturnMap(P, "wp", k) for k in (MapKind.EXACT, MapKind.IMPROVED))
+    np.testing.assert_allclose(improved(gait.vlo, u).state, exact(gait.vlo, u).state, atol=0.03)
+
+
+def test_a_stiff_push_off_speeds_up(gait):
+    step = ReturnMap(P, "wp")
+    soft, stiff = (
+        step(gait.vlo, controls(np.radians(66.0), K0, K0, k_push=share * K0)).state
+        for share in (0.95, 1.05)
+    )
+    energy = [step.sections[0].energy(P, z) for z in (soft, gait.vlo, stiff)]
+    assert energy[0] < energy[1] < energy[2]
+
+
+def test_it_gives_the_controls_the_third_direction(gait, pushing):
+    without, b = vlo_jacobians(gait)[1], vlo_jacobians(pushing)[1]
+    assert np.linalg.svd(without)[1][2] < 1e-9
+    assert np.linalg.svd(b)[1][2] > 0.05
+    # What the paper's controls leave alone, the angle and equal stiffnesses leave alone too.
+    n = uncontrolled(gait)
+    assert n @ b[:, 0] == pytest.approx(0.0, abs=1e-9)
+    assert n @ b[:, 1:].sum(axis=1) == pytest.approx(0.0, abs=1e-9)
+    assert abs(n @ b[:, 3]) > 0.05
+
+
+def test_the_planner_settles_on_the_gait_whatever_the_robot_adds(pushing):
+    planner, step, z = LqrPlanner(pushing), ReturnMap(P, "wp"), pushing.vlo.copy()
+    for _ in range(80):
+        decision = planner.decide(z)
+        z_next = step.step(z, decision.controls)[0] + [0.01, -0.001, 0.02]
+        planner.observe(decision, z_next)
+        z = z_next
+    assert np.all(np.abs(z - pushing.vlo) < [0.001, 0.0005, 0.003])
+
+
+def test_the_planner_completes_steps_far_from_the_gait(pushing):
+    planner, step = LqrPlanner(pushing), ReturnMap(P, "wp")
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        z = pushing.vlo + rng.uniform(-1.0, 1.0, 3) * [0.2, 0.01, 0.2]
+        decision = planner.decide(z)
+        assert decision.feasible
+        k = decision.controls[Slot.K_PUSH]
+        assert 0.5 * K0 - 1e-6 <= k <= 1.5 * K0 + 1e-6
+        np.testing.assert_allclose(step.step(z, decision.controls)[0], decision.predicted)
+
+
+def test_the_paper_s_planner_walks_without_it(pushing):
+    planner = ModifiedPlanner(pushing)
+    assert planner.gait.stride == "w"
+    assert planner.decide(planner.gait.vlo).controls[Slot.K_PUSH] == 0.0
+    np.testing.assert_array_equal(without_push_off(pushing).controls, planner.gait.controls)

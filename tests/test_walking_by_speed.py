@@ -1,0 +1,166 @@
+"""The family of walking gaits by speed: gaits, range, continuity, and how it is made."""
+
+import json
+from functools import partial
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.cli.main import main
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.errors import GaitError
+from template_control.robot.library import ROBOTS
+from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.gaits.by_speed import family_search
+from template_control.slip.gaits.by_speed.family_cost import FamilyCost, gait_figures
+from template_control.slip.gaits.by_speed.family_search import SearchEffort, search_family
+from template_control.slip.gaits.by_speed.nearest import NATURAL, coordinates, nearest_gait
+from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
+from template_control.slip.gaits.gait import vlo_jacobians, without_push_off
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.similarity import REFERENCE
+
+FAMILY = walking_by_speed()
+SPEEDS = np.round(np.arange(0.3, 1.46, 0.05), 2)
+UNIT = np.sqrt(REFERENCE.gravity * REFERENCE.rest_length)
+
+
+@pytest.fixture(scope="module")
+def gaits():
+    return [tc.gait_for_speed(REFERENCE, float(speed)) for speed in SPEEDS]
+
+
+def test_every_gait_has_its_speed_and_returns(gaits):
+    for speed, gait in zip(SPEEDS, gaits, strict=True):
+        assert gait.mean_speed == pytest.approx(speed, abs=1e-8)
+        for stride in ("w", "wp"):
+            end, outcome = ReturnMap(gait.parameters, stride).step(gait.vlo, gait.controls)
+            assert outcome is Outcome.SECTION
+            np.testing.assert_allclose(end, gait.vlo, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_robot_s_template_has_the_same_gaits(name):
+    p = tc.template_for(tc.load_robot(name))
+    low, high = FAMILY.range(p)
+    unit = np.sqrt(p.gravity * p.rest_length)
+    for speed in (low, 0.5 * (low + high), high):
+        gait = tc.gait_for_speed(p, speed)
+        assert gait.mean_speed == pytest.approx(speed, abs=1e-8)
+        twin = FAMILY.chain_of(gait).gait(REFERENCE, gait.vlo[0] * UNIT / unit)
+        np.testing.assert_allclose(coordinates(gait), coordinates(twin), atol=1e-8)
+
+
+def test_the_range_is_told_and_the_rest_refused():
+    low, high = FAMILY.range(REFERENCE)
+    assert low <= 0.25
+    assert high >= 1.45
+    for speed in (low - 0.01, high + 0.01):
+        with pytest.raises(GaitError, match=f"from {low:.2f} to {high:.2f} m/s"):
+            tc.gait_for_speed(REFERENCE, speed)
+
+
+def test_each_chain_is_continuous_in_speed():
+    for chain in FAMILY.chains:
+        assert np.all(np.diff(chain.mean_speed) > 0.0)
+        columns = (np.log(chain.stiffness), chain.touchdown_angle, chain.height)
+        links = np.diff(np.column_stack(columns), axis=0) / NATURAL
+        assert np.max(np.abs(links)) < 0.6
+        assert np.max(np.abs(np.diff(links, axis=0))) < 0.3
+        # A gait between two knots is next to the interpolation: no branch is left on the way.
+        for a, b in zip(chain.vlo_speed[:-1:6], chain.vlo_speed[1::6], strict=False):
+            middle = 0.5 * (a + b)
+            gait = chain.gait(REFERENCE, middle * UNIT)
+            off = (coordinates(gait) - chain._curve(middle)) / NATURAL
+            assert np.max(np.abs(off)) < 0.05
+
+
+def test_the_chains_overlap():
+    slow, fast = FAMILY.chains
+    assert fast.mean_speed[0] < slow.mean_speed[-1]
+    assert slow.mean_speed[0] < FAMILY.limits[1] < fast.mean_speed[-1]
+
+
+def test_push_off_reaches_what_three_controls_do_not(gaits):
+    """Of all gaits the rank is 3 instead of 2, and most settle much faster."""
+    three, four = [], []
+    for gait in gaits:
+        small = np.linalg.svd(vlo_jacobians(without_push_off(gait))[1])[1][2]
+        assert small < 1e-7
+        assert np.linalg.svd(vlo_jacobians(gait)[1])[1][2] > 1e-4
+        figures = gait_figures(gait, FamilyCost())
+        three.append(figures.without)
+        four.append(figures.closed)
+    assert np.all(np.array(four) < np.array(three))
+    assert np.median(four) < 0.7
+    assert np.median(three) > np.median(four) + 0.1
+
+
+def test_the_planner_follows_the_family(gaits):
+    planner = LqrPlanner(gaits[10])
+    decision = planner.decide(gaits[10].vlo, gaits[11].vlo)
+    assert decision.nominal
+    assert planner.gait.vlo[0] == pytest.approx(gaits[11].vlo[0])
+    assert planner.gait.mean_speed == pytest.approx(SPEEDS[11], abs=1e-6)
+    planner.reset()
+    assert planner.gait is gaits[10]
+
+
+def test_the_nearest_gait_is_one_and_near(gaits):
+    gait = gaits[12]
+    guess = coordinates(gait) + 0.1 * NATURAL
+    found = nearest_gait(REFERENCE, float(gait.vlo[0]), guess)
+    assert np.max(np.abs(coordinates(found) - guess) / NATURAL) < 0.25
+    with pytest.raises(GaitError, match="no symmetric gait"):
+        nearest_gait(REFERENCE, 3.0, guess)
+
+
+def test_a_search_makes_a_chain_and_lowers_its_cost(monkeypatch):
+    monkeypatch.setattr(family_search, "_SLOW", family_search._FAST[5:7])
+    monkeypatch.setattr(family_search, "_FAST", family_search._FAST[6:8])
+    told = []
+    effort = SearchEffort(spacing=0.09, settling=1, rounds=0)
+    before = search_family(effort=effort)
+    after = search_family(effort=SearchEffort(0.09, 1, 1), progress=told.append)
+    assert len(told) == 2
+    for first, second in zip(before, after, strict=True):
+        cost = [sum(member.figures.cost for member in chain) for chain in (first, second)]
+        assert cost[1] <= cost[0] + 1e-3
+        np.testing.assert_allclose([m.gait.vlo[2] for m in second], 0.0)
+
+
+def test_the_command_writes_what_the_library_reads(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(family_search, "_SLOW", family_search._FAST[5:7])
+    monkeypatch.setattr(family_search, "_FAST", family_search._FAST[6:8])
+    quick = partial(SearchEffort, spacing=0.09, settling=1)
+    monkeypatch.setattr("template_control.cli.gaits.SearchEffort", quick)
+    assert main(["gaits", "--family", "--output", str(tmp_path)]) == 0
+    assert "largest eigenvalues" in capsys.readouterr().out
+    made = json.loads((tmp_path / "walking.json").read_text())
+    assert (tmp_path / "by_speed.png").exists()
+    place = files("template_control.slip.gaits.by_speed").joinpath("walking.json")
+    shipped = json.loads(place.read_text())
+    assert made.keys() == shipped.keys()
+    assert made["cost"] == shipped["cost"]
+    assert [c.keys() for c in made["chains"]] == [c.keys() for c in shipped["chains"]]
+
+
+@pytest.mark.slow(seconds=25)
+def test_the_library_s_family_is_what_the_search_makes():
+    made = map(family_search.chain_of, search_family())
+    for new, shipped in zip(made, FAMILY.chains, strict=True):
+        for name in ("vlo_speed", "stiffness", "touchdown_angle", "height", "mean_speed"):
+            np.testing.assert_allclose(getattr(new, name), getattr(shipped, name), rtol=1e-7)
+
+
+@pytest.mark.slow(seconds=15)
+@pytest.mark.parametrize(("name", "speed"), [("five-link", 0.35), ("rabbit", 0.75)])
+def test_robots_walk_where_they_could_not(name, speed):
+    robot = tc.load_robot(name)
+    gait = tc.gait_for_speed(tc.template_for(robot), speed)
+    record = tc.simulate(robot, LqrPlanner(gait), tc.SimulationOptions(steps=30, record_every=5))
+    assert (record.steps, record.fell) == (30, False)
+    last = record.section_state[-10:].mean(axis=0) - gait.vlo
+    assert np.all(np.abs(last) < [0.01, 0.003, 0.02])
