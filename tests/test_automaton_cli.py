@@ -208,6 +208,8 @@ def test_transitions_are_chosen_at_their_own_section():
         (starts["w"], starts["wr*"]),
         (starts["wp"], starts["wr"]),
         (starts["wp"], starts["wr*"]),
+        (starts["wp"], starts["ws"]),
+        (starts["wp"], starts["ww"]),
         (starts["r"], starts["rw"]),
         (starts["w"], starts["ws"]),
         (starts["w"], starts["ww"]),

@@ -138,7 +138,7 @@ def test_where_nothing_is_found_it_says_so_and_keeps_to_its_base():
     decision = narrow.decide(WALK.vlo, target)
     assert not decision.feasible
     assert not decision.lasting
-    np.testing.assert_allclose(decision.controls[3:], 4.0 * UNIT)
+    np.testing.assert_allclose(decision.controls[[Slot.K_SC_WR, Slot.K_SD_WR]], 4.0 * UNIT)
     np.testing.assert_allclose(decision.predicted, [*target, 0.0])
 
 

@@ -83,7 +83,7 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     options = _CATCHING if scenario is None else _keeping_up(scenario)
     run = RunningPlanner(runs(slowest), options)
     return {
-        "w": walk,
+        walk.gait.stride: walk,
         "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
         "r": run,
         "rw": TransitionPlanner("rw", run, partial(walking_gait, p), RUN_TO_WALK),

@@ -9,6 +9,10 @@ RUN_ON: Mapping[str, str] = {
     "DS_sc^w": "DS_sc^wr",
     "DS_sd^w": "DS_sd^wr",
     "SS_bv^w": "SS_av^wr",
+    "SS_av^wp": "SS_av^wr",
+    "DS_sc^wp": "DS_sc^wr",
+    "DS_sd^wp": "DS_sd^wr",
+    "SS_bv^wp": "SS_av^wr",
 }
 """By a walking node: where the walk-to-run stride goes on from there.
 

@@ -122,7 +122,9 @@ def with_push_off(gait: WalkingGait) -> WalkingGait:
 
 
 def without_push_off(gait: WalkingGait) -> WalkingGait:
-    """The same gait in the steps of the paper."""
+    """The same gait in the steps of the paper; itself, if it is in these."""
+    if gait.stride != "wp":
+        return gait
     u = gait.controls.copy()
     u[Slot.K_PUSH] = 0.0
     return replace(gait, controls=u, stride="w")

@@ -18,7 +18,8 @@ from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
 
-_WALKS, _BREAKS, _RUNS, _SLOWS = "w", "wr", "r", "rw"
+_WALKS = ("w", "wp")
+_BREAKS, _RUNS, _SLOWS = "wr", "r", "rw"
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class CatchingRoute:
             return on
         self._caught = False
         goal = self.followed.next(section, z, now)
-        self._walk = goal if goal is not None and goal.stride == _WALKS else None
+        self._walk = goal if goal is not None and goal.stride in _WALKS else None
         return goal
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
@@ -103,7 +104,7 @@ class CatchingRoute:
     def instead(self, goal: StrideGoal, speed: float, excess: float) -> StrideGoal | None:
         """See :meth:`BreakingRoute.instead`: a run, for a walk that is fast enough for it."""
         slowest, fastest = running_speeds(self.parameters)
-        walks = goal.stride == _WALKS and excess >= self.options.excess
+        walks = goal.stride in _WALKS and excess >= self.options.excess
         on = self._caught and goal.stride == _BREAKS
         if speed < slowest or not (walks or on):
             return None
@@ -119,7 +120,7 @@ class CatchingRoute:
             return None
         if z[0] > self.options.walkable:
             return self._run(_RUNS, self.options.slow, _SLOWS)
-        return replace(self._walk, stride=_SLOWS, then=_WALKS)
+        return replace(self._walk, stride=_SLOWS, then=self._walk.stride)
 
     def _run(self, stride: str, speed: float, then: str) -> StrideGoal:
         p = self.parameters
