@@ -15,6 +15,7 @@ from template_control.robot.library import load_robot
 from template_control.robustness import campaign as robustness
 from template_control.robustness.campaign import Finding, Level, measure, off_gait, trial
 from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
+from template_control.robustness.wilson import wilson_interval
 from template_control.run.simulation import perturbed_start, simulate
 from template_control.slip.parameters import SlipParameters
 from template_control.view.robustness_figure import robustness_figure
@@ -286,3 +287,19 @@ def test_markdown_says_where_it_breaks(cheap):
     assert rows[2] == ["| step up", "5", "2 cm", *["8 cm or more"] * 2, "3 cm: 2 off its gait |"]
     assert rows[3] == ["| heavier", "5", *["20 %"] * 3, "30 %: 5 fell |"]
     assert rows[4] == ["| lighter", "5", *["90 % or more"] * 3, " |"]
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "expected"),
+    # Newcombe (1998), Table I, method 3.
+    [(81, 263, (0.2553, 0.3662)), (15, 148, (0.0624, 0.1605)), (0, 20, (0.0, 0.1611))],
+)
+def test_wilsons_interval_is_the_published_one(successes, trials, expected):
+    assert wilson_interval(successes, trials) == pytest.approx(expected, abs=5e-5)
+    low, high = wilson_interval(trials - successes, trials)
+    assert (1.0 - high, 1.0 - low) == pytest.approx(expected, abs=5e-5)
+
+
+def test_more_successes_than_trials_are_refused():
+    with pytest.raises(ParameterError, match="successes are 3 of 2 trials"):
+        wilson_interval(3, 2)

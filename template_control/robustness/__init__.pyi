@@ -6,3 +6,4 @@ from .campaign import trial as trial
 from .disturbances import DISTURBANCES as DISTURBANCES
 from .disturbances import Disturbance as Disturbance
 from .disturbances import Situation as Situation
+from .wilson import wilson_interval as wilson_interval

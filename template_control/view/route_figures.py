@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 _WHOLE = slice(None)
 _AROUND = 1.2  # [s] shown on either side of a transition
 _TRANSITIONS = {"wr": "walk to run", "rw": "run to walk"}
+_STANDING = ("s", "sw", "ww", "ws")  # strides that the template cannot do
 
 
 def _footholds(record: Record) -> Array:
@@ -47,8 +48,20 @@ def _stiffnesses(record: Record) -> Array:
     return out
 
 
+def _template_begins(record: Record) -> tuple[float, float]:
+    """When [s] and where [m] the robot comes to the first stride that the template makes, too."""
+    kinds = [record.metadata["strides"][i] for i in record.stride]
+    first = next((i for i, kind in enumerate(kinds) if kind not in _STANDING), 0)
+    if first == 0:
+        return 0.0, 0.0
+    begin = float(record.section_time[first])
+    return begin, float(np.interp(begin, record.time, record.com[:, 0]))
+
+
 def route_figure(record: Record, template: ScenarioRecord) -> Figure:
     """Speed, path of the CoM with footholds, leg stiffnesses and torques, single stance shaded.
+
+    Where the robot stands first, the template begins when the robot has walked off.
 
     Args:
         record: the robot's run.
@@ -56,9 +69,10 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
     """
     figure = Figure(figsize=(9.0, 9.6), layout="constrained")
     speed, path, stiffness, torque = figure.subplots(4, 1)
+    begin, where = _template_begins(record)
     speed.plot(record.time, record.com_velocity[:, 0], color=COM, linewidth=1.0, label="robot")
     speed.plot(
-        template.time, template.state[:, 2], "--", color=TEMPLATE, linewidth=0.8,
+        begin + template.time, template.state[:, 2], "--", color=TEMPLATE, linewidth=0.8,
         label="the template alone",
     )  # fmt: skip
     speed.step(
@@ -68,7 +82,7 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
     speed.set_ylabel("dx/dt [m/s]")
     path.plot(*record.com.T, color=COM, linewidth=1.0, label="robot's CoM")
     path.plot(
-        template.state[:, 0], template.state[:, 1], "--", color=TEMPLATE, linewidth=0.8,
+        where + template.state[:, 0], template.state[:, 1], "--", color=TEMPLATE, linewidth=0.8,
         label="the template alone",
     )  # fmt: skip
     holds = _footholds(record)
@@ -89,6 +103,7 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
     for axes in (speed, stiffness, torque):
         shade(axes, record, _WHOLE)
         _mark_transitions(axes, record)
+        axes.set_xlim(0.0, max(record.time[-1], begin + template.time[-1]))
     path.legend(loc="center right", fontsize=7, ncols=3)
     for axes in (speed, stiffness, torque):
         axes.legend(loc="upper right", fontsize=7, ncols=2)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -18,11 +17,12 @@ from template_control.embedding.planners.transition import (
 )
 from template_control.embedding.standing.default import standing_planners
 from template_control.embedding.standing.options import StandingOptions
+from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.catching import CatchingRoute
-from template_control.slip.scenario.route import Route, ScenarioRoute
+from template_control.slip.scenario.route import Route, ScenarioRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.similarity import REFERENCE
 
@@ -81,11 +81,16 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
         standing = standing_planners(p, StandingOptions(height=relative))
     walk = walking or LqrPlanner(walking_gait(p, speed))
     options = _CATCHING if scenario is None else _keeping_up(scenario)
+
+    def walks(speed: float) -> Gait:
+        # A walk that is kept is walked again after a run, whatever family it is of.
+        return walk.gait if isinstance(followed, SteadyRoute) else walking_gait(p, speed)
+
     run = RunningPlanner(runs(slowest), options)
     return {
         walk.gait.stride: walk,
         "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
         "r": run,
-        "rw": TransitionPlanner("rw", run, partial(walking_gait, p), RUN_TO_WALK),
+        "rw": TransitionPlanner("rw", run, walks, RUN_TO_WALK),
         **standing,
     }
