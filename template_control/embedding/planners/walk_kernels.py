@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from template_control.embedding.planners.gauss_newton import improve
 from template_control.embedding.planners.step_search import Grid, Law, linear, price, search
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.swing_foot import quintic_step
@@ -110,9 +111,14 @@ def references() -> None:
     quintic_step(np.zeros(3), 0.1, 0.0, 1.0, 1e-3)
 
 
+def catch() -> None:
+    """A planner's step towards a stride that a walk breaks into."""
+    improve(np.ones(1), np.ones((1, 1)), np.ones((2, 1)), np.ones(1), np.ones((4, 1)))
+
+
 # The search calls the maps, so it comes after them; the others in order of their length.
-CONTROL = (whole_body, planar_terms, references)
+CONTROL = (whole_body, planar_terms, catch, references)
 """What a tick of the controller calls."""
 
-WALK = (closed_form_map, derivatives, exact_map, whole_body, step_search, planar_terms, references)
+WALK = (closed_form_map, derivatives, exact_map, whole_body, step_search, *CONTROL[1:])
 """What the default planner and the controller call."""

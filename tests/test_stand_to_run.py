@@ -1,0 +1,42 @@
+"""From standing through walking to running, and back to a stand: one file, two engines."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import template_control as tc
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+ENGINES = {"pybullet": tc.PlantOptions(), "mujoco": tc.MujocoOptions()}
+
+
+@pytest.mark.slow(seconds=18)
+@pytest.mark.parametrize(
+    ("example", "name", "engine", "top"),
+    [
+        ("stand_walk_run_stand", "five-link", "pybullet", 3.0),
+        ("zero_five_zero", "runner", "pybullet", 5.0),
+        ("zero_five_zero", "runner", "mujoco", 5.0),
+    ],
+)
+def test_a_robot_stands_runs_and_stands_again(example, name, engine, top):
+    scenario = tc.load_scenario(EXAMPLES / f"{example}.toml")
+    options = tc.SimulationOptions(plant=ENGINES[engine], record_every=5)
+    record = tc.simulate(tc.load_robot(name), scenario, options)
+    m = record.metadata
+    assert (m["fall_reason"], m["arrived"]) == ("", True)
+    kinds = [m["strides"][i] for i in record.stride[:-1]]
+    order = [kind for i, kind in enumerate(kinds) if i == 0 or kind != kinds[i - 1]]
+    assert order == ["s", "sw", "ww", "w", "wr", "r", "rw", "w", "ww", "ws", "s"]
+    speed = record.section_state[:, 0]
+    assert speed.max() == pytest.approx(top, abs=0.05)
+    error = speed[1:] - record.section_target[:-1, 0]
+    assert np.sqrt(np.mean(error**2)) < 0.15
+    assert np.all(np.abs(record.torque) <= m["torque_limit"])
+    assert np.all(np.abs(record.v[:, 3:]) <= 1.01 * np.array(m["velocity_limit"]))
+    assert record.solved.all()
+    still = record.time > record.time[-1] - 2.0
+    assert np.ptp(record.com[still, 0]) < 0.01, "it stands; MuJoCo's feet creep by 2 mm/s"
+    upright = record.time < 1.9
+    assert np.abs(record.com_velocity[upright]).max() < 0.01
