@@ -76,7 +76,8 @@ class Situation:
             return self.gait.step_length * np.arange(steps + 1.0)
         # The last section may round to just after the last sample.
         at = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
-        if np.all(record.contact_force[at].any(axis=(1, 2))):
+        # Before the first tick the ground has not pressed yet.
+        if np.all(record.contact_force[at[1:]].any(axis=(1, 2))):
             return np.asarray(record.foot[at, record.rear[at], 0])
         # No foot stands at an apex: that which bore most in between.
         load = record.contact_force[:, :, 1]
