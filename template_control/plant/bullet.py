@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import RobotError
-from template_control.plant.ground import GroundStep
+from template_control.plant.ground import BOX, GroundStep
 from template_control.plant.quiet import silenced
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 # By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
 _CLOSE = 1e-6  # of the robot's mass
-_BOX = (1000.0, 1.0, 1.0)  # half sides of a step's box [m]
 
 
 def _load(robot: PlanarBiped, client: int) -> int:
@@ -65,12 +64,10 @@ def _ground_bodies(step: GroundStep | None, client: int) -> tuple[int, ...]:
     plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client)
     if step is None:
         return (body(plane, (0.0, 0.0, 0.0)),)
-    side = 1.0 if step.height > 0.0 else -1.0  # of the edge, where the ground is higher
-    box = p.createCollisionShape(p.GEOM_BOX, halfExtents=_BOX, physicsClientId=client)
-    top = max(step.height, 0.0)
+    box = p.createCollisionShape(p.GEOM_BOX, halfExtents=BOX, physicsClientId=client)
     return (
-        body(plane, (0.0, 0.0, min(step.height, 0.0))),
-        body(box, (step.x + side * _BOX[0], 0.0, top - _BOX[2])),
+        body(plane, (0.0, 0.0, step.low)),
+        body(box, step.box_centre),
     )
 
 

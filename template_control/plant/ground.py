@@ -12,6 +12,8 @@ from template_control.slip.gaits.gait import WalkingGait
 
 _HIGHEST = 1.0  # [m]
 _FARTHEST = 1000.0  # [m]
+BOX = (1000.0, 1.0, 1.0)
+"""Half sides of the box that the higher side of a step is [m]."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,17 @@ class GroundStep(Checked):
         if not 0.0 < share < 1.0:
             raise ParameterError(f"share is {share!r}: give a number between 0 and 1")
         return cls(height, (step - 1 + share) * gait.step_length)
+
+    @property
+    def low(self) -> float:
+        """Height of the lower side [m]."""
+        return min(self.height, 0.0)
+
+    @property
+    def box_centre(self) -> tuple[float, float, float]:
+        """Of a :data:`BOX` whose top is the higher side [m]."""
+        side = 1.0 if self.height > 0.0 else -1.0  # of the edge, where the ground is higher
+        return (self.x + side * BOX[0], 0.0, max(self.height, 0.0) - BOX[2])
 
     def height_at(self, x: float) -> float:
         """Height of the ground at ``x`` [m]."""

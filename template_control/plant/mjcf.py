@@ -6,7 +6,6 @@ joints of one body act one after another, as a chain does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -14,10 +13,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from template_control.plant.ground import GroundStep
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ground import BOX
 from template_control.plant.trunk_box import trunk_corners
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.requirements import BASE_DOF
+from template_control.robot.requirements import BASE_DOF, UNLIMITED
 
 Array = NDArray[np.float64]
 
@@ -25,32 +25,11 @@ FOOT = "foot"
 TRUNK = "trunk"
 """What the names of shapes that touch the ground begin with."""
 
-_UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 _MASSLESS = 1e-12  # of the robot's mass
 _CORNER = 1e-3  # radius of the balls at the trunk's corners [m]
-_BOX = (1000.0, 1.0, 1.0)  # half sides of a step's box [m]
 
 
-@dataclass(frozen=True)
-class World:
-    """What MJCF tells beside the robot.
-
-    Attributes:
-        friction: Coulomb coefficient between robot and ground.
-        time_step: [s].
-        mass_scale: factor of every link's mass and inertia.
-        contact_time: time constant with which a contact gives way [s].
-        ground_step: of the ground; None: it is flat.
-    """
-
-    friction: float
-    time_step: float
-    mass_scale: float
-    contact_time: float
-    ground_step: GroundStep | None
-
-
-def mjcf(robot: PlanarBiped, world: World) -> str:
+def mjcf(robot: PlanarBiped, world: PlantOptions, contact_time: float) -> str:
     """The model as MuJoCo reads it.
 
     The joints have the names of Pinocchio's, the feet's spheres are ``foot0`` and ``foot1``, and
@@ -59,7 +38,8 @@ def mjcf(robot: PlanarBiped, world: World) -> str:
 
     Args:
         robot: the model.
-        world: the rest.
+        world: friction, time step, mass error, step of the ground.
+        contact_time: time constant with which a contact gives way [s].
     """
     root = Element("mujoco", model="plant")
     _add(root, "compiler", angle="radian", autolimits="true")
@@ -73,7 +53,7 @@ def mjcf(robot: PlanarBiped, world: World) -> str:
     # A state that is no number any more is the controller's to refuse, not to be put back.
     _add(option, "flag", autoreset="disable")
     ground = _add(root, "worldbody")
-    _add_ground(ground, world)
+    _add_ground(ground, world, contact_time)
     _add_robot(ground, robot, world.mass_scale)
     return ElementTree.tostring(root, encoding="unicode")
 
@@ -86,24 +66,21 @@ def _text(values: ArrayLike) -> str:
     return " ".join(map(repr, np.asarray(values, dtype=float).tolist()))
 
 
-def _add_ground(parent: Element, world: World) -> None:
+def _add_ground(parent: Element, world: PlantOptions, contact_time: float) -> None:
     """A plane at the lower level, and a long box up to the higher one."""
     how = {
         "friction": _text((world.friction, 0.0, 0.0)),
         "priority": "1",  # the ground's friction and give count, not the robot's
         "condim": "3",
-        "solref": _text((world.contact_time, 1.0)),
+        "solref": _text((contact_time, 1.0)),
         "contype": "1",
         "conaffinity": "0",
     }
     step = world.ground_step
-    low = 0.0 if step is None else min(step.height, 0.0)
+    low = 0.0 if step is None else step.low
     _add(parent, "geom", type="plane", size="0 0 1", pos=_text((0.0, 0.0, low)), **how)
     if step is not None:
-        side = 1.0 if step.height > 0.0 else -1.0  # of the edge, where the ground is higher
-        top = max(step.height, 0.0)
-        centre = (step.x + side * _BOX[0], 0.0, top - _BOX[2])
-        _add(parent, "geom", type="box", size=_text(_BOX), pos=_text(centre), **how)
+        _add(parent, "geom", type="box", size=_text(BOX), pos=_text(step.box_centre), **how)
 
 
 def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
@@ -163,7 +140,7 @@ def _add_joint(body: Element, model: pin.Model, joint: int, here: pin.SE3, axis:
         "pos": _text(here.translation),
     }
     low, high = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
-    if joint > BASE_DOF and max(abs(low), abs(high)) < _UNLIMITED:
+    if joint > BASE_DOF and max(abs(low), abs(high)) < UNLIMITED:
         about["range"] = _text((low, high))
     _add(body, "joint", **about)
 

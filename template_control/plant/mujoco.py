@@ -12,7 +12,7 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.mjcf import FOOT, TRUNK, World, mjcf
+from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 
@@ -79,10 +79,9 @@ class MujocoPlant:
     def __init__(self, robot: PlanarBiped, options: MujocoOptions) -> None:
         self.options = options
         self._engine = engine = _mujoco()
-        o = options
-        world = World(o.friction, o.time_step, o.mass_scale, o.contact_time, o.ground_step)
         try:
-            self.model = engine.MjModel.from_xml_string(mjcf(robot, world))
+            text = mjcf(robot, options, options.contact_time)
+            self.model = engine.MjModel.from_xml_string(text)
         except ValueError as error:
             raise RobotError(f"MuJoCo does not take {robot.path} ({error}): change it") from None
         self.data = engine.MjData(self.model)

@@ -12,7 +12,7 @@ from template_control.errors import RobotError
 
 BASE_DOF = 3
 _BASE = ("JointModelPX", "JointModelPZ", "JointModelRY")
-_UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
+UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 _CLOSE = 1e-4  # [m]
 
 
@@ -51,11 +51,11 @@ def check_planar(path: Path, model: pin.Model) -> None:
         )
     limits = np.array(model.effortLimit[BASE_DOF:])
     for name, limit in zip(names[BASE_DOF:], limits, strict=True):
-        if not 0.0 < limit < _UNLIMITED:
+        if not 0.0 < limit < UNLIMITED:
             raise RobotError(f"{path}: joint {name!r} has effort {limit}: give its torque limit")
     speeds = np.array(model.velocityLimit[BASE_DOF:])
     for name, limit in zip(names[BASE_DOF:], speeds, strict=True):
-        if not 0.0 < limit < _UNLIMITED:
+        if not 0.0 < limit < UNLIMITED:
             raise RobotError(
                 f"{path}: joint {name!r} has velocity {limit}: give the speed [rad/s] that it can"
                 " have"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.run.record import Record
+from template_control.run.summary import STANDING
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.view.figure_file import save_figure
 from template_control.view.state_figures import template_energies
@@ -21,7 +22,6 @@ Array = NDArray[np.float64]
 _WHOLE = slice(None)
 _AROUND = 1.2  # [s] shown on either side of a transition
 _TRANSITIONS = {"wr": "walk to run", "rw": "run to walk"}
-_STANDING = ("s", "sw", "ww", "ws")  # strides that the template cannot do
 
 
 def _footholds(record: Record) -> Array:
@@ -51,7 +51,7 @@ def _stiffnesses(record: Record) -> Array:
 def _template_begins(record: Record) -> tuple[float, float]:
     """When [s] and where [m] the robot comes to the first stride that the template makes, too."""
     kinds = [record.metadata["strides"][i] for i in record.stride]
-    first = next((i for i, kind in enumerate(kinds) if kind not in _STANDING), 0)
+    first = next((i for i, kind in enumerate(kinds) if kind not in STANDING), 0)
     if first == 0:
         return 0.0, 0.0
     begin = float(record.section_time[first])
