@@ -24,6 +24,8 @@ from .plant.ideal import IdealOptions as IdealOptions
 from .plant.mujoco import MujocoOptions as MujocoOptions
 from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
+from .robot.free.free_biped import FreeBiped as FreeBiped
+from .robot.library import load_free_robot as load_free_robot
 from .robot.library import load_robot as load_robot
 from .robot.planar_biped import PlanarBiped as PlanarBiped
 from .run.config import RunConfig as RunConfig

@@ -12,7 +12,7 @@ from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.foot_task import FootTask
 from template_control.whole_body.momentum_task import MomentumTask
 from template_control.whole_body.posture_task import PostureTask
-from template_control.whole_body.problem import ROWS_PER_FOOT
+from template_control.whole_body.problem import rows_per_foot
 from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
 from template_control.whole_body.task import DESIRED, TaskStack
 from template_control.whole_body.wanted import Wanted
@@ -24,6 +24,7 @@ TASKS = {
     1: (ComTask((0.01, 3.0)), PostureTask(), FootTask(Leg.FRONT)),
     2: (ComTask((1.0, 3.0)), PostureTask()),
 }
+ROWS_PER_FOOT = rows_per_foot(2)
 STANCES = {0: (), 1: (0,), 2: (0, 1)}
 
 

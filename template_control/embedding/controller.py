@@ -36,7 +36,7 @@ from template_control.embedding.station import stations
 from template_control.embedding.stride_planning import StridePlanning
 from template_control.errors import ParameterError
 from template_control.parts import ready
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Leg
@@ -47,8 +47,6 @@ from template_control.whole_body.solver import Solution, Stance, WholeBodyQp
 from template_control.whole_body.wanted import Wanted
 
 Array = NDArray[np.float64]
-
-_PITCH = 2  # place of the trunk's pitch in q
 
 
 class EmbeddingController:
@@ -78,7 +76,7 @@ class EmbeddingController:
     @checked
     def __init__(
         self,
-        robot: PlanarBiped,
+        robot: Biped,
         planners: Planners | Planner,
         options: EmbeddingOptions | None = None,
         route: Route | None = None,
@@ -180,7 +178,8 @@ class EmbeddingController:
         """Torques for the next ``dt`` seconds.
 
         Args:
-            q, v: (nv,) measured configuration and velocity.
+            q: (nq,) measured configuration.
+            v: (nv,) measured velocity.
             contact: (2,) whether each foot touches the ground.
             dt: control period [s].
 
@@ -347,6 +346,7 @@ class EmbeddingController:
     def _swing(self, q: Array, v: Array, dt: float) -> None:
         """Move the references of the feet in the air towards their footholds."""
         station, planning, wanted = self.station, self.planning, self.wanted
+        hips, wanted.hip_speed = self.robot.hips(q, v)
         for leg in station.swings:
             foot = self.feet.of[leg]
             swing = self.feet.swing[foot]
@@ -362,8 +362,7 @@ class EmbeddingController:
                     foothold = self._sensed.toes[Leg.REAR] + gait.step_length
                     due = gait.step_duration - self.feet.swing_time[foot]
                 swing.advance(foothold, due, dt, self.ground)
-            wanted.furthest[foot] = swing.furthest(q[:2], self.robot.leg_length)
-        wanted.hip_speed = v[0]
+            wanted.furthest[foot] = swing.furthest(hips, self.robot.leg_length)
 
     def _track(self, q: Array, v: Array, dt: float) -> None:
         """Let the phase's tasks write what they ask for."""
@@ -371,8 +370,9 @@ class EmbeddingController:
         wanted.com_now[:] = s.state
         wanted.com_now[0] -= s.toes[0]
         wanted.com_push = self.trim.acceleration if station.control.trims else 0.0
-        wanted.pitch_now[0], wanted.pitch_now[1] = q[_PITCH], v[_PITCH]
-        wanted.pitch = self.lean.advance(q[_PITCH], dt)
+        pitch, turning = self.robot.trunk(q, v)
+        wanted.pitch_now[0], wanted.pitch_now[1] = pitch, turning
+        wanted.pitch = self.lean.advance(pitch, dt)
         wanted.feet = self.feet.of
         station.tasks.write(self.robot, wanted)
         if station.control.weighs and station.com is not None:

@@ -7,8 +7,7 @@ import numpy as np
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Angle, Positive
 from template_control.errors import GaitError
-from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.requirements import BASE_DOF
+from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
@@ -29,7 +28,7 @@ _HEIGHTS = np.linspace(0.9, 1.3, 161)  # over l0, that are tried
 
 
 @checked
-def default_gait(robot: PlanarBiped, touchdown_angle: Angle | None = None) -> WalkingGait:
+def default_gait(robot: Biped, touchdown_angle: Angle | None = None) -> WalkingGait:
     """The robot's walk: its own if it has one, else 66 degrees and 1.1 m/s for l0 = 1 m.
 
     Args:
@@ -56,7 +55,7 @@ def paper_gait(parameters: SlipParameters) -> WalkingGait:
 
 
 @checked
-def template_for(robot: PlanarBiped) -> SlipParameters:
+def template_for(robot: Biped) -> SlipParameters:
     """The reference template scaled to a robot's mass and legs by dynamic similarity.
 
     l0 is such that the leg is stretched as far at the default gait's touchdown as the
@@ -65,9 +64,7 @@ def template_for(robot: PlanarBiped) -> SlipParameters:
     Args:
         robot: its last update is overwritten.
     """
-    q = np.zeros(robot.nv)
-    for leg in robot.legs:
-        q[[BASE_DOF + joint for joint in leg]] = 0.0
+    q = robot.neutral()
     robot.update(q, np.zeros(robot.nv))
     above_hip = float(robot.com[1] - robot.hip_height(q))
     reach = _STRETCH * (robot.leg_length + robot.foot_radius)
@@ -79,7 +76,7 @@ def template_for(robot: PlanarBiped) -> SlipParameters:
     return SlipParameters(robot.mass, robot.gravity, length, relative * weight / length)
 
 
-def knee_torque(robot: PlanarBiped, gait: RunningGait) -> float:
+def knee_torque(robot: Biped, gait: RunningGait) -> float:
     """Torque that a knee needs at the bottom of a stance, estimated [N m].
 
     A share of the template's leg force times the distance of a knee from the line between hip and
@@ -106,9 +103,7 @@ def _shortest_leg(gait: RunningGait) -> float:
 
 
 @checked
-def check_apex(
-    robot: PlanarBiped, speed: float, height: Positive, torque_scale: Positive = 1.0
-) -> None:
+def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Positive = 1.0) -> None:
     """Check that a robot can run with an apex of a given height.
 
     Args:
@@ -131,7 +126,7 @@ def check_apex(
     raise GaitError(f"{what}: give a height from {min(good):.3g} to {max(good):.3g} m")
 
 
-def _bears(robot: PlanarBiped, speed: float, height: float, torque_scale: float) -> bool:
+def _bears(robot: Biped, speed: float, height: float, torque_scale: float) -> bool:
     """Whether there is such a gait, and its stance does not ask too much of a knee."""
     p = template_for(robot)
     try:

@@ -17,7 +17,7 @@ from template_control.checks.ranges import Positive
 from template_control.errors import RobotError
 from template_control.plant.ground import BOX, GroundStep
 from template_control.plant.quiet import silenced
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.robot.requirements import BASE_DOF
 from template_control.robot.urdf import link_masses
 
@@ -29,10 +29,16 @@ Array = NDArray[np.float64]
 # By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
 _CLOSE = 1e-6  # of the robot's mass
+_AXES = {2: (0, 2), 3: (0, 1, 2)}  # of a force's components, by how many there are
 
 
-def _load(robot: PlanarBiped, client: int) -> int:
+def load_body(robot: Biped, client: int, held: bool = True) -> int:
     """Body of a robot's URDF; PyBullet only reads files.
+
+    Args:
+        robot: whose URDF.
+        client: PyBullet's handle of the world.
+        held: whether the root link is fixed to the world.
 
     Raises:
         RobotError: if PyBullet does not read it.
@@ -46,7 +52,7 @@ def _load(robot: PlanarBiped, client: int) -> int:
         path.write_bytes(ElementTree.tostring(tree, encoding="utf-8"))
         try:
             body = pybullet.loadURDF(
-                str(path), useFixedBase=True, flags=_FLAGS, physicsClientId=client
+                str(path), useFixedBase=held, flags=_FLAGS, physicsClientId=client
             )
         except pybullet.error as error:
             raise RobotError(f"PyBullet does not read {robot.path} ({error}): change it") from None
@@ -114,7 +120,7 @@ class BulletPlant:
     """
 
     @checked
-    def __init__(self, robot: PlanarBiped, options: PlantOptions) -> None:
+    def __init__(self, robot: Biped, options: PlantOptions) -> None:
         self.robot = robot
         self.options = options
         self.client = pybullet.connect(pybullet.DIRECT)
@@ -123,7 +129,7 @@ class BulletPlant:
         p.setTimeStep(options.time_step, physicsClientId=c)
         self._ground = _ground_bodies(options.ground_step, c)
         try:
-            self.body = _load(robot, c)
+            self.body = self._load()
             info = self._info()
             self._compare_masses(info)
         except RobotError:
@@ -132,13 +138,19 @@ class BulletPlant:
         by_name = {row[1].decode(): row[0] for row in info}
         by_link = {row[12].decode(): row[0] for row in info}
         # Pinocchio sorts sibling joints by name, Bullet keeps the file's order.
-        names = list(robot.model.names)[1:]
-        self.joints = [by_name[name] for name in names]
-        self._actuated = self.joints[BASE_DOF:]
+        self.joints = [by_name[name] for name in robot.model.names if name in by_name]
+        self._actuated = [by_name[name] for name in robot.joint_names]
         self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
-        self._trunk = self.joints[BASE_DOF - 1]
+        self._trunk = self._trunk_link()
         self._contacts: Sequence[Any] | None = None
         self._configure(len(info))
+
+    def _load(self) -> int:
+        return load_body(self.robot, self.client)
+
+    def _trunk_link(self) -> int:
+        """PyBullet's index of the trunk."""
+        return self.joints[BASE_DOF - 1]
 
     def _info(self) -> list[tuple[Any, ...]]:
         p, c = pybullet, self.client
@@ -223,13 +235,14 @@ class BulletPlant:
         divided by that step.
         """
         out[:] = 0.0
+        axes = _AXES[out.shape[1]]
         for contact in self._touching():
             sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
             foot = self._feet.get(link)
             if foot is None:
                 continue
             # Normal force and direction (a step's wall pushes sideways), two of friction.
-            for i, axis in enumerate((0, 2)):
+            for i, axis in enumerate(axes):
                 out[foot, i] += sign * (
                     contact[9] * contact[7][axis]
                     + contact[10] * contact[11][axis]
@@ -270,11 +283,14 @@ class BulletPlant:
                 self.body,
                 self._trunk,
                 [push, 0.0, 0.0],
-                p.getLinkState(self.body, self._trunk, physicsClientId=c)[0],
+                self._trunk_com(),
                 p.WORLD_FRAME,
                 physicsClientId=c,
             )
         p.stepSimulation(physicsClientId=c)
+
+    def _trunk_com(self) -> Any:
+        return pybullet.getLinkState(self.body, self._trunk, physicsClientId=self.client)[0]
 
     def close(self) -> None:
         """Disconnect; the plant is unusable afterwards."""

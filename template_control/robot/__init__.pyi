@@ -1,6 +1,13 @@
+from .biped import Biped as Biped
 from .five_link import FiveLink as FiveLink
 from .five_link import Link as Link
+from .free.free_biped import FreeBiped as FreeBiped
+from .free.free_biped import JointLimits as JointLimits
+from .free.start import FreePose as FreePose
+from .free.start import free_state_in as free_state_in
+from .library import FREE_ROBOTS as FREE_ROBOTS
 from .library import ROBOTS as ROBOTS
+from .library import load_free_robot as load_free_robot
 from .library import load_robot as load_robot
 from .library import robot_path as robot_path
 from .planar_biped import PlanarBiped as PlanarBiped

@@ -10,6 +10,7 @@ import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.errors import RobotError
+from template_control.robot.free.free_biped import FreeBiped, JointLimits
 from template_control.robot.planar_biped import PlanarBiped
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -24,6 +25,7 @@ class _Entry:
         about: one line.
         distribution: the Python package that brings the URDF; "" for ours.
         feet, sagittal_joints, foot_radius, walk: see :meth:`PlanarBiped.from_urdf`.
+        limits: of a robot that walks free, in place of the URDF's; None where it cannot.
     """
 
     file: str
@@ -33,7 +35,13 @@ class _Entry:
     sagittal_joints: tuple[str, ...] = ()
     foot_radius: float | None = None
     walk: tuple[float, float] | None = None
+    limits: JointLimits | None = None
 
+
+# Bolt's actuator, the module of the Open Dynamic Robot Initiative (Grimminger et al., "An open
+# torque-controlled modular robot architecture for legged locomotion research", 2020): a motor of
+# 0.025 N m/A and 300 rpm/V behind belts of 9:1, 12 A at most, 24 V.
+_BOLT_ACTUATOR = JointLimits(torque=0.025 * 9.0 * 12.0, velocity=300.0 * 24.0 / 9.0 * np.pi / 30.0)
 
 _ENTRIES = {
     "five-link": _Entry("five_link.urdf", "light legs, as robots built for the SLIP have them"),
@@ -53,11 +61,15 @@ _ENTRIES = {
         feet=("FL_FOOT", "FR_FOOT"),
         sagittal_joints=("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE"),
         foot_radius=0.016,
+        limits=_BOLT_ACTUATOR,
     ),
 }
 
 ROBOTS: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
 """Names that :func:`load_robot` knows, with a line about each."""
+
+FREE_ROBOTS = tuple(name for name, entry in _ENTRIES.items() if entry.limits is not None)
+"""Names that :func:`load_free_robot` knows."""
 
 
 @checked
@@ -110,4 +122,25 @@ def load_robot(name: str | Path) -> PlanarBiped:
         entry.sagittal_joints,
         foot_radius=entry.foot_radius,
         walk=entry.walk,
+    )
+
+
+@checked
+def load_free_robot(name: str | Path) -> FreeBiped:
+    """A shipped robot by name, or any biped by the path of its URDF, that nothing holds.
+
+    Raises:
+        RobotError: if there is no such robot or file, or it is planar.
+    """
+    text = str(name)
+    if text not in _ENTRIES and (text.endswith(".urdf") or "/" in text):
+        return FreeBiped.from_urdf(text)
+    path, entry = robot_path(text), _ENTRIES[text]
+    if entry.limits is None:
+        raise RobotError(
+            f"robot {text!r} is planar and cannot walk free: give one of {list(FREE_ROBOTS)} or a"
+            " URDF file"
+        )
+    return FreeBiped.from_urdf(
+        path, entry.feet, entry.foot_radius, limits=entry.limits, walk=entry.walk
     )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError, RobotError
+from template_control.robot.biped import Biped, sagittal_length
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planar_terms import PlanarTerms, gather, sources
 from template_control.robot.planarise import planarise
@@ -31,50 +32,24 @@ from template_control.robot.urdf import (
 
 Array = NDArray[np.float64]
 
+_PITCH = 2  # place of the trunk's pitch in q
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-class PlanarBiped:
+class PlanarBiped(Biped):
     """Model of a planar biped and its kinematics and dynamics at the last :meth:`update`.
 
     :meth:`from_urdf` makes one from a file. The constructor takes ``path``, ``urdf``, ``model``,
     ``feet``, ``foot_radius`` and ``walk`` of the attributes.
-    Attributes (constant):
-        name: the URDF's robot name.
-        path: the URDF file.
-        urdf: its text, as Pinocchio and PyBullet load it.
-        model: the Pinocchio model.
-        nv: degrees of freedom, 3 + number of actuated joints.
-        mass: total mass [kg].
-        gravity: gravitational acceleration [m/s^2].
-        feet: names of the two foot frames, left then right.
-        foot_radius: radius of the foot spheres [m].
-        walk: touchdown angle [rad] and speed at VLO over sqrt(g l0) of its default gait, or
-            None where none is better than the library's.
-        joint_names: actuated joints in the order of q[3:].
-        torque_limit: (nv - 3,) URDF ``effort`` [N m].
-        velocity_limit: (nv - 3,) URDF ``velocity`` [rad/s].
-        legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
-        leg_length: from hip to the foot sphere's centre with a straight knee [m].
-        joint_sign: (nv - 3,) 1 where a joint turns about +y, -1 where it does about -y.
-        trunk_com: height of the trunk's own CoM above the hips [m].
 
-    Attributes (written by :meth:`update`; views that the next call overwrites):
-        mass_matrix: (nv, nv) M(q).
-        nonlinear_effects: (nv,) C(q, v) v + g(q) [N, N m].
-        com, com_velocity: (2,) [m, m/s].
-        com_jacobian: (2, nv) maps v to the CoM's velocity.
-        com_bias: (2,) dJ/dt v of this Jacobian [m/s^2].
-        angular_momentum: about the CoM, forward pitch positive [kg m^2/s].
-        angular_momentum_jacobian: (nv,) its row of the centroidal momentum matrix.
-        angular_momentum_bias: that row's time derivative times v [N m].
-        foot_position: (2, 2) lowest point of each foot sphere [m].
-        foot_velocity: (2, 2) of the material point there [m/s].
-        foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
-        foot_bias: (2, 2) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
-        joint_velocity: (nv - 3,) of the actuated joints [rad/s].
-        fastest: the largest share of its limit that a joint's speed has.
+    Its attributes are those of :class:`~.biped.Biped`, and:
+
+    Attributes:
+        joint_sign: (nv - 3,) 1 where a joint turns about +y, -1 where it does about -y.
     """
+
+    base_dof = BASE_DOF
+    directions = 2
 
     def __init__(
         self,
@@ -92,7 +67,7 @@ class PlanarBiped:
         self.feet = feet
         self.foot_radius = foot_radius
         self.walk = walk
-        self.nv: int = model.nv
+        self.nq, self.nv = model.nq, model.nv
         self.mass = float(pin.computeTotalMass(model))
         self.gravity = float(-model.gravity.linear[2])
         self.joint_names: tuple[str, ...] = tuple(model.names)[1 + BASE_DOF :]
@@ -104,8 +79,8 @@ class PlanarBiped:
             for parent in (model.frames[f].parentJoint for f in self._foot_ids)
         )
         self.leg_length = min(
-            sum(_sagittal(model.jointPlacements[j + 1 + BASE_DOF]) for j in leg[1:])
-            + _sagittal(model.frames[foot].placement)
+            sum(sagittal_length(model.jointPlacements[j + 1 + BASE_DOF]) for j in leg[1:])
+            + sagittal_length(model.frames[foot].placement)
             for leg, foot in zip(self.legs, self._foot_ids, strict=True)
         )
         axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
@@ -131,12 +106,11 @@ class PlanarBiped:
         self.foot_velocity = np.zeros((2, 2))
         self.foot_jacobian = terms.foot_jacobian
         self.foot_bias = terms.foot_bias
+        self.contact_velocity = self.foot_velocity
+        self.contact_jacobian = self.foot_jacobian
+        self.contact_bias = self.foot_bias
         self.joint_velocity = terms.joint_velocity
         self.fastest = 0.0
-
-    def __repr__(self) -> str:
-        joints = ", ".join(self.joint_names)
-        return f"<PlanarBiped {self.name}: {self.mass:.4g} kg, joints {joints}>"
 
     @classmethod
     @checked
@@ -228,8 +202,12 @@ class PlanarBiped:
             )
         np.matmul(self.foot_jacobian, v, out=self.foot_velocity)
 
+    def neutral(self) -> Array:
+        """See :meth:`~.biped.Biped.neutral`."""
+        return np.zeros(self.nq)
+
     def joint_positions(self, out: Array) -> None:
-        """Write the actuated joints' positions (nv - 3, 2) [m] at the last update."""
+        """See :meth:`~.biped.Biped.joint_positions`."""
         for i, position in enumerate(self._joint_places):
             out[i, 0], out[i, 1] = position[0], position[2]
 
@@ -237,8 +215,14 @@ class PlanarBiped:
         """Height of the point the legs hang from [m]; the base joint is placed there."""
         return float(q[1])
 
+    def hips(self, q: Array, v: Array) -> tuple[Array, float]:
+        """See :meth:`~.biped.Biped.hips`."""
+        return q[:2], v[0]
 
-def _sagittal(placement: pin.SE3) -> float:
-    """Length of a placement's translation in the x-z plane [m]."""
-    translation = placement.translation
-    return float(np.hypot(translation[0], translation[2]))
+    def trunk(self, q: Array, v: Array) -> tuple[float, float]:
+        """See :meth:`~.biped.Biped.trunk`; the third coordinate."""
+        return q[_PITCH], v[_PITCH]
+
+    def tilt(self, q: Array) -> float:
+        """See :meth:`~.biped.Biped.tilt`."""
+        return abs(float(q[_PITCH]))

@@ -77,7 +77,7 @@ def planarise(
     hips = _check_axes(path, robot, sagittal_joints)
     root = _root_link(robot)
     _shift(robot, root, hips)
-    _spheres(robot, feet, foot_radius)
+    spheres(robot, feet, foot_radius)
     links = _free(_WORLD, {str(link.get("name")) for link in robot.findall("link")})
     for link in links:
         ET.SubElement(robot, "link", name=link)
@@ -181,8 +181,14 @@ def _shift(robot: ET.Element, root: str, hips: Array) -> None:
         origin.set("xyz", _text(_vector(origin.get("xyz")) - offset))
 
 
-def _spheres(robot: ET.Element, feet: Sequence[str], radius: float | None) -> None:
-    """Leave collision shapes to the feet alone, and give them spheres."""
+def spheres(robot: ET.Element, feet: Sequence[str], radius: float | None) -> None:
+    """Leave collision shapes to the feet alone, and give them spheres.
+
+    Args:
+        robot: the root element of a URDF; changed.
+        feet: names of the foot links.
+        radius: of the spheres [m]; None to keep the feet's own shapes.
+    """
     for link in robot.findall("link"):
         foot = link.get("name") in feet
         for collision in link.findall("collision"):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.similarity import PER_ACCELERATION_SQUARED, RATE, RATE_SQUARED, tuned
 from template_control.whole_body.task import Rows
 from template_control.whole_body.wanted import Wanted
@@ -38,7 +38,7 @@ class ComTask(Checked):
         """See :class:`~.task.Task`."""
         return self.weight
 
-    def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
+    def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
         (kp, kd), ref, now = self.gains, wanted.com.tolist(), wanted.com_now.tolist()
         height = now[1]

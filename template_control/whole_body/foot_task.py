@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.similarity import PER_ACCELERATION_SQUARED, RATE, RATE_SQUARED, tuned
 from template_control.whole_body.task import Rows
@@ -40,7 +40,7 @@ class FootTask(Checked):
         """See :class:`~.task.Task`."""
         return self.weight
 
-    def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
+    def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
         foot = wanted.feet[self.leg]
         (kp, kd), (hold_p, hold_d) = self.gains, self.hold_gains

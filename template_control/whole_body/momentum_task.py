@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.similarity import PER_RATE_TO_THE_FOURTH, RATE, tuned
 from template_control.whole_body.task import Rows
 from template_control.whole_body.wanted import Wanted
@@ -37,7 +37,7 @@ class MomentumTask(Checked):
         """See :class:`~.task.Task`."""
         return (self.weight,)
 
-    def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
+    def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
         inertia = robot.mass * wanted.com_now[1] ** 2
         rows.jacobian[0] = robot.angular_momentum_jacobian / inertia

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.similarity import PER_RATE_TO_THE_FOURTH, RATE, RATE_SQUARED, tuned
 from template_control.whole_body.task import Rows
 from template_control.whole_body.wanted import Wanted
@@ -33,7 +33,7 @@ class PostureTask(Checked):
         """See :class:`~.task.Task`."""
         return (self.weight,)
 
-    def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
+    def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
         kp, kd = self.gains
         angle, rate = wanted.pitch_now

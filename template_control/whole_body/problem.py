@@ -1,11 +1,12 @@
 """The whole-body QP in its only unknowns, the joint torques.
 
-Torques are scaled by their limits and forces by the robot's weight:
+Torques are scaled by their limits and forces by the robot's weight; f_n is a foot's normal force,
+f_t each of its tangential ones, of which there is one in the plane and two in space:
 
     min  1/2 z^T H z + g^T z      z = tau / tau_max
     s.t. -1 <= z <= 1                           torque limits
-         0 <= mu f_y -+ f_x                     linearised friction cone, each stance foot
-         0 <= f_y <= cap                        unilateral contact, unloading foot
+         0 <= mu f_n -+ f_t                     linearised friction cone, each stance foot
+         0 <= f_n <= cap                        unilateral contact, unloading foot
          low <= a_joint <= high                 only where a joint is near its speed limit
 
 H is badly conditioned (tasks against regularisers), and a proximal solver is slow along
@@ -26,9 +27,18 @@ from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
 Array = NDArray[np.float64]
 
-ROWS_PER_FOOT = 3
 _FAR = 1e20  # ProxQP's infinity
 _GRID = 2.0**24  # steps of a torque up to its limit
+
+
+@compiled
+def rows_per_foot(directions: int) -> int:
+    """Constraints of a stance foot: two for each tangential direction, one for the normal one.
+
+    Args:
+        directions: of its force, 2 in the plane, 3 in space.
+    """
+    return 2 * directions - 1
 
 
 class Matrices(NamedTuple):
@@ -36,10 +46,11 @@ class Matrices(NamedTuple):
 
     Attributes:
         a_map: (nv, nu + 1) accelerations as an affine function of the torques.
-        f_map: (2 c, nu + 1) contact forces as an affine function of the torques.
+        f_map: (d c, nu + 1) contact forces as an affine function of the torques, d the directions.
         factor: (nu, nu) L in its lower triangle.
         gradient: (nu,) L^-1 g.
-        constraint: (nu + 3 c, nu) rows of unit length; nu more where accelerations are bounded.
+        constraint: (nu + (2 d - 1) c, nu) rows of unit length; nu more where accelerations are
+            bounded.
         lower, upper: bounds of the rows times w.
     """
 
@@ -66,8 +77,8 @@ def assemble(
 
     Args:
         mass_matrix, nonlinear_effects: (nv, nv) M and (nv,) h.
-        contact: (2 c, nv + 2) a row for x and y of each stance foot: Jacobian J, bias dJ/dt v,
-            wanted force [N].
+        contact: (c, d, nv + 2) a row for each direction of each stance foot, the last one normal
+            to the ground: Jacobian J, bias dJ/dt v, wanted force [N].
         tasks: (t, nv + 3), the table of a :class:`~.task.TaskStack`.
         costs: (2,) of the contact forces' distance from the wanted ones, per (m g)^2, and of
             the joint torques, per squared limit.
@@ -84,15 +95,17 @@ def assemble(
     a_map, f_map, factor, gradient, constraint, lower, upper = out
     nv = mass_matrix.shape[0]
     nu = gradient.shape[0]
-    feet = contact.shape[0] // 2
+    feet, directions = contact.shape[0], contact.shape[1]
+    per_foot = rows_per_foot(directions)
     torque_limit, force_cap = limits[:nu], limits[nu : nu + feet]
     friction, weight = limits[nu + feet], limits[nu + feet + 1]
     # Copies without gaps, which the elimination reads faster.
-    jacobian, bias = np.empty((2 * feet, nv)), np.empty(2 * feet)
-    for i in range(2 * feet):
-        for k in range(nv):
-            jacobian[i, k] = contact[i, k]
-        bias[i] = contact[i, nv]
+    jacobian, bias = np.empty((directions * feet, nv)), np.empty(directions * feet)
+    for foot in range(feet):
+        for d in range(directions):
+            for k in range(nv):
+                jacobian[foot * directions + d, k] = contact[foot, d, k]
+            bias[foot * directions + d] = contact[foot, d, nv]
     if not eliminate(mass_matrix, nonlinear_effects, jacobian, bias, nv - nu, a_map, f_map):
         return False
     factor[:] = 0.0
@@ -110,33 +123,39 @@ def assemble(
             row[j] = total
         row[nu] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
         _add_square(row, tasks[t, nv + WEIGHT], torque_limit, factor, gradient)
-    for i in range(2 * feet):
-        for j in range(nu + 1):
-            row[j] = f_map[i, j] / weight
-        row[nu] -= contact[i, nv + 1] / weight
-        _add_square(row, costs[0], torque_limit, factor, gradient)
+    for foot in range(feet):
+        for d in range(directions):
+            for j in range(nu + 1):
+                row[j] = f_map[foot * directions + d, j] / weight
+            row[nu] -= contact[foot, d, nv + 1] / weight
+            _add_square(row, costs[0], torque_limit, factor, gradient)
 
     constraint[:] = 0.0
     for i in range(nu):
         constraint[i, i] = 1.0
         lower[i], upper[i] = -1.0, 1.0
     for foot in range(feet):
-        x, y, top = 2 * foot, 2 * foot + 1, nu + ROWS_PER_FOOT * foot
-        for side in range(2):
-            sign = 1.0 - 2.0 * side
-            for j in range(nu):
-                constraint[top + side, j] = (
-                    (friction * f_map[y, j] + sign * f_map[x, j]) * torque_limit[j] / weight
-                )
-            lower[top + side] = -(friction * f_map[y, nu] + sign * f_map[x, nu]) / weight
-            upper[top + side] = _FAR
+        top, normal = nu + per_foot * foot, directions * foot + directions - 1
+        for d in range(directions - 1):
+            along = directions * foot + d
+            for side in range(2):
+                sign, at = 1.0 - 2.0 * side, top + 2 * d + side
+                for j in range(nu):
+                    constraint[at, j] = (
+                        (friction * f_map[normal, j] + sign * f_map[along, j])
+                        * torque_limit[j]
+                        / weight
+                    )
+                lower[at] = -(friction * f_map[normal, nu] + sign * f_map[along, nu]) / weight
+                upper[at] = _FAR
+        at = top + per_foot - 1
         for j in range(nu):
-            constraint[top + 2, j] = f_map[y, j] * torque_limit[j] / weight
-        lower[top + 2] = -f_map[y, nu] / weight
-        upper[top + 2] = min(_FAR, (force_cap[foot] - f_map[y, nu]) / weight)
+            constraint[at, j] = f_map[normal, j] * torque_limit[j] / weight
+        lower[at] = -f_map[normal, nu] / weight
+        upper[at] = min(_FAR, (force_cap[foot] - f_map[normal, nu]) / weight)
     least = nu + feet + 2
     for i in range((limits.shape[0] - least) // 2):
-        row_of, joint = nu + ROWS_PER_FOOT * feet + i, nv - nu + i
+        row_of, joint = nu + per_foot * feet + i, nv - nu + i
         for j in range(nu):
             constraint[row_of, j] = a_map[joint, j] * torque_limit[j]
         lower[row_of] = limits[least + i] - a_map[joint, nu]
@@ -215,7 +234,7 @@ def follow(a_map: Array, f_map: Array, tau: Array, acceleration: Array, force: A
         a_map, f_map: affine maps that :func:`assemble` has filled.
         tau: (nu,) joint torques [N m].
         acceleration: (nv,) overwritten with the generalised accelerations [m/s^2, rad/s^2].
-        force: (2 c,) overwritten with x and y of the force on each stance foot [N].
+        force: (d c,) overwritten with the force on each stance foot [N].
     """
     _affine(a_map, tau, acceleration)
     _affine(f_map, tau, force)

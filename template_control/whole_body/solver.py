@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.similarity import RATE, TIME, tuned
 from template_control.whole_body.problem import (
-    ROWS_PER_FOOT,
     Matrices,
     assemble,
     follow,
+    rows_per_foot,
     torques,
 )
 from template_control.whole_body.task import TaskStack
@@ -77,7 +77,7 @@ class Stance(NamedTuple):
 
     Attributes:
         feet: indices of the feet, none to two.
-        force: (2 c,) contact forces to stay near, x and y of each foot [N].
+        force: (d c,) contact forces to stay near, of each foot x and y, in space x, y and z [N].
         cap: (c,) largest normal force of each foot [N] (inf: none).
     """
 
@@ -92,7 +92,7 @@ class Solution:
 
     Attributes:
         torque: (nu,) joint torques [N m], within their limits.
-        force: (2 c,) contact forces [N], x and y of each stance foot.
+        force: (d c,) contact forces of each stance foot [N], by direction.
         acceleration: (nv,) generalised accelerations.
         solved: False where the QP was infeasible, singular or not solved within its caps;
             the torques are then the last solved ones, and force and acceleration follow
@@ -111,18 +111,18 @@ class _Workspace:
     """Matrices and ProxQP object for one number of stance feet.
 
     Args:
-        nv, nu: degrees of freedom, and those that are driven.
+        robot: whose.
         feet: on the ground.
-        weight: of the robot [N].
         bounded: how many accelerations of joints have bounds: none, or all.
     """
 
-    def __init__(self, nv: int, nu: int, feet: int, weight: float, bounded: int = 0) -> None:
-        rows = nu + ROWS_PER_FOOT * feet + bounded
+    def __init__(self, robot: Biped, feet: int, bounded: int = 0) -> None:
+        nv, nu, directions = robot.nv, len(robot.torque_limit), robot.directions
+        rows = nu + rows_per_foot(directions) * feet + bounded
         self._identity = np.eye(nu)
         self.matrices = Matrices(
             a_map=np.zeros((nv, nu + 1)),
-            f_map=np.zeros((2 * feet, nu + 1)),
+            f_map=np.zeros((directions * feet, nu + 1)),
             factor=np.zeros((nu, nu)),
             gradient=np.zeros(nu),
             constraint=np.zeros((rows, nu)),
@@ -131,13 +131,13 @@ class _Workspace:
         )
         self.out = tuple(self.matrices)
         self.limits = np.zeros(nu + feet + 2 + 2 * bounded)
-        self.limits[nu + feet + 1] = weight
+        self.limits[nu + feet + 1] = robot.mass * robot.gravity
         self.torque_limit, self.cap = self.limits[:nu], self.limits[nu : nu + feet]
         self.friction = self.limits[nu + feet : nu + feet + 1]
         self.least, self.most = self.limits[nu + feet + 2 :].reshape(2, bounded)
-        self.contact = np.zeros((2 * feet, nv + 2))
-        self.jacobian = self.contact[:, :nv]
-        self.bias, self.force = self.contact[:, nv], self.contact[:, nv + 1]
+        self.contact = np.zeros((feet, directions, nv + 2))
+        self.jacobian = self.contact[:, :, :nv]
+        self.bias, self.force = self.contact[:, :, nv], self.contact[:, :, nv + 1]
         self.rows = rows
         self.qp = self._new()
         self.ready = False
@@ -197,7 +197,7 @@ class WholeBodyQp:
     """
 
     @checked
-    def __init__(self, robot: PlanarBiped, options: QpOptions | None = None) -> None:
+    def __init__(self, robot: Biped, options: QpOptions | None = None) -> None:
         o = options or QpOptions()
         self.robot = robot
         self.friction = o.cone
@@ -206,10 +206,8 @@ class WholeBodyQp:
         self._costs = np.array([o.force_cost, o.torque_cost])
         self._speed_share, self._speed_rate = o.speed_share, 1.0 / o.speed_horizon
         nu = len(self.torque_limit)
-        weight = robot.mass * robot.gravity
         self._workspaces, self._braked = (
-            [_Workspace(robot.nv, nu, feet, weight, bounded) for feet in range(3)]
-            for bounded in (0, nu)
+            [_Workspace(robot, feet, bounded) for feet in range(3)] for bounded in (0, nu)
         )
         self._torque = np.zeros(nu)
         self._failing = False
@@ -247,7 +245,7 @@ class WholeBodyQp:
             torques(w.matrices.factor, w.qp.results.x, limit, self._torque)
         else:
             np.clip(self._torque, -limit, limit, out=self._torque)
-        force = np.empty(2 * feet)
+        force = np.empty(robot.directions * feet)
         acceleration = np.empty(robot.nv)
         follow(w.matrices.a_map, w.matrices.f_map, self._torque, acceleration, force)
         return Solution(load * self._torque, force, acceleration, solved, seconds)
@@ -258,10 +256,10 @@ class WholeBodyQp:
         """Whether the problem is regular, and solved, in this workspace; seconds in ProxQP."""
         robot = self.robot
         for i, foot in enumerate(stance.feet):
-            rows = slice(2 * i, 2 * i + 2)
-            w.jacobian[rows] = robot.foot_jacobian[foot]
-            w.bias[rows] = robot.foot_bias[foot] + self._contact_damping * robot.foot_velocity[foot]
-        w.force[:] = stance.force
+            sliding = robot.contact_velocity[foot]
+            w.jacobian[i] = robot.contact_jacobian[foot]
+            w.bias[i] = robot.contact_bias[foot] + self._contact_damping * sliding
+        w.force[:] = stance.force.reshape(w.force.shape)
         w.torque_limit[:], w.cap[:] = limit, stance.cap
         w.friction[0] = self.friction
         regular = assemble(

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.whole_body.wanted import Wanted
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class Task(Protocol):
     def weights(self) -> tuple[float, ...]:
         """One weight a row."""
 
-    def write(self, robot: PlanarBiped, wanted: Wanted, rows: Rows) -> None:
+    def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """Fill the task's rows.
 
         Args:
@@ -76,7 +76,7 @@ class TaskStack:
             rows = Rows(part[:, :nv], part[:, nv + BIAS], part[:, nv + DESIRED])
             self._parts.append((task, rows))
 
-    def write(self, robot: PlanarBiped, wanted: Wanted) -> None:
+    def write(self, robot: Biped, wanted: Wanted) -> None:
         """Let every task fill its rows of the table.
 
         Args:

@@ -25,6 +25,7 @@ class Wanted:
         feet: the foot that is the rear leg's, and the front leg's.
         foot: (2, 2, 3) of each foot: x and y, each wanted position, velocity, acceleration, in
             the world [m, m/s, m/s^2].
+        side: (2, 3) of each foot of a free robot: y, to the left, as ``foot`` in its heading frame.
         furthest: (2,) largest x that each foot may be moved to, so that its leg does not go
             straight [m].
         hip_speed: forward speed of the hips [m/s].
@@ -37,5 +38,6 @@ class Wanted:
     pitch_now: Array = field(default_factory=lambda: np.zeros(2))
     feet: tuple[int, int] = (0, 1)
     foot: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
+    side: Array = field(default_factory=lambda: np.zeros((2, 3)))
     furthest: Array = field(default_factory=lambda: np.full(2, np.inf))
     hip_speed: float = 0.0

@@ -24,10 +24,10 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.whole_body.problem import (
-    ROWS_PER_FOOT,
     Matrices,
     assemble,
     follow,
+    rows_per_foot,
     torques,
 )
 
@@ -55,18 +55,19 @@ def exact_map() -> None:
 
 def whole_body() -> None:
     """The whole-body QP, of two degrees of freedom, one motor and one foot."""
+    rows = 1 + rows_per_foot(2)
     matrices = Matrices(
         a_map=np.zeros((2, 2)),
         f_map=np.zeros((2, 2)),
         factor=np.zeros((1, 1)),
         gradient=np.zeros(1),
-        constraint=np.zeros((1 + ROWS_PER_FOOT, 1)),
-        lower=np.zeros(1 + ROWS_PER_FOOT),
-        upper=np.zeros(1 + ROWS_PER_FOOT),
+        constraint=np.zeros((rows, 1)),
+        lower=np.zeros(rows),
+        upper=np.zeros(rows),
     )
     mass_matrix = np.asfortranarray(np.eye(2))
     bias, limits, costs = np.zeros(2), np.ones(1 + 1 + 2), np.ones(2)
-    contact, tasks, out = np.zeros((2, 4)), np.zeros((1, 5)), tuple(matrices)
+    contact, tasks, out = np.zeros((1, 2, 4)), np.zeros((1, 5)), tuple(matrices)
     assemble(mass_matrix, bias, contact, tasks, costs, limits, out)
     torques(np.ones((1, 1)), np.zeros(1), np.ones(1), np.zeros(1))
     follow(matrices.a_map, matrices.f_map, np.zeros(1), np.zeros(2), np.zeros(2))

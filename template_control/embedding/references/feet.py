@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Leg, Reset
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Feet:
         self.of = (rear, 1 - rear)
         self.landed = rear
 
-    def lift(self, foot: int, robot: PlanarBiped, swung: float = 0.0) -> None:
+    def lift(self, foot: int, robot: Biped, swung: float = 0.0) -> None:
         """Begin the swing of a foot that leaves the ground, or has left it already.
 
         Args:

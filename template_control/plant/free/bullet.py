@@ -1,0 +1,95 @@
+"""A free biped in PyBullet: its trunk is the body's base, and only joint torques drive it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from template_control.checks.checked import checked
+from template_control.plant.bullet import BulletPlant, PlantOptions, load_body
+from template_control.plant.quiet import silenced
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.free.free_terms import BASE_DOF
+
+with silenced():  # PyBullet announces its build time on standard output or stderr
+    import pybullet
+
+Array = NDArray[np.float64]
+
+_BASE = -1  # PyBullet's index of the base link
+_POSITION = BASE_DOF + 1
+
+
+class FreeBulletPlant(BulletPlant):
+    """As :class:`~template_control.plant.bullet.BulletPlant`, for a robot that nothing holds.
+
+    PyBullet tells and sets the state of the base link's CoM in its axes of inertia; the robot's is
+    that of the link's own frame.
+
+    Args:
+        robot: whose URDF to load and whose joint order to speak.
+        options: friction, physics step, mass error, step of the ground.
+
+    Raises:
+        RobotError: if PyBullet does not read the URDF, or reads another mass.
+    """
+
+    @checked
+    def __init__(self, robot: FreeBiped, options: PlantOptions) -> None:
+        super().__init__(robot, options)
+        found = pybullet.getDynamicsInfo(self.body, _BASE, physicsClientId=self.client)
+        self._inertial = _pose(found[3], found[4])
+        self._away = self._inertial.inverse()
+
+    def _load(self) -> int:
+        return load_body(self.robot, self.client, held=False)
+
+    def _trunk_link(self) -> int:
+        return _BASE
+
+    def _trunk_com(self) -> Any:
+        return pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
+
+    def reset(self, q: Array, v: Array) -> None:
+        """See :meth:`~template_control.plant.plant.Plant.reset`."""
+        p, c = pybullet, self.client
+        self._contacts = None
+        trunk = _pose(q[:3], q[3:_POSITION])
+        place = trunk * self._inertial
+        quaternion = pin.Quaternion(place.rotation).coeffs().tolist()
+        p.resetBasePositionAndOrientation(
+            self.body, place.translation.tolist(), quaternion, physicsClientId=c
+        )
+        linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:BASE_DOF]
+        linear = linear + np.cross(angular, place.translation - trunk.translation)
+        p.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=c)
+        for joint, position, velocity in zip(
+            self._actuated, q[_POSITION:], v[BASE_DOF:], strict=True
+        ):
+            p.resetJointState(self.body, joint, position, velocity, physicsClientId=c)
+
+    def read(self, q: Array, v: Array) -> None:
+        """See :meth:`~template_control.plant.plant.Plant.read`."""
+        p, c = pybullet, self.client
+        position, quaternion = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
+        linear, angular = p.getBaseVelocity(self.body, physicsClientId=c)
+        place = _pose(position, quaternion)
+        trunk = place * self._away
+        back = trunk.rotation.T
+        speed = linear - np.cross(angular, place.translation - trunk.translation)
+        q[:3], v[:3], v[3:BASE_DOF] = trunk.translation, back @ speed, back @ angular
+        coefficients = pin.Quaternion(trunk.rotation).coeffs()
+        # Of the two quaternions of a rotation the one nearer to the last.
+        near = float(coefficients @ q[3:_POSITION]) >= 0.0
+        q[3:_POSITION] = coefficients if near else -coefficients
+        states = p.getJointStates(self.body, self._actuated, physicsClientId=c)
+        for i, state in enumerate(states):
+            q[_POSITION + i], v[BASE_DOF + i] = state[0], state[1]
+
+
+def _pose(position: Any, quaternion: Any) -> pin.SE3:
+    """A frame from its place [m] and its quaternion x y z w."""
+    return pin.SE3(pin.Quaternion(np.array(quaternion)).matrix(), np.array(position))

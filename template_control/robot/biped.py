@@ -1,0 +1,146 @@
+"""What controller, whole-body QP and plants read of a robot, held in its plane or free."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Biped(ABC):
+    """A biped with point feet, and its kinematics and dynamics at the last :meth:`update`.
+
+    Sagittal quantities have two entries, x forward and y up: of a planar robot in the world, of a
+    free one in its heading frame.
+
+    Attributes (constant):
+        base_dof: unactuated degrees of freedom, the first ones.
+        directions: rows of a contact: 2 in the plane, 3 in space. The last one is up.
+        name: the URDF's robot name.
+        path: the URDF file.
+        urdf: its text, as Pinocchio and PyBullet load it.
+        model: the Pinocchio model.
+        nq, nv: numbers of a configuration and of a velocity.
+        mass: total mass [kg].
+        gravity: gravitational acceleration [m/s^2].
+        feet: names of the two foot frames, left then right.
+        foot_radius: radius of the foot spheres [m].
+        walk: touchdown angle [rad] and speed at VLO over sqrt(g l0) of its default gait, or
+            None where none is better than the library's.
+        joint_names: actuated joints, in the order of the last entries of q and v.
+        torque_limit: (nu,) URDF ``effort`` [N m].
+        velocity_limit: (nu,) URDF ``velocity`` [rad/s].
+        legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
+        leg_length: from hip to the foot sphere's centre with a straight knee [m].
+        trunk_com: height of the trunk's own CoM above the hips [m].
+
+    Attributes (written by :meth:`update`; views that the next call overwrites):
+        mass_matrix: (nv, nv) M(q).
+        nonlinear_effects: (nv,) C(q, v) v + g(q) [N, N m].
+        com, com_velocity: (2,) [m, m/s].
+        com_jacobian: (2, nv) maps v to the CoM's velocity.
+        com_bias: (2,) dJ/dt v of this Jacobian [m/s^2].
+        angular_momentum: about the CoM, forward pitch positive [kg m^2/s].
+        angular_momentum_jacobian: (nv,) its row of the centroidal momentum matrix.
+        angular_momentum_bias: that row's time derivative times v [N m].
+        foot_position: (2, 2) lowest point of each foot sphere [m].
+        foot_velocity: (2, 2) of the material point there [m/s].
+        foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
+        foot_bias: (2, 2) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
+        contact_velocity, contact_jacobian, contact_bias: of each foot in all ``directions``.
+        joint_velocity: (nu,) of the actuated joints [rad/s].
+        fastest: the largest share of its limit that a joint's speed has.
+    """
+
+    base_dof: int
+    directions: int
+    name: str
+    path: Path
+    urdf: str
+    model: pin.Model
+    nq: int
+    nv: int
+    mass: float
+    gravity: float
+    feet: tuple[str, str]
+    foot_radius: float
+    walk: tuple[float, float] | None
+    joint_names: tuple[str, ...]
+    torque_limit: Array
+    velocity_limit: Array
+    legs: tuple[tuple[int, ...], ...]
+    leg_length: float
+    trunk_com: float
+    mass_matrix: Array
+    nonlinear_effects: Array
+    com: Array
+    com_velocity: Array
+    com_jacobian: Array
+    com_bias: Array
+    angular_momentum: float
+    angular_momentum_jacobian: Array
+    angular_momentum_bias: float
+    foot_position: Array
+    foot_velocity: Array
+    foot_jacobian: Array
+    foot_bias: Array
+    contact_velocity: Array
+    contact_jacobian: Array
+    contact_bias: Array
+    joint_velocity: Array
+    fastest: float
+
+    def __repr__(self) -> str:
+        joints = ", ".join(self.joint_names)
+        return f"<{type(self).__name__} {self.name}: {self.mass:.4g} kg, joints {joints}>"
+
+    @abstractmethod
+    def update(self, q: Array, v: Array) -> None:
+        """Compute everything the controller needs at (q, v), each quantity once.
+
+        Args:
+            q: (nq,) configuration.
+            v: (nv,) velocity.
+
+        Raises:
+            ParameterError: if a value is NaN or infinite.
+        """
+
+    @abstractmethod
+    def neutral(self) -> Array:
+        """(nq,) upright, with straight vertical legs."""
+
+    @abstractmethod
+    def joint_positions(self, out: Array) -> None:
+        """Write the actuated joints' sagittal positions (nu, 2) [m] at the last update."""
+
+    @abstractmethod
+    def hip_height(self, q: Array) -> float:
+        """Height of the point the legs hang from [m], of the last update's ``q``."""
+
+    @abstractmethod
+    def hips(self, q: Array, v: Array) -> tuple[Array, float]:
+        """(2,) position of that point [m], and its forward speed [m/s], at the last update."""
+
+    @abstractmethod
+    def trunk(self, q: Array, v: Array) -> tuple[float, float]:
+        """Pitch of the trunk [rad] and its rate [rad/s], at the last update."""
+
+    @abstractmethod
+    def tilt(self, q: Array) -> float:
+        """Angle of the trunk from the upright [rad], at the last update."""
+
+
+def sagittal_length(placement: pin.SE3) -> float:
+    """Length of a placement's translation in the x-z plane [m].
+
+    Args:
+        placement: of a joint or a frame.
+    """
+    translation = placement.translation
+    return float(np.hypot(translation[0], translation[2]))

@@ -1,0 +1,1 @@
+"""Bipeds that nothing holds: six degrees of freedom in the base."""

@@ -1,0 +1,287 @@
+"""A biped that nothing holds, on Pinocchio: its trunk is a free flyer.
+
+Frames: world x forward, y left, z up. The configuration is q = (x, y, z of the trunk's origin, its
+quaternion x y z w, joints), the velocity v = (linear and angular velocity of the trunk in its own
+axes, joints), both in Pinocchio's order.
+
+What :meth:`FreeBiped.update` writes stands in the *heading frame*: the world, shifted and turned
+about the vertical by the heading. The sagittal controller sees the robot's x and z there, and
+knows nothing of the rest. The frame rests, but for :meth:`FreeBiped.turn`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, cos, sin
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Positive
+from template_control.errors import ParameterError
+from template_control.robot.biped import Biped, sagittal_length
+from template_control.robot.free.free_terms import BASE_DOF, FreeTerms, gather, sources
+from template_control.robot.free.requirements import check_free, set_limits
+from template_control.robot.meshes import find_meshes
+from template_control.robot.planarise import spheres
+from template_control.robot.requirements import foot_radius_of
+from template_control.robot.urdf import (
+    build_model,
+    check_bodies,
+    check_shapes,
+    read_urdf,
+    write_out_massless,
+)
+
+Array = NDArray[np.float64]
+
+_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+_POSITION = BASE_DOF + 1  # places in q before the joints
+_ROOT = 1  # Pinocchio's index of the free flyer
+
+
+@dataclass(frozen=True)
+class JointLimits(Checked):
+    """Limits of all joints, in place of the URDF's.
+
+    Attributes:
+        torque: the largest [N m].
+        velocity: the largest [rad/s].
+    """
+
+    torque: Positive
+    velocity: Positive
+
+
+class FreeBiped(Biped):
+    """Model of a free biped, and its kinematics and dynamics at the last :meth:`update`.
+
+    :meth:`from_urdf` makes one from a file. The constructor takes ``path``, ``urdf``, ``model``,
+    ``feet``, ``foot_radius`` and ``walk`` of the attributes. These are those of
+    :class:`~template_control.robot.biped.Biped`, and:
+
+    Attributes:
+        heading: angle from the world's x to the heading frame's, to the left positive [rad].
+        origin: (2,) x and y of the heading frame's origin in the world [m].
+        space: all terms with three directions, in the heading frame.
+        rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
+    """
+
+    base_dof = BASE_DOF
+    directions = 3
+
+    def __init__(
+        self,
+        path: Path,
+        urdf: str,
+        model: pin.Model,
+        feet: tuple[str, str],
+        foot_radius: float,
+        walk: tuple[float, float] | None = None,
+    ) -> None:
+        self.path = path
+        self.urdf = urdf
+        self.model = model
+        self.name = model.name
+        self.feet = feet
+        self.foot_radius = foot_radius
+        self.walk = walk
+        self.nq, self.nv = model.nq, model.nv
+        self.mass = float(pin.computeTotalMass(model))
+        self.gravity = float(-model.gravity.linear[2])
+        self.joint_names = tuple(model.names)[_ROOT + 1 :]
+        self.torque_limit = np.array(model.effortLimit[BASE_DOF:])
+        self.velocity_limit = np.array(model.velocityLimit[BASE_DOF:])
+        self._foot_ids = tuple(model.getFrameId(f) for f in feet)
+        joints = [
+            [j for j in model.supports[model.frames[f].parentJoint] if j > _ROOT]
+            for f in self._foot_ids
+        ]
+        self.legs = tuple(tuple(j - _ROOT - 1 for j in leg) for leg in joints)
+        self.leg_length = min(
+            sagittal_length(model.jointPlacements[leg[-1]])
+            + sagittal_length(model.frames[foot].placement)
+            for leg, foot in zip(joints, self._foot_ids, strict=True)
+        )
+        self._data = model.createData()
+        data = self._data
+        # Pinocchio keeps these arrays in place, so the views stay good.
+        self.mass_matrix, self.nonlinear_effects = data.M, data.nle
+        self.rotation: Array = data.oMi[_ROOT].rotation
+        self._joint_places = [data.oMi[j].translation for j in range(_ROOT + 1, model.njoints)]
+        self._hips = [data.oMi[leg[-2]].translation for leg in joints]
+        self._sources = sources(model, data, self._foot_ids, foot_radius)
+        self.space = FreeTerms.zeros(self.nv)
+        self._terms = tuple(self.space)
+        self._frame = np.array([0.0, 0.0, 1.0, 0.0])
+        self.origin = self._frame[:2]
+        self.heading = 0.0
+        self._look()
+        self.update(pin.neutral(model), np.zeros(self.nv))
+        lever = model.inertias[_ROOT].lever[2]
+        self.trunk_com = float(lever - self.hip_height(pin.neutral(model)))
+
+    def _look(self) -> None:
+        """The sagittal terms are the space's x and z."""
+        s = self.space
+        self.com, self.com_velocity, self.com_bias = (
+            s.com[::2],
+            s.com_velocity[::2],
+            s.com_bias[::2],
+        )
+        self.com_jacobian = s.com_jacobian[::2]
+        self.angular_momentum_jacobian = s.momentum_jacobian[1]
+        self.angular_momentum = self.angular_momentum_bias = 0.0
+        self.contact_jacobian, self.contact_bias = s.foot_jacobian, s.foot_bias
+        self.contact_velocity = np.zeros((2, 3))
+        self.foot_position, self.foot_velocity = s.foot[:, ::2], self.contact_velocity[:, ::2]
+        self.foot_jacobian, self.foot_bias = s.foot_jacobian[:, ::2], s.foot_bias[:, ::2]
+        self.joint_velocity = s.joint_velocity
+        self.fastest = 0.0
+
+    @classmethod
+    @checked
+    def from_urdf(
+        cls,
+        path: str | Path,
+        feet: Sequence[str] = ("left_foot", "right_foot"),
+        foot_radius: float | None = None,
+        limits: JointLimits | None = None,
+        walk: tuple[float, float] | None = None,
+    ) -> FreeBiped:
+        """Load a URDF whose root link is the trunk: x forward, y left, z up.
+
+        Either leg ends in a hip and a knee about y; one joint or two may come before them.
+
+        Args:
+            path: the URDF file.
+            feet: the two foot links, left then right.
+            foot_radius: of spheres to be put into the feet [m]; None to keep the feet's own.
+            limits: in place of the URDF's; None to keep those.
+            walk: see :class:`~template_control.robot.biped.Biped`.
+
+        Raises:
+            RobotError: if the file is missing, no URDF, no such biped, or lacks a foot; if a mass,
+                an inertia, a size or a limit is none.
+        """
+        path = Path(path)
+        tree = read_urdf(path)
+        if limits is not None:
+            set_limits(tree, limits.torque, limits.velocity)
+        spheres(tree, feet, foot_radius)
+        find_meshes(path, tree)
+        check_shapes(path, tree)
+        write_out_massless(tree)
+        urdf = ElementTree.tostring(tree, encoding="unicode")
+        build_model(path, urdf)  # which tells what is wrong with it
+        model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+        check_free(path, model, feet)
+        check_bodies(path, tree, model, _ROOT + 1)
+        radius = foot_radius_of(path, urdf, model, feet)
+        return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
+
+    def update(self, q: Array, v: Array) -> None:
+        """See :meth:`~template_control.robot.biped.Biped.update`."""
+        model, data = self.model, self._data
+        pin.computeAllTerms(model, data, q, v)
+        pin.centerOfMass(model, data)  # without q: data.a is dJ/dt v then
+        left, right = self._foot_ids
+        pin.updateFramePlacement(model, data, left)
+        pin.updateFramePlacement(model, data, right)
+        drift = (
+            pin.getFrameClassicalAcceleration(model, data, left, _WORLD_ALIGNED).vector,
+            pin.getFrameClassicalAcceleration(model, data, right, _WORLD_ALIGNED).vector,
+        )
+        finite, self.fastest = gather(self._sources, q, v, drift, self._frame, self._terms)
+        if not finite:
+            raise ParameterError(
+                f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
+            )
+        s = self.space
+        self.angular_momentum, self.angular_momentum_bias = s.momentum[1], s.momentum_bias[1]
+        np.matmul(s.foot_jacobian, v, out=self.contact_velocity)
+
+    def face(self, heading: float, origin: Array) -> None:
+        """Put the heading frame somewhere; takes effect at the next :meth:`update`.
+
+        Args:
+            heading: angle from the world's x to its own, to the left positive [rad].
+            origin: (2,) x and y of its origin in the world [m].
+        """
+        self.heading = heading
+        self._frame[:] = origin[0], origin[1], cos(heading), sin(heading)
+
+    def turn(self, angle: float, about: Array) -> None:
+        """Turn the heading frame; takes effect at the next :meth:`update`.
+
+        Args:
+            angle: to the left positive [rad].
+            about: (2,) the point that keeps its coordinates in the heading frame, x and y there
+                [m].
+        """
+        pivot = self.to_world(about)
+        heading = self.heading + angle
+        c, s = cos(heading), sin(heading)
+        x, y = about
+        self.face(heading, np.array([pivot[0] - c * x + s * y, pivot[1] - s * x - c * y]))
+
+    def to_world(self, point: Array) -> Array:
+        """A point of the heading frame in the world.
+
+        Args:
+            point: (..., 2) or (..., 3) [m].
+        """
+        x0, y0, c, s = self._frame
+        x, y = point[..., 0], point[..., 1]
+        out = np.array(point)
+        out[..., 0], out[..., 1] = x0 + c * x - s * y, y0 + s * x + c * y
+        return out
+
+    def neutral(self) -> Array:
+        """See :meth:`~template_control.robot.biped.Biped.neutral`."""
+        return np.asarray(pin.neutral(self.model))
+
+    def joint_positions(self, out: Array) -> None:
+        """See :meth:`~template_control.robot.biped.Biped.joint_positions`."""
+        x0, y0, c, s = self._frame
+        for i, place in enumerate(self._joint_places):
+            out[i, 0], out[i, 1] = c * (place[0] - x0) + s * (place[1] - y0), place[2]
+
+    def hip_height(self, q: Array) -> float:
+        """Mean height of the hips that swing the legs forward [m], at the last update."""
+        left, right = self._hips
+        return float(0.5 * (left[2] + right[2]))
+
+    def hips(self, q: Array, v: Array) -> tuple[Array, float]:
+        """See :meth:`~template_control.robot.biped.Biped.hips`: their mean."""
+        x0, y0, c, s = self._frame
+        x, y, z = (0.5 * (self._hips[0] + self._hips[1])).tolist()
+        away = z - float(q[2])
+        # The hips move with the trunk, whose origin is above them.
+        moving = self.rotation @ v[:3]
+        speed = c * moving[0] + s * moving[1] + self.space.turning[1] * away
+        return np.array([c * (x - x0) + s * (y - y0), z]), float(speed)
+
+    def trunk(self, q: Array, v: Array) -> tuple[float, float]:
+        """See :meth:`~template_control.robot.biped.Biped.trunk`: in the sagittal plane."""
+        return self.roll_pitch_yaw()[1], float(self.space.turning[1])
+
+    def roll_pitch_yaw(self) -> tuple[float, float, float]:
+        """How the trunk stands in the heading frame, at the last update [rad].
+
+        Roll and pitch are the angles of its upward axis from the vertical, about the heading
+        frame's x and y; yaw is that of its forward axis about the vertical.
+        """
+        (xx, _, xz), (yx, _, yz), (_, _, zz) = self.rotation.tolist()
+        c, s = float(self._frame[2]), float(self._frame[3])
+        ahead, left = c * xz + s * yz, c * yz - s * xz
+        return atan2(-left, zz), atan2(ahead, zz), atan2(c * yx - s * xx, c * xx + s * yx)
+
+    def tilt(self, q: Array) -> float:
+        """See :meth:`~template_control.robot.biped.Biped.tilt`."""
+        return float(np.arccos(np.clip(self.rotation[2, 2], -1.0, 1.0)))

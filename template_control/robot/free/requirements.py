@@ -1,0 +1,88 @@
+"""What a URDF must have to be a free biped of this library."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from template_control.errors import RobotError
+from template_control.robot.free.free_terms import BASE_DOF
+from template_control.robot.requirements import UNLIMITED
+
+_LATERAL = 2  # hip and knee, the last joints of a leg
+_LEAST, _MOST = 3, 4  # joints of a leg
+_CLOSE = 1e-6
+
+
+def set_limits(robot: ET.Element, torque: float, velocity: float) -> None:
+    """Give all moving joints other limits.
+
+    Args:
+        robot: the root element of a URDF; changed.
+        torque: the largest [N m].
+        velocity: the largest [rad/s].
+    """
+    for joint in robot.findall("joint"):
+        if joint.get("type") != "fixed":
+            limit = joint.find("limit")
+            if limit is None:
+                limit = ET.SubElement(joint, "limit", lower="-10", upper="10")
+            limit.set("effort", f"{torque:.12g}")
+            limit.set("velocity", f"{velocity:.12g}")
+
+
+def check_free(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
+    """Check that the robot is a biped whose legs can place their feet anywhere.
+
+    Args:
+        path: of the URDF, for the message.
+        model: of the robot, with a free flyer.
+        feet: names of the two foot links.
+
+    Raises:
+        RobotError: naming the foot or the joint that is otherwise.
+    """
+    if len(feet) != 2:
+        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
+    for foot in feet:
+        if not model.existFrame(foot):
+            links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
+            raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
+    for joint, name in list(zip(model.joints, model.names, strict=True))[2:]:
+        if joint.nq != 1 or joint.nv != 1:
+            raise RobotError(
+                f"{path}: joint {name!r} is {joint.shortname()}, and must be revolute with limits"
+            )
+    legs = [
+        [j for j in model.supports[model.frames[model.getFrameId(foot)].parentJoint] if j > 1]
+        for foot in feet
+    ]
+    if set(legs[0]) & set(legs[1]):
+        raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")
+    axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[3:]
+    for leg, foot in zip(legs, feet, strict=True):
+        if not _LEAST <= len(leg) <= _MOST:
+            raise RobotError(
+                f"{path}: {len(leg)} joints move foot {foot!r}: three or four are needed, the last"
+                " two of them hip and knee about the lateral axis"
+            )
+        for joint in leg[-_LATERAL:]:
+            if abs(abs(axes[1, model.idx_vs[joint]]) - 1.0) > _CLOSE:
+                raise RobotError(
+                    f"{path}: joint {model.names[joint]!r} of foot {foot!r} does not turn about the"
+                    " lateral axis y, as hip and knee must, the last two joints of a leg"
+                )
+    if len(legs[0]) + len(legs[1]) != model.nv - BASE_DOF:
+        others = [n for j, n in enumerate(model.names) if j > 1 and j not in (*legs[0], *legs[1])]
+        raise RobotError(f"{path}: joints {others} are in no leg: make them fixed")
+    for kind, limits in (("effort", model.effortLimit), ("velocity", model.velocityLimit)):
+        for joint in (*legs[0], *legs[1]):
+            limit = limits[model.idx_vs[joint]]
+            if not 0.0 < limit < UNLIMITED or not np.isfinite(limit):
+                raise RobotError(
+                    f"{path}: joint {model.names[joint]!r} has {kind} {limit}: give its limit"
+                )

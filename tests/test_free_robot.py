@@ -1,0 +1,192 @@
+"""The free biped's model: agreement with PyBullet, its terms, its heading frame, its start."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from template_control.errors import RobotError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.free.start import FreePose, free_state_in
+from template_control.robot.library import load_free_robot, robot_path
+
+
+@pytest.fixture(scope="module")
+def bolt():
+    return load_free_robot("bolt")
+
+
+def states(robot, count=10):
+    """Random configurations high above the ground, and velocities."""
+    rng = np.random.default_rng(5)
+    for _ in range(count):
+        step = np.concatenate(([0.0, 0.0, 5.0], rng.uniform(-1.0, 1.0, robot.nv - 3)))
+        yield pin.integrate(robot.model, robot.neutral(), step), rng.uniform(-2.0, 2.0, robot.nv)
+
+
+def of_world(q, v):
+    """Linear and angular velocity of the trunk in the world's axes, and the joints'."""
+    rotation = pin.Quaternion(q[3:7]).matrix()
+    return np.concatenate((rotation @ v[:3], rotation @ v[3:6], v[6:]))
+
+
+def bullet_acceleration(plant, q, v, torque):
+    """By one step of the plant, in the world's axes: its integration is semi-implicit."""
+    robot = plant.robot
+    after_q, after_v = np.zeros(robot.nq), np.zeros(robot.nv)
+    plant.reset(q, v)
+    plant.step(torque)
+    plant.read(after_q, after_v)
+    return (of_world(after_q, after_v) - of_world(q, v)) / plant.time_step
+
+
+def model_acceleration(robot, q, v, torque):
+    generalised = np.concatenate((np.zeros(6), torque))
+    a = pin.aba(robot.model, robot.model.createData(), q, v, generalised)
+    rotation = pin.Quaternion(q[3:7]).matrix()
+    linear = rotation @ (a[:3] + np.cross(v[3:6], v[:3]))
+    return np.concatenate((linear, rotation @ a[3:6], a[6:]))
+
+
+def test_forward_dynamics_agree_with_pybullet(bolt):
+    """Of torques, of gravity and of velocity."""
+    rng = np.random.default_rng(6)
+    with FreeBulletPlant(bolt, PlantOptions()) as plant:
+        for q, v in states(bolt):
+            torque = rng.uniform(-0.5, 0.5, 6)
+            found = bullet_acceleration(plant, q, v, torque)
+            np.testing.assert_allclose(found, model_acceleration(bolt, q, v, torque), atol=1e-8)
+
+
+def test_mass_matrix_and_bias_forces_agree_with_pybullet(bolt):
+    """M a + h = S' tau with PyBullet's accelerations; its columns of the torques show M."""
+    with FreeBulletPlant(bolt, PlantOptions()) as plant:
+        for q, v in states(bolt, 3):
+            bolt.update(q, v)
+            rotation = pin.Quaternion(q[3:7]).matrix()
+            for torque in (np.zeros(6), *(0.1 * np.eye(6))):
+                world = bullet_acceleration(plant, q, v, torque)
+                own = rotation.T @ world[:3] - np.cross(v[3:6], v[:3])
+                a = np.concatenate((own, rotation.T @ world[3:6], world[6:]))
+                left = bolt.mass_matrix @ a + bolt.nonlinear_effects
+                np.testing.assert_allclose(left, [*np.zeros(6), *torque], atol=1e-8)
+
+
+def test_the_plant_reads_the_state_it_was_given(bolt):
+    q, v = np.zeros(bolt.nq), np.zeros(bolt.nv)
+    with FreeBulletPlant(bolt, PlantOptions()) as plant:
+        for wanted_q, wanted_v in states(bolt, 5):
+            q[3:7] = wanted_q[3:7]
+            plant.reset(wanted_q, wanted_v)
+            plant.read(q, v)
+            np.testing.assert_allclose(q, wanted_q, atol=1e-12)
+            np.testing.assert_allclose(v, wanted_v, atol=1e-12)
+
+
+def test_terms_match_finite_differences_in_the_heading_frame(bolt):
+    h = 1e-6
+    bolt.face(0.7, np.array([0.3, -0.2]))
+    s = bolt.space
+    for q, v in states(bolt, 5):
+
+        def rate(read, q=q, v=v):
+            values = []
+            for step in (h, -h):
+                bolt.update(pin.integrate(bolt.model, q, step * v), v)
+                values.append(np.copy(read()))
+            return (values[0] - values[1]) / (2.0 * h)
+
+        com = rate(lambda: s.com)
+        velocity, momentum = rate(lambda: s.com_velocity), rate(lambda: s.momentum)
+        foot, turning = rate(lambda: bolt.contact_velocity), rate(lambda: s.turning)
+        bolt.update(q, v)
+        np.testing.assert_allclose(s.com_velocity, com, atol=1e-7)
+        np.testing.assert_allclose(s.com_bias, velocity, atol=1e-6)
+        np.testing.assert_allclose(s.momentum_bias, momentum, atol=1e-6)
+        np.testing.assert_allclose(s.foot_bias, foot, atol=1e-5)
+        np.testing.assert_allclose(turning, 0.0, atol=1e-6)
+        np.testing.assert_allclose(s.com_jacobian @ v, s.com_velocity, atol=1e-12)
+        np.testing.assert_allclose(s.momentum_jacobian @ v, s.momentum, atol=1e-12)
+        np.testing.assert_allclose(s.turning_jacobian @ v, s.turning, atol=1e-12)
+        np.testing.assert_allclose(bolt.com, s.com[[0, 2]])
+        assert bolt.angular_momentum == s.momentum[1]
+    bolt.face(0.0, np.zeros(2))
+
+
+def test_a_turn_keeps_its_pivot_and_turns_the_rest(bolt):
+    q, v = next(states(bolt, 1))
+    bolt.face(0.2, np.array([1.0, 2.0]))
+    bolt.update(q, v)
+    foot, com = bolt.space.foot.copy(), bolt.space.com.copy()
+    world = bolt.to_world(com)
+    bolt.turn(0.3, foot[0, :2])
+    bolt.update(q, v)
+    np.testing.assert_allclose(bolt.space.foot[0], foot[0], atol=1e-12)
+    np.testing.assert_allclose(bolt.to_world(bolt.space.com), world, atol=1e-12)
+    before, after = com - foot[0], bolt.space.com - foot[0]
+    c, s = np.cos(0.3), np.sin(0.3)
+    turned = [c * before[0] + s * before[1], c * before[1] - s * before[0], before[2]]
+    np.testing.assert_allclose(after, turned, atol=1e-12)
+    bolt.face(0.0, np.zeros(2))
+
+
+def test_roll_pitch_and_yaw_are_those_of_the_heading_frame(bolt):
+    for angles in ((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3)):
+        q = bolt.neutral()
+        turn = pin.exp3(np.array([0.0, 0.0, 0.5])) @ pin.exp3(np.array(angles))
+        q[3:7] = pin.Quaternion(turn).coeffs()
+        bolt.face(0.5, np.zeros(2))
+        bolt.update(q, np.zeros(bolt.nv))
+        np.testing.assert_allclose(bolt.roll_pitch_yaw(), angles, atol=1e-12)
+    bolt.face(0.0, np.zeros(2))
+
+
+def test_a_start_is_in_the_pose(bolt):
+    pose = FreePose(
+        com=np.array([0.0, 0.01, 0.35]),
+        com_velocity=np.array([0.6, -0.1, 0.02]),
+        feet=np.array([[0.0, 0.05, 0.0], [0.02, -0.06, 0.02]]),
+        feet_velocity=np.array([[0.0, 0.0, 0.0], [1.2, 0.1, 0.0]]),
+        rear=1,
+    )
+    q, v = free_state_in(bolt, pose)
+    bolt.update(q, v)
+    s = bolt.space
+    np.testing.assert_allclose(s.com, pose.com, atol=1e-11)
+    np.testing.assert_allclose(s.foot[[1, 0]], pose.feet, atol=1e-11)
+    np.testing.assert_allclose(bolt.contact_velocity[[1, 0]], pose.feet_velocity, atol=1e-11)
+    np.testing.assert_allclose(s.turning, 0.0, atol=1e-11)
+    weight = bolt.mass * 0.35
+    about = s.com_velocity + [s.momentum[1] / weight, -s.momentum[0] / weight, 0.0]
+    np.testing.assert_allclose(about, pose.com_velocity, atol=1e-11)
+    with pytest.raises(RobotError, match="do not reach"):
+        free_state_in(bolt, replace(pose, com=np.array([0.0, 0.0, 0.8])))
+
+
+def test_the_limits_are_those_of_the_actuators(bolt):
+    np.testing.assert_allclose(bolt.torque_limit, 2.7)
+    np.testing.assert_allclose(bolt.velocity_limit, 83.8, atol=0.05)
+    assert bolt.legs == ((0, 1, 2), (3, 4, 5))
+
+
+@pytest.mark.parametrize(
+    ("feet", "message"),
+    [
+        (("FL_FOOT", "nowhere"), "no foot link 'nowhere'"),
+        (("FL_FOOT", "FL_FOOT"), "the same leg"),
+        (("FL_FOOT",), "1 feet were named"),
+    ],
+)
+def test_what_is_no_free_biped_is_refused(feet, message):
+    with pytest.raises(RobotError, match=message):
+        FreeBiped.from_urdf(robot_path("bolt"), feet, 0.016)
+
+
+def test_a_planar_robot_is_not_free():
+    with pytest.raises(RobotError, match="'five-link' is planar"):
+        load_free_robot("five-link")
+    with pytest.raises(RobotError, match="the same leg"):
+        FreeBiped.from_urdf(robot_path("five-link"))
