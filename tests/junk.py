@@ -253,6 +253,8 @@ FLAGS = {
     "replay": ("--speed", "--fps", "--start", "--end"),
     "plots": ("--output",),
     "robustness": ("--robot", "--disturbance", "--quick", "--json"),
+    "campaign": ("--robot", "--gait", "--speed", "--plant", "--trials", "--mix", "--severity",
+                 "--seed", "--json"),
     "slip": ("--map", "--json", "--no-figures"),
     "gaits": ("--gait", "--fix", "--controlled", "--start", "--over", "--limits", "--step",
               "--json"),
@@ -269,6 +271,7 @@ ALWAYS = {
     "replay": ["--html", "page.html", "--no-browser"],
     # It refuses: a campaign takes minutes.
     "robustness": ["--workers", "0"],
+    "campaign": ["--workers", "0"],
     "slip": ["--no-figures"],
     "gaits": ["--no-figures"],
     "automaton": ["--no-figure"],

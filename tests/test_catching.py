@@ -10,9 +10,10 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import BreakingPlanner, Free
+from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed
-from template_control.embedding.stride_planning import ReplanOptions, StridePlanning
+from template_control.embedding.stride_planning import StridePlanning
 from template_control.embedding.touchdown import free_controls
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.breaking import RUN_ON

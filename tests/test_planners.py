@@ -14,9 +14,10 @@ from template_control.embedding.learners.momentum_trim import (
 )
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed
-from template_control.embedding.stride_planning import ReplanOptions, StridePlanning
+from template_control.embedding.stride_planning import StridePlanning
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.cli import robustness as command
+from template_control.cli.trials import robustness as command
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.robot.library import load_robot
-from template_control.robustness import campaign as robustness
-from template_control.robustness.campaign import Finding, Level, measure, off_gait, trial
+from template_control.robustness import ladder as robustness
 from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES, Situation
+from template_control.robustness.ladder import Finding, Level, measure, off_gait, trial
 from template_control.robustness.wilson import wilson_interval
 from template_control.run.simulation import perturbed_start, simulate
 from template_control.slip.parameters import SlipParameters
-from template_control.view.robustness_figure import robustness_figure
+from template_control.view.trials.robustness_figure import robustness_figure
 
 DOCS = Path(__file__).parents[1] / "docs"
 BY_NAME = {d.name: d for d in DISTURBANCES}

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from template_control.cli import robustness as command
 from template_control.cli.main import build_parser, main
+from template_control.cli.trials import robustness as command
 from template_control.robot.library import robot_path
 from template_control.robustness.disturbances import DISTURBANCES
 

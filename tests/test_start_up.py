@@ -16,8 +16,8 @@ HEAVY = (
     "rich", "scipy",
 )  # fmt: skip
 COMMANDS = (
-    "walk", "run", "go", "robots", "replay", "plots", "robustness", "slip", "gaits", "automaton",
-    "reproduce",
+    "walk", "run", "go", "robots", "replay", "plots", "robustness", "campaign", "slip", "gaits",
+    "automaton", "reproduce",
 )  # fmt: skip
 ROOMS = (
     "slip", "robot", "whole_body", "embedding", "plant", "run", "robustness", "sweep", "view",

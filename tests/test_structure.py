@@ -33,7 +33,7 @@ SLIP_STAGES = (
     ("maps",),
     ("control",),
     ("gaits",),
-    ("scenario",),
+    ("lateral", "scenario"),
 )
 SHARED = (
     "checks",

@@ -10,8 +10,8 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.library import load_robot
-from template_control.robustness.campaign import off_gait
 from template_control.robustness.disturbances import Situation
+from template_control.robustness.ladder import off_gait
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import perturbed_start, simulate

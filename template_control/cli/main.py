@@ -54,8 +54,12 @@ _COMMANDS = {
     ),
     "plots": _Command("template_control.cli.plots", "draw the figures of a recorded run"),
     "robustness": _Command(
-        "template_control.cli.robustness",
+        "template_control.cli.trials.robustness",
         "raise disturbances until a robot's walk breaks, and tell how much it takes",
+    ),
+    "campaign": _Command(
+        "template_control.cli.trials.campaign",
+        "disturb a robot by everything at once, many times, and tell how sure its gait is",
     ),
     "slip": _Command(
         "template_control.cli.slip",

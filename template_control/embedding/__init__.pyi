@@ -24,6 +24,7 @@ from .planners.running import RunningOptions as RunningOptions
 from .planners.running import RunningPlanner as RunningPlanner
 from .planners.transition import TransitionOptions as TransitionOptions
 from .planners.transition import TransitionPlanner as TransitionPlanner
+from .planning.replan_options import ReplanOptions as ReplanOptions
 from .references.apex_pose import ApexStart as ApexStart
 from .references.apex_pose import apex_pose as apex_pose
 from .references.leg_forces import UnloadOptions as UnloadOptions
@@ -42,4 +43,3 @@ from .standing.planners import StandPlanner as StandPlanner
 from .standing.planners import StartPlanner as StartPlanner
 from .standing.planners import StopPlanner as StopPlanner
 from .standing.pose import standing_pose as standing_pose
-from .stride_planning import ReplanOptions as ReplanOptions

@@ -12,9 +12,9 @@ from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.learners.load import LoadOptions
 from template_control.embedding.learners.momentum_trim import TrimOptions
 from template_control.embedding.phases import PHASES, PhaseControl
+from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.references.leg_forces import UnloadOptions
 from template_control.embedding.references.swing_foot import SwingOptions
-from template_control.embedding.stride_planning import ReplanOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
 from template_control.whole_body.solver import QpOptions

@@ -1,301 +1,262 @@
-"""How much a robot's walk or run takes: every disturbance raised until it breaks.
-
-All disturbances are raised together, one level after the other, each level a sweep whose
-trials are on disk as they finish. A disturbance is left out from the level on where all trials
-fall, or more than half of them twice running; so it goes past the level where none succeeds.
-"""
+"""How sure a gait is: many trials, each with a draw of everything that disturbs, all at once."""
 
 from __future__ import annotations
 
-import hashlib
+from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
-from template_control.checks.checked import checked
+from template_control import settings
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Count, Index
+from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.running import RunningOptions
-from template_control.errors import ParameterError, RobotError, SweepError
-from template_control.robot.planar_biped import PlanarBiped
-from template_control.robustness.disturbances import (
-    AFTER,
-    BEGIN,
-    DISTURBANCES,
-    Disturbance,
-    Situation,
-)
-from template_control.run.config import GaitChoice, RobotChoice, RunConfig
-from template_control.run.options import SimulationOptions
-from template_control.run.record import Record
-from template_control.run.simulation import simulate
-from template_control.slip.gaits.gait import Gait, WalkingGait
-from template_control.slip.gaits.running_gait import RunningGait
-from template_control.sweep.sweep import Item, SweepOptions, sweep
+from template_control.errors import SweepError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ground import GroundStep
+from template_control.plant.mujoco import MujocoOptions
+from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
+from template_control.robustness.fingerprint import fingerprint
+from template_control.robustness.first_wrong import first_wrong
+from template_control.robustness.ladder import off_gait
+from template_control.robustness.mix import Draw, Mix
+from template_control.robustness.wilson import wilson_interval
+from template_control.run.config import GaitChoice, Ready, RobotChoice, RunConfig
+from template_control.run.options import Push, SimulationOptions
+from template_control.run.sensing import SensorOptions
+from template_control.slip.similarity import Scale
+from template_control.sweep.sweep import Item, SweepOptions, item_seed, sweep
 
-SETTLED = 0.02
-"""How near to the gait's mean speed and height at its section a robot must be to be back on it."""
+ASTRAY = 0.03
+"""Share of the gait's mean speed beyond which a robot is off its gait after the last step."""
 
-_LAST = 5  # steps these are averaged over
-_HALF = 0.5
-_QUICK_LEVELS, _QUICK_TRIALS = 2, 2
-_BY_NAME = {d.name: d for d in DISTURBANCES}
-_PACKAGE = Path(__file__).resolve().parents[1]
+_PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions)}
 
 
 @dataclass(frozen=True)
-class Level:
-    """What came of one disturbance at one level.
+class Conditions(Checked):
+    """What is tried.
 
     Attributes:
-        level: the disturbance's size for this robot [SI].
-        succeeded, fell, astray: how many trials; astray is on its feet but not on its gait.
+        robot: which one.
+        gait: that it keeps.
+        plant: kind of the engine.
+        mix: of the disturbances.
+        seed: of the whole campaign; a trial's own follows from it and the trial's number.
+
+    Raises:
+        ParameterError: if a value is of a wrong type or out of its range.
     """
 
-    level: float
-    succeeded: int
-    fell: int
-    astray: int
+    robot: RobotChoice = field(default_factory=RobotChoice)
+    gait: GaitChoice = field(default_factory=GaitChoice)
+    plant: Literal["pybullet", "mujoco"] = "pybullet"
+    mix: Mix = field(default_factory=Mix)
+    seed: Index = 0
 
-    @property
-    def rate(self) -> float:
-        """Share of the trials that succeeded."""
-        return self.succeeded / (self.succeeded + self.fell + self.astray)
+    def draw(self, number: Index) -> Draw:
+        """What disturbs a trial.
 
-    @property
-    def standing(self) -> float:
-        """Share of the trials without a fall."""
-        return 1.0 - self.fell / (self.succeeded + self.fell + self.astray)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What one disturbance does to a robot.
-
-    Attributes:
-        disturbance: the one that was raised.
-        levels: those tried, from mild to severe.
-    """
-
-    disturbance: Disturbance
-    levels: tuple[Level, ...] = ()
-
-    @property
-    def breaking_point(self) -> float | None:
-        """The severest level up to which every trial of each level succeeds, or None."""
-        return _last(self.levels, [level.rate >= 1.0 for level in self.levels])
-
-    @property
-    def half_point(self) -> float | None:
-        """The severest level up to which at least half of each level's trials succeed, or None."""
-        return _last(self.levels, [level.rate >= _HALF for level in self.levels])
-
-    @property
-    def standing_point(self) -> float | None:
-        """The severest level up to which no trial falls, or None."""
-        return _last(self.levels, [level.fell == 0 for level in self.levels])
-
-    @property
-    def broken(self) -> bool:
-        """Whether the disturbance need not be raised further.
-
-        All trials of the last level fell, or more than half of the trials at each of the last two.
+        Args:
+            number: of the trial, from 0.
         """
-        rates = [level.standing for level in self.levels]
-        twice = len(rates) > 1 and max(rates[-2:]) < _HALF
-        return bool(rates) and (rates[-1] == 0.0 or twice)
+        return self.mix.draw(item_seed(self.seed, number))
+
+    def trial(self, number: Index) -> tuple[RunConfig, Ready]:
+        """A trial as a run, and what the run is made of.
+
+        Args:
+            number: of the trial, from 0.
+
+        Raises:
+            TemplateControlError: if robot or gait is not to be had.
+        """
+        planner = RunningOptions() if self.gait.name == "run" else LqrOptions()
+        config = RunConfig(self.robot, self.gait, planner)
+        ready = config.prepare()
+        gait, draw = ready.gait, self.draw(number)
+        scale = Scale.of(gait.parameters)
+        plant = _PLANTS[self.plant](
+            friction=draw.friction,
+            mass_scale=1.0 + draw.mass,
+            ground_step=_ground_step(draw, scale.length, gait.step_length),
+        )
+        z = [*gait.state, 0.0][:3]
+        step, phase = divmod(draw.push_at, 1.0)
+        impulse = draw.push * impulse_unit(gait.parameters)
+        push = Push(impulse, int(step), phase, PUSH_SECONDS * scale.time)
+        delay = round(draw.delay * scale.time / plant.time_step) * plant.time_step
+        simulation = SimulationOptions(
+            steps=self.mix.steps,
+            plant=plant,
+            start=(z[0] * (1.0 + draw.speed), z[1] + draw.height * scale.length, z[2]),
+            pushes=(push,),
+            sensors=SensorOptions.of_size(
+                draw.noise, scale, item_seed(self.seed, number) % 2**_SEED_BITS
+            ),
+            delay=delay,
+        )
+        return replace(config, simulation=simulation), ready
 
 
-def _last(levels: Sequence[Level], good: Sequence[bool]) -> float | None:
-    """The level before the first that is not good; None where that is the first."""
-    count = next((i for i, fine in enumerate(good) if not fine), len(good))
-    return levels[count - 1].level if count else None
+_SEED_BITS = 63  # that TOML can say
+
+
+def _ground_step(draw: Draw, length: float, step_length: float) -> GroundStep | None:
+    height = draw.ground_step * length
+    return GroundStep(height, draw.ground_step_at * step_length) if height != 0.0 else None
+
+
+class Trial(NamedTuple):
+    """What came of one trial.
+
+    Attributes:
+        number: from 0.
+        fell: whether the robot fell.
+        reason: of the fall, "" without one.
+        first: what went wrong first, "" without a fall; see :func:`first_wrong`.
+        speed_error: mean speed of the last 5 steps over the gait's, less one; None after a fall.
+        draw: what disturbed.
+        severity: of the draw.
+    """
+
+    number: int
+    fell: bool
+    reason: str
+    first: str
+    speed_error: float | None
+    draw: Draw
+    severity: float
+
+    @property
+    def astray(self) -> bool:
+        """Whether the robot is on its feet and off its gait."""
+        return self.speed_error is not None and abs(self.speed_error) > ASTRAY
+
+    @property
+    def good(self) -> bool:
+        """Whether it is on its gait."""
+        return not (self.fell or self.astray)
 
 
 @dataclass(frozen=True)
-class Robustness:
-    """Findings for a robot.
+class Campaign:
+    """What came of a campaign.
 
     Attributes:
-        robot: its name.
-        gait: that it kept.
-        speed_error, height_error: undisturbed, relative, as trials are judged.
-        findings: one a disturbance.
+        conditions: that were tried.
+        trials: by number.
     """
 
-    robot: str
-    gait: WalkingGait | RunningGait
-    speed_error: float
-    height_error: float
-    findings: tuple[Finding, ...]
+    conditions: Conditions
+    trials: tuple[Trial, ...]
+
+    @property
+    def fell(self) -> tuple[Trial, ...]:
+        """Trials in which the robot fell."""
+        return tuple(t for t in self.trials if t.fell)
+
+    @property
+    def astray(self) -> tuple[Trial, ...]:
+        """Trials that ended on the feet, off the gait."""
+        return tuple(t for t in self.trials if t.astray)
+
+    @property
+    def reasons(self) -> dict[str, int]:
+        """How many falls began with what."""
+        return dict(Counter(t.first for t in self.fell).most_common())
+
+    def interval(self, of: Sequence[Trial]) -> tuple[float, float]:
+        """Wilson's 95 % interval of the share of some of the trials.
+
+        Args:
+            of: those trials.
+        """
+        return wilson_interval(len(of), len(self.trials))
 
 
-def off_gait(record: Record, gait: Gait) -> tuple[float, float]:
-    """How far a robot's last 5 steps are from its gait, relative to the gait.
+def campaign_trial(conditions: dict[str, Any], number: int) -> dict[str, Any]:
+    """One trial, as a sweep's worker runs it.
 
     Args:
-        record: a run of at least 5 steps, without a fall.
-        gait: the gait to compare with.
+        conditions: as :func:`~.settings.to_table` makes them.
+        number: of the trial, from 0.
 
     Returns:
-        Mean forward speed over the gait's, less one; mean height at the section over the gait's,
-        less one.
+        fell, reason, first, speed_error; see :class:`Trial`.
     """
-    x = np.interp(record.section_time[[-1 - _LAST, -1]], record.time, record.com[:, 0])
-    speed = (x[1] - x[0]) / (record.section_time[-1] - record.section_time[-1 - _LAST])
-    height = record.section_state[-_LAST:, 1].mean()
-    pace = gait.step_length / gait.step_duration
-    return float(speed / pace - 1.0), float(height / gait.state[1] - 1.0)
-
-
-def _situation(robot: str, speed: float | None) -> Situation:
-    """The robot and its gait: a walk, or a run with ``speed`` at apex [m/s]."""
-    choice = RobotChoice(robot)
-    if speed is None:
-        config = RunConfig(choice)
-    else:
-        config = RunConfig(choice, GaitChoice("run", speed), RunningOptions())
-    ready = config.prepare()
-    return Situation(ready.robot, ready.gait, ready.planners[ready.gait.stride])
-
-
-@checked
-def trial(
-    robot: str, disturbance: str, level: float, number: int, speed: float | None = None
-) -> dict[str, Any]:
-    """One walk or run under one disturbance, as a sweep's worker runs it.
-
-    Args:
-        robot: name or URDF path.
-        disturbance: name of the disturbance.
-        level: the disturbance's size for this robot [SI].
-        number: of the trial, from 0; trials of a level differ by it.
-        speed: of a run, dx/dt at apex [m/s]; None: the robot walks.
-
-    Returns:
-        fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
-    """
-    where = _situation(robot, speed)
-    options = _BY_NAME[disturbance].options(where, level, number)
-    record = simulate(where.robot, where.planner, options)
-    errors = (None, None) if record.fell else off_gait(record, where.gait)
+    config, ready = settings.from_table(Conditions, conditions).trial(number)
+    record = ready.run(config.simulation)
     return {
         "fell": record.fell,
         "reason": record.metadata["fall_reason"],
-        "steps": record.steps,
-        "speed_error": errors[0],
-        "height_error": errors[1],
+        "first": first_wrong(record) if record.fell else "",
+        "speed_error": None if record.fell else off_gait(record, ready.gait)[0],
     }
 
 
 @checked
-def measure(
-    robot: str,
-    names: Sequence[str] | None = None,
+def run_campaign(
+    conditions: Conditions,
+    trials: Count,
     folder: Path | None = None,
     executor: Executor | None = None,
-    quick: bool = False,
     progress: bool = True,
-    speed: float | None = None,
-) -> Robustness:
-    """Raise disturbances until the robot's walk or run breaks.
+) -> Campaign:
+    """Run trials, or those that are missing.
+
+    A longer campaign begins with the trials of a shorter one, but has a file of its own.
 
     Args:
-        robot: name or URDF path.
-        names: of the disturbances; None for all.
+        conditions: what is tried.
+        trials: how many.
         folder: for the trials' results, from which the same call goes on; None keeps them in
-            memory. They are those of this code and this URDF: after a change of either all
-            trials are run again.
+            memory. They are those of this code and this URDF.
         executor: where to run the trials; None for one process a core.
-        quick: two levels of two trials each, to see that everything works.
-        progress: show a bar a level on stderr.
-        speed: of a run, dx/dt at apex [m/s]; None: the robot walks.
+        progress: show a bar on stderr.
 
     Raises:
-        ParameterError: if there is no such disturbance.
-        RobotError: if there is no such robot or it falls without a disturbance.
-        GaitError: if no run has this speed.
-        SweepError: if a trial fails for another reason than a fall, or files do not fit.
+        TemplateControlError: if robot or gait is not to be had.
+        SweepError: if a trial ends otherwise than by its steps or a fall, or files do not fit.
     """
-    wanted = set(_BY_NAME if names is None else names)
-    if not wanted or not wanted <= set(_BY_NAME):
-        raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(_BY_NAME)}")
-    where = _situation(robot, speed)
-    model, gait = where.robot, where.gait
-    undisturbed = _undisturbed(robot, where)
-    chosen = [_shortened(d, quick) for d in DISTURBANCES if d.name in wanted]
-    levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
-    moving: Item = {} if speed is None else {"speed": speed}
-    stem = _fingerprint(model, chosen, moving)
-    found = {d.name: Finding(d) for d in chosen}
-    for index in range(max(len(of) for of in levels.values())):
-        going = [d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken]
-        items: list[Item] = [
-            {
-                "robot": robot,
-                "disturbance": d.name,
-                "level": levels[d.name][index],
-                "number": i,
-                **moving,
-            }
-            for d in going
-            for i in range(d.trials)
-        ]
-        if not items:
-            break
-        done = sweep(
-            trial,
-            items,
-            None if folder is None else folder / f"trials-{stem}-{index + 1:02d}.jsonl",
-            executor,
-            options=SweepOptions(progress, label=f"level {index + 1}", retry_failed=True),
-        )
-        for i, reason in done.failures.items():
-            raise SweepError(f"trial {items[i]} came to no end: {reason}")
-        results = iter(done.results)
-        for d in going:
-            of_level = [next(results) for _ in range(d.trials)]
-            level = _judged(d, levels[d.name][index], of_level)
-            found[d.name] = Finding(d, (*found[d.name].levels, level))
-    errors = off_gait(undisturbed, gait)
-    return Robustness(model.name, gait, *errors, findings=tuple(found[d.name] for d in chosen))
-
-
-def _undisturbed(robot: str, where: Situation) -> Record:
-    record = simulate(where.robot, where.planner, SimulationOptions(steps=BEGIN + 1 + AFTER))
-    if record.fell:
-        raise RobotError(
-            f"{robot} falls without a disturbance ({record.metadata['fall_reason']}):"
-            " there is no robustness to measure; make it go first"
-        )
-    return record
-
-
-def _shortened(disturbance: Disturbance, quick: bool) -> Disturbance:
-    if not quick:
-        return disturbance
-    return replace(disturbance, levels=disturbance.levels[:_QUICK_LEVELS], trials=_QUICK_TRIALS)
-
-
-def _judged(disturbance: Disturbance, level: float, results: list[dict[str, Any]]) -> Level:
-    """Count the trials of one level."""
-    fell = sum(r["fell"] for r in results)
-    astray = sum(
-        not r["fell"] and max(abs(r["speed_error"]), abs(r["height_error"])) > SETTLED
-        for r in results
+    _, ready = conditions.trial(0)  # a mistake is told before a worker meets it
+    table = settings.to_table(conditions)
+    items: list[Item] = [{"conditions": table, "number": i} for i in range(trials)]
+    stem = fingerprint(ready.robot, table)
+    done = sweep(
+        campaign_trial,
+        items,
+        None if folder is None else folder / f"trials-{stem}-{trials}.jsonl",
+        executor,
+        conditions.seed,
+        SweepOptions(progress, label="trials", retry_failed=True),
     )
-    if not disturbance.passing:
-        astray = 0
-    return Level(level, len(results) - fell - astray, fell, astray)
+    for i, reason in done.failures.items():
+        raise SweepError(f"trial {i} came to no end: {reason}")
+    found = []
+    for i, result in enumerate(done.results):
+        draw = conditions.draw(i)
+        found.append(Trial(number=i, draw=draw, severity=conditions.mix.severity(draw), **result))
+    return Campaign(conditions, tuple(found))
 
 
-def _fingerprint(model: PlanarBiped, chosen: Sequence[Disturbance], moving: Item) -> str:
-    """What the trials' results depend on: this package's code, the URDF, gait, the trials."""
-    digest = hashlib.sha256(model.urdf.encode())
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        digest.update(path.read_bytes())
-    trials = [(d.name, d.levels, d.trials) for d in chosen]
-    digest.update(repr((trials, moving)).encode())
-    return digest.hexdigest()[:10]
+def save_falls(campaign: Campaign, folder: Path) -> dict[int, Path]:
+    """Write each trial that went wrong as a run that ``walk --config`` or ``run --config`` repeats.
+
+    Args:
+        campaign: whose trials.
+        folder: for ``trial-NUMBER.toml``.
+
+    Returns:
+        The files by number of the trial.
+
+    Raises:
+        RecordError: if a file cannot be written.
+    """
+    return {
+        t.number: campaign.conditions.trial(t.number)[0].save(folder / f"trial-{t.number:04d}.toml")
+        for t in (*campaign.fell, *campaign.astray)
+    }

@@ -37,7 +37,9 @@ _SOON = 4  # steps of a robot that starts off its gait before a step of the grou
 _PHASES = 10  # of the step in which a push begins
 _EDGES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the way between two footholds
 _STARTS = 5  # seeds of the starts off the gait
-_PUSH_SECONDS = 0.1
+PUSH_SECONDS = 0.1
+"""How long a push lasts on the reference template."""
+
 _TIME_STEP = PlantOptions().time_step
 
 
@@ -152,13 +154,17 @@ def _time(parameters: SlipParameters) -> float:
     return Scale.of(parameters).time
 
 
-def _impulse(parameters: SlipParameters) -> float:
-    """M sqrt(g l0)."""
+def impulse_unit(parameters: SlipParameters) -> float:
+    """What an impulse for the reference template is multiplied by: M sqrt(g l0) over its own.
+
+    Args:
+        parameters: of a robot's template.
+    """
     return parameters.mass / REFERENCE.mass * Scale.of(parameters).speed
 
 
 def _pushed(where: Situation, level: float, trial: int) -> SimulationOptions:
-    push = Push(level, BEGIN, trial / _PHASES, _PUSH_SECONDS * where.scale.time)
+    push = Push(level, BEGIN, trial / _PHASES, PUSH_SECONDS * where.scale.time)
     return SimulationOptions(steps=BEGIN + 1 + AFTER, pushes=(push,))
 
 
@@ -235,7 +241,7 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         _NEWTON_SECONDS,
         _PUSHES,
         _PHASES,
-        _impulse,
+        impulse_unit,
         _pushed,
         passing=True,
     ),
@@ -245,7 +251,7 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         _NEWTON_SECONDS,
         _PUSHES,
         _PHASES,
-        _impulse,
+        impulse_unit,
         _pushed_back,
         passing=True,
     ),

@@ -77,6 +77,7 @@ class TemplatePath:
     """Consecutive strides of the template, in one time and one world frame.
 
     Attributes:
+        strides: of which it is made, from its start on.
         curve: the segments.
         events: time on the path [s] and guard of each event.
         landings: next touchdown of the leg that is rear, and of the one that is front, at the
@@ -87,6 +88,7 @@ class TemplatePath:
         duration: end of the last segment [s].
     """
 
+    strides: tuple[Stride, ...]
     curve: Curve
     events: tuple[tuple[float, Event], ...]
     landings: tuple[Landing, Landing]
@@ -139,6 +141,7 @@ def join(strides: Sequence[Stride], options: PathOptions | None = None) -> Templ
     meta = np.concatenate(metas)
     o = options or PathOptions()
     return TemplatePath(
+        strides=tuple(strides),
         curve=Curve(
             coefficients=np.concatenate([(s.cx, s.cy) for s in strides], axis=1),
             meta=meta,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,18 +15,19 @@ from template_control.cli.options.gait import SPEEDS
 from template_control.cli.options.ranges import check_ranges
 from template_control.cli.options.robot import add_robot
 from template_control.cli.report.output import INTERRUPTED
+from template_control.cli.trials.workers import add_workers, worker_count
 from template_control.errors import ParameterError
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.library import load_robot
-from template_control.robustness.campaign import SETTLED, Finding, Robustness, measure
 from template_control.robustness.disturbances import AFTER, DISTURBANCES
+from template_control.robustness.ladder import SETTLED, Finding, Robustness, measure
 from template_control.run.config import GaitChoice
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writable
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
 from template_control.view.figure_file import save_figure
-from template_control.view.robustness_figure import robustness_figure
+from template_control.view.trials.robustness_figure import robustness_figure
 
 _NAMES = tuple(d.name for d in DISTURBANCES)
 _COLUMNS = (
@@ -38,7 +38,6 @@ _COLUMNS = (
     "none falls up to",
     "first failures",
 )
-_MOST_WORKERS = 1000
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -71,13 +70,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="two levels of two trials each, to see that it works"
     )
-    parser.add_argument(
-        "--workers",
-        type=int,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes that run trials",
-    )
+    add_workers(parser)
     parser.add_argument(
         "--output",
         type=Path,
@@ -99,15 +92,12 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ParameterError: if the number of workers is out of its range, or a walk is given a speed.
     """
-    if not 1 <= options.workers <= _MOST_WORKERS:
-        raise ParameterError(
-            f"--workers is {options.workers}: give a number from 1 to {_MOST_WORKERS}"
-        )
+    count = worker_count(options)
     speed, name = _speed(options), Path(options.robot).stem  # before a folder is made for it
     name += "" if speed is None else "-run"
     folder = writable(options.output or Path("runs/robustness") / name)
     try:
-        with workers(options.workers) as pool, stdout_to_stderr():
+        with workers(count) as pool, stdout_to_stderr():
             found = measure(
                 options.robot, options.disturbance, folder, pool, options.quick, speed=speed
             )

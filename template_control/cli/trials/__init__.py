@@ -1,0 +1,1 @@
+"""Commands that make many trials of a robot: robustness level by level, and campaigns."""

@@ -1,0 +1,245 @@
+"""``template-control campaign``: how sure a gait is, with everything disturbed at once."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from rich.table import Table
+
+from template_control import settings
+from template_control.cli.options.ranges import check_ranges
+from template_control.cli.options.robot import add_robot_options, robot_choice
+from template_control.cli.report.output import INTERRUPTED
+from template_control.cli.trials.workers import add_workers, worker_count
+from template_control.plant.quiet import stdout_to_stderr
+from template_control.robustness.campaign import (
+    ASTRAY,
+    Campaign,
+    Conditions,
+    Trial,
+    run_campaign,
+    save_falls,
+)
+from template_control.robustness.mix import Mix
+from template_control.run.config import GaitChoice, RobotChoice
+from template_control.storage import Files, writable, write_text
+from template_control.sweep.executor import workers
+from template_control.terminal import plain_console
+from template_control.view.figure_file import save_figure
+from template_control.view.trials.campaign_figure import campaign_figure
+
+_MIX = Mix()
+_RANGES = {"trials": (1, 1_000_000), "severity": (0.0, 100.0), "seed": (0, 2**63 - 1)}
+_LISTED = 20  # trials that went wrong, at most, in the printed table
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the command's description and options."""
+    parser.description = (
+        "Walk or run a robot many times, each time with start, friction, mass, push, ground step,"
+        " noise and delay drawn at once from a mix, which the controller does not know. Tells"
+        f" the share of falls and of trials that end more than {100 * ASTRAY:g} % off the"
+        " gait's speed, with Wilson's 95 % intervals; lists what went wrong first in each fall,"
+        " and writes a file that repeats it. Ctrl-C and the same command again go on where it was."
+        " Exit status: 0, 2 for bad input, 130 after Ctrl-C."
+    )
+    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
+    add_robot_options(parser)
+    parser.add_argument("--gait", choices=("walk", "run"), default="walk", help="what it keeps")
+    parser.add_argument(
+        "--speed", type=float, metavar="M/S", help="of the gait, as walk or run take it"
+    )
+    parser.add_argument(
+        "--plant", choices=("pybullet", "mujoco"), default="pybullet", help="physics engine"
+    )
+    parser.add_argument("--trials", type=int, default=100, metavar="N", help="how many")
+    parser.add_argument(
+        "--mix",
+        type=Path,
+        metavar="TOML",
+        help="ranges that the trials are drawn from; a mix.toml of an earlier campaign is one to"
+        " begin with",
+    )
+    parser.add_argument(
+        "--severity",
+        type=float,
+        default=1.0,
+        metavar="FACTOR",
+        help="all ranges so many times as wide about where nothing disturbs",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of all draws")
+    add_workers(parser)
+    parser.add_argument(
+        "--output",
+        type=Path,
+        help="folder for results, figure and falls; by default runs/campaign/ROBOT, with the"
+        " gait's name if it is a run, and the engine's if it is not PyBullet",
+    )
+    printed = parser.add_mutually_exclusive_group()
+    printed.add_argument(
+        "--json", action="store_true", help="print JSON, and nothing else, on stdout"
+    )
+    printed.add_argument(
+        "--markdown", action="store_true", help="print the table as Markdown on stdout"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the trials as told; returns 0, or 130 after Ctrl-C.
+
+    Raises:
+        TemplateControlError: naming the option that is wrong.
+    """
+    check_ranges(options, _RANGES)
+    count = worker_count(options)
+    mix = _MIX if options.mix is None else settings.read(Mix, options.mix)
+    conditions = Conditions(
+        robot_choice(options, RobotChoice()),
+        GaitChoice(options.gait, options.speed),
+        options.plant,
+        mix.times(options.severity),
+        options.seed,
+    )
+    robot = conditions.trial(0)[1].robot  # before a folder is made for it
+    folder = writable(options.output or Path("runs/campaign") / _name(robot.name, conditions))
+    try:
+        with workers(count) as pool, stdout_to_stderr():
+            found = run_campaign(conditions, options.trials, folder, pool)
+    except KeyboardInterrupt:
+        print(
+            f"template-control: interrupted; finished trials are in {folder}, the same command"
+            " goes on from there",
+            file=sys.stderr,
+        )
+        return INTERRUPTED
+    files = Files()
+    files.write(lambda: _save_mix(conditions.mix, folder))
+    falls = files.write(lambda: save_falls(found, folder)) or {}
+    figure = files.write(lambda: _draw(found, folder))
+    if options.json:
+        print(json.dumps({**data(found, falls), "figure": None if figure is None else str(figure)}))
+    elif options.markdown:
+        print(markdown(found))
+    else:
+        _print_tables(found, falls, figure)
+    files.tell()
+    return 0
+
+
+def _name(robot: str, conditions: Conditions) -> str:
+    parts = [robot]
+    if conditions.gait.name != "walk":
+        parts.append(conditions.gait.name)
+    if conditions.plant != Conditions().plant:
+        parts.append(conditions.plant)
+    return "-".join(parts)
+
+
+def _save_mix(mix: Mix, folder: Path) -> Path:
+    head = "# template-control campaign --mix FILE draws from these ranges.\n"
+    return write_text(folder / "mix.toml", head + settings.text(settings.to_table(mix)))
+
+
+def _draw(found: Campaign, folder: Path) -> Path:
+    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        return save_figure(campaign_figure(found), folder / "campaign.png")
+
+
+def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:
+    """The campaign as plain data.
+
+    Args:
+        found: the campaign.
+        falls: the file of each trial that went wrong, by number.
+
+    Returns:
+        robot, gait, plant, trials, mix; fell and astray (count, share, and low and high of its
+        95 % interval); reasons (count by what went wrong first); wrong: number, fell, reason,
+        first, speed_error, severity, config.
+    """
+    conditions = found.conditions
+    return {
+        "robot": conditions.robot.model,
+        "gait": settings.to_table(conditions.gait),
+        "plant": conditions.plant,
+        "trials": len(found.trials),
+        "mix": settings.to_table(conditions.mix),
+        "fell": _share(found, found.fell),
+        "astray": _share(found, found.astray),
+        "reasons": found.reasons,
+        "wrong": [
+            {
+                "number": t.number,
+                "fell": t.fell,
+                "reason": t.reason,
+                "first": t.first,
+                "speed_error": t.speed_error,
+                "severity": t.severity,
+                "config": str(falls[t.number]) if t.number in falls else None,
+            }
+            for t in (*found.fell, *found.astray)
+        ],
+    }
+
+
+def _share(found: Campaign, of: tuple[Trial, ...]) -> dict[str, float]:
+    low, high = found.interval(of)
+    return {"count": len(of), "share": len(of) / len(found.trials), "low": low, "high": high}
+
+
+def _rows(found: Campaign) -> list[tuple[str, str, str, str]]:
+    rows = []
+    for name, of in (("fell", found.fell), ("off its gait", found.astray)):
+        low, high = found.interval(of)
+        share = len(of) / len(found.trials)
+        rows.append((name, str(len(of)), f"{share:.2%}", f"{low:.2%} to {high:.2%}"))
+    return rows
+
+
+_COLUMNS = ("of the trials", "count", "share", "with 95 % confidence")
+
+
+def _title(found: Campaign) -> str:
+    c = found.conditions
+    speed = "" if c.gait.speed is None else f" at {c.gait.speed:g} m/s"
+    return f"{c.robot.model}, {c.gait.name}{speed}, in {c.plant}: {len(found.trials)} trials"
+
+
+def markdown(found: Campaign) -> str:
+    """The shares as a table of Markdown, and what the falls began with."""
+    rows = [_COLUMNS, tuple("---" for _ in _COLUMNS), *_rows(found)]
+    lines = [_title(found) + ":", "", *("| " + " | ".join(r) + " |" for r in rows)]
+    if found.reasons:
+        told = ", ".join(f"{name} {count}" for name, count in found.reasons.items())
+        lines += ["", f"The falls began with: {told}."]
+    return "\n".join(lines)
+
+
+def _print_tables(found: Campaign, falls: dict[int, Path], figure: Path | None) -> None:
+    console = plain_console()
+    table = Table(title=_title(found))
+    for column in _COLUMNS:
+        table.add_column(column)
+    for row in _rows(found):
+        table.add_row(*row)
+    console.print(table)
+    wrong = (*found.fell, *found.astray)
+    if wrong:
+        listed = Table(title="what went wrong")
+        for column in ("trial", "first", "how it ended", "repeat it with"):
+            listed.add_column(column)
+        for t in wrong[:_LISTED]:
+            end = t.reason or f"{t.speed_error or 0.0:+.1%} in speed"
+            file = falls.get(t.number)
+            command = "" if file is None else f"{found.conditions.gait.name} --config {file}"
+            listed.add_row(str(t.number), t.first, end, command)
+        console.print(listed)
+        if len(wrong) > _LISTED:
+            console.print(f"and {len(wrong) - _LISTED} more, each with its file beside these")
+    if figure is not None:
+        console.print(f"figure: {figure}", highlight=False)

@@ -1,0 +1,40 @@
+"""When a stride is planned anew between two sections."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive, Range, Share
+from template_control.embedding.references.template_path import PathOptions
+from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
+
+
+@dataclass(frozen=True)
+class ReplanOptions(Checked):
+    """When a stride is planned anew between two sections, and from where.
+
+    Attributes:
+        speed: deviation of the forward speed from the path's [m/s].
+        interval: shortest time between such plans [s].
+        patience: a touchdown that is later than this [s] is not waited for on the same path.
+        angle_drop: the touchdown angle is then taken to be lower by this [rad].
+        agility: a touchdown in t seconds can still be planned anew with an angle that differs
+            from the old one by this times t^2 [rad/s^2]; the swing foot cannot do more.
+        foresight: t counts as this at most [s]; where no touchdown is due it has no bound.
+        calmer: shares of dy/dt, tried in turn, of the states that a path starts from where the
+            template cannot go on from the robot's: its leg cannot pull, the robot's can.
+        highest: height over l0 above which no such path starts.
+        path: how the robot's place on the path is looked for.
+    """
+
+    speed: Annotated[float, Range(0.0, endless=True)] = tuned(0.05, SPEED)
+    interval: NotNegative = tuned(0.02, TIME)
+    patience: Annotated[float, Range(0.0, endless=True)] = tuned(0.01, TIME)
+    angle_drop: NotNegative = tuned(0.15)
+    agility: NotNegative = tuned(8.0, RATE_SQUARED)
+    foresight: NotNegative = tuned(1.0, TIME)
+    calmer: tuple[Share, ...] = tuned((0.5, 0.0))
+    highest: Positive = tuned(0.99)
+    path: PathOptions = field(default_factory=PathOptions)

@@ -1,0 +1,84 @@
+"""The planners of a route: which one plans a stride, and from where."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import Decision, Planner, Planners
+from template_control.embedding.planning.replan_options import ReplanOptions
+from template_control.errors import ParameterError
+from template_control.slip.maps.section import Section
+from template_control.slip.scenario.route import Route, StrideGoal
+
+Array = NDArray[np.float64]
+
+
+class RoutePlanners:
+    """Decides at the sections of a route.
+
+    Args:
+        route: which stride comes next, and towards which state.
+        planners: one for each kind of stride of the route.
+        options: from which states a path starts where the robot's leads nowhere.
+    """
+
+    def __init__(self, route: Route, planners: Planners, options: ReplanOptions) -> None:
+        self.route = route
+        self.planners = planners
+        self.options = options
+
+    def reset(self) -> None:
+        """Forget an earlier run."""
+        self.route.reset()
+        for planner in self.planners.values():
+            planner.reset()
+
+    def first_goal(self) -> StrideGoal:
+        """The stride that the route begins with.
+
+        Raises:
+            ParameterError: if the route is empty.
+        """
+        goal = self.route.ahead(self.route.section, self.route.start, 0.0)
+        if goal is None:
+            raise ParameterError("the route ends where it begins: give one with a stride")
+        return goal
+
+    def of(self, goal: StrideGoal) -> Planner:
+        """The planner of a goal's stride.
+
+        Raises:
+            ParameterError: if there is none.
+        """
+        if goal.stride not in self.planners:
+            raise ParameterError(
+                f"the route asks for a stride {goal.stride!r}, and there are planners for"
+                f" {', '.join(self.planners)}: give one for it too, or another route"
+            )
+        return self.planners[goal.stride]
+
+    def plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
+        """A decision at ``z``, and the section state from which its path starts.
+
+        The template's leg ends at l0, cannot pull, and pushes as its spring does; the robot's
+        need not. Where the template would leave the ground or come to no second stride, the
+        path starts from a state that does, and the robot is let down or pushed up to it.
+
+        Args:
+            section: that was reached.
+            z: (n,) state there.
+            goal: the stride that begins.
+        """
+        o, planner = self.options, self.of(goal)
+        decision = planner.decide(z, goal.target)
+        if decision.lasting:
+            return decision, z
+        for share in o.calmer:
+            start = section.calmer(z, share, o.highest * self.route.parameters.rest_length)
+            calmer = planner.decide(start, goal.target)
+            if calmer.lasting:
+                return replace(calmer, feasible=decision.feasible, nominal=False), start
+        return decision, z

@@ -1,0 +1,123 @@
+"""What went wrong first, before a robot fell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.run.record import Record
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
+
+_LOOKED_AT = 4  # strides before the fall
+_LATE = 1.3  # step durations of the gait, after which a stride is late
+_LIMIT, _AT_LIMIT = 0.999, 0.02  # share of the torque limit; how long, on the reference [s]
+_SLIP = 0.02  # of l0, that a foot slides since it bears
+_BEARS = 0.05  # share of the weight that a foot bears when it stands
+_STRAIGHT = 0.998  # of the leg's length, that a knee is straight from on
+_WALL = 2.0  # times the friction, which only an edge of the ground can press with
+
+
+def first_wrong(record: Record) -> str:
+    """The first of these that happened in the four strides before a fall.
+
+    ``failed QP``; ``torque limit``: a joint is at its limit for 20 ms on end; ``slip``: a loaded
+    foot slides by 2 % of l0; ``stumble``: a foot is pressed backwards by more than friction can;
+    ``reach``: a loaded leg is straight; ``late``: no section for 1.3 step durations. Times are
+    those of the reference template.
+
+    Args:
+        record: a run that fell, every sample kept.
+
+    Returns:
+        The name; "none of these" if there is none.
+    """
+    begin = record.section_time[max(len(record.section_time) - _LOOKED_AT, 0)]
+    since = int(np.searchsorted(record.time, begin))
+    found = {}
+    for name, look in _LOOKS.items():
+        wrong = np.flatnonzero(look(record)[since:])
+        if len(wrong):
+            found[name] = int(wrong[0])
+    return min(found, key=lambda name: found[name]) if found else "none of these"
+
+
+def _template(record: Record) -> SlipParameters:
+    return SlipParameters(**record.metadata["template"])
+
+
+def _bears(record: Record) -> NDArray[np.bool_]:
+    """(T, 2) which feet are loaded."""
+    weight = record.metadata["mass"] * _template(record).gravity
+    return np.asarray(record.contact_force[:, :, 1] > _BEARS * weight)
+
+
+def _failed(record: Record) -> NDArray[np.bool_]:
+    return ~np.asarray(record.solved, dtype=bool)
+
+
+def _limited(record: Record) -> NDArray[np.bool_]:
+    at_limit = np.abs(record.torque) >= _LIMIT * np.array(record.metadata["torque_limit"])
+    long = _AT_LIMIT * Scale.of(_template(record)).time
+    wrong = np.zeros(len(record.time), dtype=bool)
+    for joint in at_limit.T:
+        wrong |= _lasts(joint, record.time) >= long
+    return wrong
+
+
+def _slipped(record: Record) -> NDArray[np.bool_]:
+    wrong = np.zeros(len(record.time), dtype=bool)
+    for foot, bears in enumerate(_bears(record).T):
+        x = record.foot[:, foot, 0]
+        wrong |= bears & (np.abs(x - _at_begin(x, bears)) > _SLIP * _template(record).rest_length)
+    return wrong
+
+
+def _stumbled(record: Record) -> NDArray[np.bool_]:
+    friction = record.metadata["options"]["plant"].get("friction", np.inf)
+    weight = record.metadata["mass"] * _template(record).gravity
+    force = record.contact_force
+    pressed = -force[:, :, 0] > np.maximum(_WALL * friction * force[:, :, 1], _BEARS * weight)
+    return np.asarray(pressed.any(axis=1))
+
+
+def _stretched(record: Record) -> NDArray[np.bool_]:
+    legs = record.metadata["legs"]
+    wrong = np.zeros(len(record.time), dtype=bool)
+    for foot, (leg, bears) in enumerate(zip(legs, _bears(record).T, strict=True)):
+        hip, knee, tip = record.joint[:, leg[0]], record.joint[:, leg[1]], record.foot[:, foot]
+        whole = np.linalg.norm(hip - knee, axis=1) + np.linalg.norm(knee - tip, axis=1)
+        wrong |= bears & (np.linalg.norm(hip - tip, axis=1) > _STRAIGHT * whole)
+    return wrong
+
+
+def _late(record: Record) -> NDArray[np.bool_]:
+    index = np.searchsorted(record.section_time, record.time, side="right") - 1
+    waited = record.time - record.section_time[np.maximum(index, 0)]
+    durations = np.diff(record.section_time)
+    usual = float(np.median(durations)) if len(durations) else np.inf
+    return np.asarray(waited > _LATE * usual)
+
+
+def _lasts(true: NDArray[np.bool_], time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T,) for how long it has been true."""
+    return np.where(true, time - _at_begin(time, true), 0.0)
+
+
+def _at_begin(value: NDArray[np.float64], true: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(T,) the value where the present stretch of ``true`` began; undefined outside of it."""
+    begins = true & ~np.concatenate(([False], true[:-1]))
+    last = np.maximum.accumulate(np.where(begins, np.arange(len(true)), 0))
+    return np.asarray(value[last])
+
+
+_LOOKS: dict[str, Callable[[Record], NDArray[np.bool_]]] = {
+    "failed QP": _failed,
+    "torque limit": _limited,
+    "slip": _slipped,
+    "stumble": _stumbled,
+    "reach": _stretched,
+    "late": _late,
+}

@@ -1,0 +1,290 @@
+"""How much a robot's walk or run takes: every disturbance raised until it breaks.
+
+All disturbances are raised together, one level after the other, each level a sweep whose
+trials are on disk as they finish. A disturbance is left out from the level on where all trials
+fall, or more than half of them twice running; so it goes past the level where none succeeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from template_control.checks.checked import checked
+from template_control.embedding.planners.running import RunningOptions
+from template_control.errors import ParameterError, RobotError, SweepError
+from template_control.robustness.disturbances import (
+    AFTER,
+    BEGIN,
+    DISTURBANCES,
+    Disturbance,
+    Situation,
+)
+from template_control.robustness.fingerprint import fingerprint
+from template_control.run.config import GaitChoice, RobotChoice, RunConfig
+from template_control.run.options import SimulationOptions
+from template_control.run.record import Record
+from template_control.run.simulation import simulate
+from template_control.slip.gaits.gait import Gait, WalkingGait
+from template_control.slip.gaits.running_gait import RunningGait
+from template_control.sweep.sweep import Item, SweepOptions, sweep
+
+SETTLED = 0.02
+"""How near to the gait's mean speed and height at its section a robot must be to be back on it."""
+
+_LAST = 5  # steps these are averaged over
+_HALF = 0.5
+_QUICK_LEVELS, _QUICK_TRIALS = 2, 2
+_BY_NAME = {d.name: d for d in DISTURBANCES}
+
+
+@dataclass(frozen=True)
+class Level:
+    """What came of one disturbance at one level.
+
+    Attributes:
+        level: the disturbance's size for this robot [SI].
+        succeeded, fell, astray: how many trials; astray is on its feet but not on its gait.
+    """
+
+    level: float
+    succeeded: int
+    fell: int
+    astray: int
+
+    @property
+    def rate(self) -> float:
+        """Share of the trials that succeeded."""
+        return self.succeeded / (self.succeeded + self.fell + self.astray)
+
+    @property
+    def standing(self) -> float:
+        """Share of the trials without a fall."""
+        return 1.0 - self.fell / (self.succeeded + self.fell + self.astray)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one disturbance does to a robot.
+
+    Attributes:
+        disturbance: the one that was raised.
+        levels: those tried, from mild to severe.
+    """
+
+    disturbance: Disturbance
+    levels: tuple[Level, ...] = ()
+
+    @property
+    def breaking_point(self) -> float | None:
+        """The severest level up to which every trial of each level succeeds, or None."""
+        return _last(self.levels, [level.rate >= 1.0 for level in self.levels])
+
+    @property
+    def half_point(self) -> float | None:
+        """The severest level up to which at least half of each level's trials succeed, or None."""
+        return _last(self.levels, [level.rate >= _HALF for level in self.levels])
+
+    @property
+    def standing_point(self) -> float | None:
+        """The severest level up to which no trial falls, or None."""
+        return _last(self.levels, [level.fell == 0 for level in self.levels])
+
+    @property
+    def broken(self) -> bool:
+        """Whether the disturbance need not be raised further.
+
+        All trials of the last level fell, or more than half of the trials at each of the last two.
+        """
+        rates = [level.standing for level in self.levels]
+        twice = len(rates) > 1 and max(rates[-2:]) < _HALF
+        return bool(rates) and (rates[-1] == 0.0 or twice)
+
+
+def _last(levels: Sequence[Level], good: Sequence[bool]) -> float | None:
+    """The level before the first that is not good; None where that is the first."""
+    count = next((i for i, fine in enumerate(good) if not fine), len(good))
+    return levels[count - 1].level if count else None
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """Findings for a robot.
+
+    Attributes:
+        robot: its name.
+        gait: that it kept.
+        speed_error, height_error: undisturbed, relative, as trials are judged.
+        findings: one a disturbance.
+    """
+
+    robot: str
+    gait: WalkingGait | RunningGait
+    speed_error: float
+    height_error: float
+    findings: tuple[Finding, ...]
+
+
+def off_gait(record: Record, gait: Gait) -> tuple[float, float]:
+    """How far a robot's last 5 steps are from its gait, relative to the gait.
+
+    Args:
+        record: a run of at least 5 steps, without a fall.
+        gait: the gait to compare with.
+
+    Returns:
+        Mean forward speed over the gait's, less one; mean height at the section over the gait's,
+        less one.
+    """
+    x = np.interp(record.section_time[[-1 - _LAST, -1]], record.time, record.com[:, 0])
+    speed = (x[1] - x[0]) / (record.section_time[-1] - record.section_time[-1 - _LAST])
+    height = record.section_state[-_LAST:, 1].mean()
+    pace = gait.step_length / gait.step_duration
+    return float(speed / pace - 1.0), float(height / gait.state[1] - 1.0)
+
+
+def _situation(robot: str, speed: float | None) -> Situation:
+    """The robot and its gait: a walk, or a run with ``speed`` at apex [m/s]."""
+    choice = RobotChoice(robot)
+    if speed is None:
+        config = RunConfig(choice)
+    else:
+        config = RunConfig(choice, GaitChoice("run", speed), RunningOptions())
+    ready = config.prepare()
+    return Situation(ready.robot, ready.gait, ready.planners[ready.gait.stride])
+
+
+@checked
+def trial(
+    robot: str, disturbance: str, level: float, number: int, speed: float | None = None
+) -> dict[str, Any]:
+    """One walk or run under one disturbance, as a sweep's worker runs it.
+
+    Args:
+        robot: name or URDF path.
+        disturbance: name of the disturbance.
+        level: the disturbance's size for this robot [SI].
+        number: of the trial, from 0; trials of a level differ by it.
+        speed: of a run, dx/dt at apex [m/s]; None: the robot walks.
+
+    Returns:
+        fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
+    """
+    where = _situation(robot, speed)
+    options = _BY_NAME[disturbance].options(where, level, number)
+    record = simulate(where.robot, where.planner, options)
+    errors = (None, None) if record.fell else off_gait(record, where.gait)
+    return {
+        "fell": record.fell,
+        "reason": record.metadata["fall_reason"],
+        "steps": record.steps,
+        "speed_error": errors[0],
+        "height_error": errors[1],
+    }
+
+
+@checked
+def measure(
+    robot: str,
+    names: Sequence[str] | None = None,
+    folder: Path | None = None,
+    executor: Executor | None = None,
+    quick: bool = False,
+    progress: bool = True,
+    speed: float | None = None,
+) -> Robustness:
+    """Raise disturbances until the robot's walk or run breaks.
+
+    Args:
+        robot: name or URDF path.
+        names: of the disturbances; None for all.
+        folder: for the trials' results, from which the same call goes on; None keeps them in
+            memory. They are those of this code and this URDF: after a change of either all
+            trials are run again.
+        executor: where to run the trials; None for one process a core.
+        quick: two levels of two trials each, to see that everything works.
+        progress: show a bar a level on stderr.
+        speed: of a run, dx/dt at apex [m/s]; None: the robot walks.
+
+    Raises:
+        ParameterError: if there is no such disturbance.
+        RobotError: if there is no such robot or it falls without a disturbance.
+        GaitError: if no run has this speed.
+        SweepError: if a trial fails for another reason than a fall, or files do not fit.
+    """
+    wanted = set(_BY_NAME if names is None else names)
+    if not wanted or not wanted <= set(_BY_NAME):
+        raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(_BY_NAME)}")
+    where = _situation(robot, speed)
+    model, gait = where.robot, where.gait
+    undisturbed = _undisturbed(robot, where)
+    chosen = [_shortened(d, quick) for d in DISTURBANCES if d.name in wanted]
+    levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
+    moving: Item = {} if speed is None else {"speed": speed}
+    trials = [(d.name, d.levels, d.trials) for d in chosen]
+    stem = fingerprint(model, trials, moving)
+    found = {d.name: Finding(d) for d in chosen}
+    for index in range(max(len(of) for of in levels.values())):
+        going = [d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken]
+        items: list[Item] = [
+            {
+                "robot": robot,
+                "disturbance": d.name,
+                "level": levels[d.name][index],
+                "number": i,
+                **moving,
+            }
+            for d in going
+            for i in range(d.trials)
+        ]
+        if not items:
+            break
+        done = sweep(
+            trial,
+            items,
+            None if folder is None else folder / f"trials-{stem}-{index + 1:02d}.jsonl",
+            executor,
+            options=SweepOptions(progress, label=f"level {index + 1}", retry_failed=True),
+        )
+        for i, reason in done.failures.items():
+            raise SweepError(f"trial {items[i]} came to no end: {reason}")
+        results = iter(done.results)
+        for d in going:
+            of_level = [next(results) for _ in range(d.trials)]
+            level = _judged(d, levels[d.name][index], of_level)
+            found[d.name] = Finding(d, (*found[d.name].levels, level))
+    errors = off_gait(undisturbed, gait)
+    return Robustness(model.name, gait, *errors, findings=tuple(found[d.name] for d in chosen))
+
+
+def _undisturbed(robot: str, where: Situation) -> Record:
+    record = simulate(where.robot, where.planner, SimulationOptions(steps=BEGIN + 1 + AFTER))
+    if record.fell:
+        raise RobotError(
+            f"{robot} falls without a disturbance ({record.metadata['fall_reason']}):"
+            " there is no robustness to measure; make it go first"
+        )
+    return record
+
+
+def _shortened(disturbance: Disturbance, quick: bool) -> Disturbance:
+    if not quick:
+        return disturbance
+    return replace(disturbance, levels=disturbance.levels[:_QUICK_LEVELS], trials=_QUICK_TRIALS)
+
+
+def _judged(disturbance: Disturbance, level: float, results: list[dict[str, Any]]) -> Level:
+    """Count the trials of one level."""
+    fell = sum(r["fell"] for r in results)
+    astray = sum(
+        not r["fell"] and max(abs(r["speed_error"]), abs(r["height_error"])) > SETTLED
+        for r in results
+    )
+    if not disturbance.passing:
+        astray = 0
+    return Level(level, len(results) - fell - astray, fell, astray)

@@ -1,0 +1,1 @@
+"""Figures of many trials: robustness level by level, and campaigns."""

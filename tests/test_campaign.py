@@ -1,0 +1,223 @@
+"""Campaigns: draws from a mix, trials as runs, and ``template-control campaign``."""
+
+import json
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from template_control import settings
+from template_control.cli.main import main
+from template_control.cli.trials import campaign as command
+from template_control.errors import ParameterError
+from template_control.robustness import Campaign, Conditions, Draw, Mix, Trial, first_wrong
+from template_control.run.config import RobotChoice, RunConfig
+from template_control.run.record import Record
+from template_control.view.trials.campaign_figure import campaign_figure
+
+PAGE = (Path(__file__).parents[1] / "docs" / "campaign.md").read_text()
+RANGES = [f.name for f in fields(Mix) if f.name not in ("within", "after")]
+
+
+@given(seed=st.integers(0, 2**64 - 1), factor=st.floats(0.0, 1.3))
+def test_a_draw_is_within_its_mix(seed, factor):
+    mix = Mix().times(factor)
+    draw = mix.draw(seed)
+    assert draw == mix.draw(seed)
+    for name in RANGES:
+        low, high = getattr(mix, name)
+        assert low <= getattr(draw, name) <= high
+    for at in (draw.push_at, draw.ground_step_at):
+        assert mix.within[0] <= at <= mix.within[1]
+    assert 0.0 <= mix.severity(draw) <= 1.0 + 1e-12
+
+
+def test_draws_fill_their_ranges():
+    mix = Mix()
+    draws = [mix.draw(seed) for seed in range(400)]
+    for name in RANGES:
+        low, high = getattr(mix, name)
+        drawn = np.array([getattr(d, name) for d in draws])
+        assert np.mean(drawn) == pytest.approx(0.5 * (low + high), abs=0.08 * (high - low) + 1e-12)
+        assert np.ptp(drawn) >= 0.97 * (high - low)
+
+
+def test_severity_is_the_share_of_the_range_that_is_used():
+    mix = Mix()
+    assert mix.severity(Draw()) == 0.0
+    worst = Draw(**{name: getattr(mix, name)[1] for name in RANGES})
+    assert mix.severity(worst) == pytest.approx(1.0)
+    # Noise is the same in all trials: seven ranges are left.
+    assert mix.severity(Draw(push=-10.0)) == pytest.approx(0.5 / np.sqrt(7))
+    assert mix.severity(Draw(friction=0.6)) == pytest.approx(0.5 / np.sqrt(7))
+
+
+def test_a_mix_of_no_severity_disturbs_nothing():
+    draw = Mix().times(0.0).draw(3)
+    assert replace(draw, push_at=0.0, ground_step_at=0.0) == Draw()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"push": (5.0, -5.0)}, "Mix.push is [5.0, -5.0]"),
+        ({"within": (3, 3)}, "Mix.within is [3, 3]"),
+        ({"friction": (0.0, 1.0)}, "Mix.friction"),
+        ({"mass": (-1.0, 1.0)}, "Mix.mass"),
+        ({"noise": (-1e-3, 1e-3)}, "Mix.noise"),
+        ({"delay": (0.0, float("nan"))}, "Mix.delay"),
+    ],
+)
+def test_a_mix_that_cannot_be_is_refused(wrong, told):
+    with pytest.raises(ParameterError) as error:
+        Mix(**wrong)
+    assert told in str(error.value)
+
+
+def test_a_trial_is_a_run_that_its_file_repeats(tmp_path):
+    conditions = Conditions(seed=5)
+    config, ready = conditions.trial(3)
+    draw = conditions.draw(3)
+    simulation = config.simulation
+    assert simulation.steps == 26
+    assert simulation.plant.friction == draw.friction
+    assert simulation.plant.mass_scale == 1.0 + draw.mass
+    assert simulation.start[0] == pytest.approx(ready.gait.vlo[0] * (1.0 + draw.speed))
+    (push,) = simulation.pushes
+    assert push.impulse == pytest.approx(draw.push)
+    assert push.step + push.phase == pytest.approx(draw.push_at)
+    assert RunConfig.load(config.save(tmp_path / "trial.toml")) == config
+    assert settings.from_table(Conditions, settings.to_table(conditions)) == conditions
+    assert conditions.trial(4)[0] != config
+
+
+def test_a_small_robot_is_disturbed_as_a_small_one():
+    draw, conditions = Conditions().draw(0), Conditions(RobotChoice("bolt"))
+    config, ready = conditions.trial(0)
+    p = ready.gait.parameters
+    length, time = p.rest_length, np.sqrt(p.rest_length * 9.81 / p.gravity)
+    (push,) = config.simulation.pushes
+    assert push.impulse == pytest.approx(draw.push * p.mass / 80.0 * length / time)
+    assert push.duration == pytest.approx(0.1 * time)
+    assert config.simulation.delay <= draw.delay * time + 0.5e-3
+
+
+def test_shares_and_figure_of_a_campaign():
+    conditions = Conditions()
+    trials = tuple(
+        Trial(
+            number=i,
+            fell=i % 10 == 0,
+            reason="the hip was low" if i % 10 == 0 else "",
+            first="slip" if i % 10 == 0 else "",
+            speed_error=None if i % 10 == 0 else 0.05 * (i % 10 == 1),
+            draw=conditions.draw(i),
+            severity=conditions.mix.severity(conditions.draw(i)),
+        )
+        for i in range(40)
+    )
+    found = Campaign(conditions, trials)
+    assert len(found.fell) == 4
+    assert len(found.astray) == 4
+    assert found.reasons == {"slip": 4}
+    low, high = found.interval(found.fell)
+    assert low < 0.1 < high
+    panels = [axes for axes in campaign_figure(found).axes if axes.get_visible()]
+    assert len(panels) == 8  # severity, and seven ranges with a width
+    no_fall = [line.get_ydata() for line in panels[0].containers[0].lines[:1]]
+    assert 0.0 <= float(no_fall[0][0]) <= 100.0
+
+
+def test_what_went_wrong_first(long_walk):
+    assert first_wrong(long_walk) == "none of these"
+    late = len(long_walk.time) - 400
+    slid = long_walk.foot.copy()
+    slid[late + 200 :, :, 0] += 0.1
+    solved = np.array(long_walk.solved, dtype=bool)
+    solved[late + 300] = False
+    torque = long_walk.torque.copy()
+    torque[late + 100 : late + 150, 0] = long_walk.metadata["torque_limit"][0]
+    force = long_walk.contact_force.copy()
+    force[late, 0] = (-200.0, 10.0)
+    wrong = replace(long_walk, solved=solved)
+    assert first_wrong(wrong) == "failed QP"
+    wrong = replace(wrong, foot=slid)
+    assert first_wrong(wrong) == "slip"
+    wrong = replace(wrong, torque=torque)
+    assert first_wrong(wrong) == "torque limit"
+    assert first_wrong(replace(wrong, contact_force=force)) == "stumble"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--trials", "0"], "--trials is 0"),
+        (["--severity", "nan"], "--severity is nan"),
+        (["--severity", "5"], "Mix.friction"),
+        (["--workers", "0"], "--workers is 0"),
+        (["--mix", "missing.toml"], "missing.toml"),
+        (["--robot", "nobody"], "nobody"),
+        (["--speed", "9"], "9"),
+    ],
+)
+def test_a_mistake_is_one_line(words, told, refused):
+    assert told in refused(["campaign", *words])
+
+
+def test_a_mix_with_an_unknown_key_is_refused(tmp_path, refused):
+    path = tmp_path / "mix.toml"
+    path.write_text("wind = [0, 1]\n")
+    told = refused(["campaign", "--mix", str(path)])
+    assert "wind" in told
+    assert "friction" in told
+
+
+def printed(language):
+    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+
+
+@pytest.mark.parametrize("line", "".join(printed("sh")).strip().splitlines())
+def test_commands_of_the_page_are_understood(line, understood):
+    assert understood(line).command == "campaign"
+
+
+@pytest.mark.slow(seconds=60)
+def test_the_snippet_of_the_page_runs(capfd):
+    (snippet,) = printed("python")
+    exec(snippet, {})
+    assert capfd.readouterr().out.startswith("0 (0.0, ")
+
+
+def test_ctrl_c_says_where_the_trials_are(tmp_path, monkeypatch, capfd):
+    def impatient(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "run_campaign", impatient)
+    assert main(["campaign", "--output", str(tmp_path)]) == 130
+    assert "goes on from there" in capfd.readouterr().err
+
+
+@pytest.mark.slow(seconds=60)
+def test_a_campaign_goes_on_and_its_falls_can_be_repeated(tmp_path, capfd):
+    mix = tmp_path / "hard.toml"
+    mix.write_text("push = [-120.0, -119.0]\nwithin = [1, 2]\nafter = 5\n")
+    words = ["campaign", "--mix", str(mix), "--workers", "1", "--json"]
+    words += ["--trials", "2", "--output", str(tmp_path / "out")]
+    assert main(words) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["fell"]["count"] == 2
+    results = {path: path.read_bytes() for path in (tmp_path / "out").glob("*.jsonl")}
+    assert main(words) == 0
+    assert json.loads(capfd.readouterr().out) == found
+    assert {path: path.read_bytes() for path in (tmp_path / "out").glob("*.jsonl")} == results
+    wrong = found["wrong"][0]
+    assert Path(found["figure"]).is_file()
+    assert wrong["first"]
+    again = ["walk", "--config", wrong["config"], "--no-figures", "--json"]
+    assert main([*again, "--output", str(tmp_path / "again")]) == 1
+    assert json.loads(capfd.readouterr().out)["fall_reason"] == wrong["reason"]
+    assert Record.load(tmp_path / "again" / "run.npz").fell
