@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from template_control import view
-from template_control.run.record import Record
+from template_control.run.kinds.any_record import load_record
 from template_control.storage import writable
 
 
@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw and name the files."""
-    record = Record.load(options.run_file)
+    record = load_record(options.run_file)
     folder = options.run_file.parent if options.output is None else options.output
     for path in view.save_figures(record, writable(folder)):
         print(path)

@@ -14,6 +14,7 @@ from template_control.cli.options.gait import (
 from template_control.cli.options.output import add_output_options
 from template_control.cli.options.robot import add_robot_options
 from template_control.cli.options.world import (
+    add_course_options,
     add_disturbance_options,
     add_length_options,
     add_world_options,
@@ -37,6 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_config(parser)
     add_robot_options(parser)
+    add_course_options(parser)
     add_gait_options(parser)
     add_stand_options(parser)
     add_planner_options(parser)

@@ -1,4 +1,7 @@
 from .controller import EmbeddingController as EmbeddingController
+from .free.controller import FreeController as FreeController
+from .free.options import FreeOptions as FreeOptions
+from .free.phases import FREE_PHASES as FREE_PHASES
 from .guards import GuardOptions as GuardOptions
 from .learners.lean import Lean as Lean
 from .learners.lean import LeanOptions as LeanOptions

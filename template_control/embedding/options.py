@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from template_control.checks.ranges import Range
 from template_control.embedding.guards import GuardOptions
@@ -39,6 +39,8 @@ class EmbeddingOptions(QpOptions):
         catches: whether a walk that is kept breaks into a run where it cannot go on.
         lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
     """
+
+    kind: ClassVar[str] = "planar"
 
     trunk_pitch: Annotated[float, Range(-1.5, 1.5)] = tuned(0.0)
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(PHASES))

@@ -8,7 +8,7 @@ from template_control.checks.checked import checked
 from template_control.embedding.planners.running import AGILE
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.gaits.walking_family import speed_range
 from template_control.slip.scenario.route import ScenarioRoute
@@ -21,7 +21,7 @@ _WHERE = {"walk": "at VLO", "run": "at apex"}
 
 
 @checked
-def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
+def robot_route(robot: Biped, scenario: Scenario) -> ScenarioRoute:
     """The scenario on the robot's own template.
 
     Args:
@@ -57,7 +57,7 @@ def robot_route(robot: PlanarBiped, scenario: Scenario) -> ScenarioRoute:
     return ScenarioRoute(own, lambda speed: suited_height(speed / unit) * p.rest_length)
 
 
-def _check_accelerations(robot: PlanarBiped, own: Scenario) -> None:
+def _check_accelerations(robot: Biped, own: Scenario) -> None:
     """Refuse what no stride can do, however strong the motors: they bound it further."""
     p = own.parameters
     most = scaled(AGILE, Scale.of(p)).pace / (_STRIDE * float(np.sqrt(p.rest_length / p.gravity)))

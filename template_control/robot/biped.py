@@ -116,6 +116,15 @@ class Biped(ABC):
         """(nq,) upright, with straight vertical legs."""
 
     @abstractmethod
+    def moved(self, q: Array, step: Array) -> Array:
+        """(nq,) the configuration that a small motion leads to.
+
+        Args:
+            q: (nq,) configuration.
+            step: (nv,) the motion, in the coordinates of the velocity [m, rad].
+        """
+
+    @abstractmethod
     def joint_positions(self, out: Array) -> None:
         """Write the actuated joints' sagittal positions (nu, 2) [m] at the last update."""
 

@@ -206,6 +206,10 @@ class PlanarBiped(Biped):
         """See :meth:`~.biped.Biped.neutral`."""
         return np.zeros(self.nq)
 
+    def moved(self, q: Array, step: Array) -> Array:
+        """See :meth:`~.biped.Biped.moved`."""
+        return q + step
+
     def joint_positions(self, out: Array) -> None:
         """See :meth:`~.biped.Biped.joint_positions`."""
         for i, position in enumerate(self._joint_places):

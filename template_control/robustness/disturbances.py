@@ -18,7 +18,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.sensing import SensorOptions
 from template_control.run.simulation import perturbed_start, simulate
@@ -53,7 +53,7 @@ class Situation:
         planner: that keeps it.
     """
 
-    robot: PlanarBiped
+    robot: Biped
     gait: WalkingGait | RunningGait
     planner: Planner
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _LETTERS = 10
 
 
-def fingerprint(model: PlanarBiped, *trials: object) -> str:
+def fingerprint(model: Biped, *trials: object) -> str:
     """Ten letters of a digest of this package's code, the robot's URDF and the trials.
 
     Args:

@@ -3,6 +3,9 @@ from .config import OwnPlanner as OwnPlanner
 from .config import RobotChoice as RobotChoice
 from .config import RunConfig as RunConfig
 from .data_frame import columns as columns
+from .kinds.any_record import load_record as load_record
+from .kinds.free_record import FreeRecord as FreeRecord
+from .options import Course as Course
 from .options import FallOptions as FallOptions
 from .options import Push as Push
 from .options import SimulationOptions as SimulationOptions

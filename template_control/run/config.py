@@ -33,7 +33,9 @@ from template_control.embedding.robot_template import (
 )
 from template_control.errors import ParameterError
 from template_control.parts import ready
-from template_control.robot.library import ROBOTS, load_robot
+from template_control.robot.biped import Biped
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.library import ROBOTS, load_free_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
@@ -57,6 +59,7 @@ class RobotChoice(Checked):
         sagittal_joints: of a 3D URDF, hips and knees.
         foot_radius: of the spheres put into the feet of a 3D URDF [m].
         locked: angle of each locked joint of a 3D URDF that is not at 0 [rad].
+        free: whether nothing holds the robot; its URDF is a 3D one, and all its joints move.
     """
 
     model: str = "five-link"
@@ -64,12 +67,13 @@ class RobotChoice(Checked):
     sagittal_joints: tuple[str, ...] = ()
     foot_radius: float | None = None
     locked: Mapping[str, float] = field(default_factory=dict)
+    free: bool = False
 
-    def load(self) -> PlanarBiped:
+    def load(self) -> Biped:
         """The robot.
 
         Raises:
-            RobotError: if there is none, or it is no planar biped.
+            RobotError: if there is none, or it is no such biped.
             ParameterError: if a shipped robot comes with what only a URDF needs.
         """
         own = {
@@ -80,10 +84,17 @@ class RobotChoice(Checked):
         }
         given = {name: value for name, value in own.items() if value not in (None, (), {})}
         if not given:
-            return load_robot(self.model)
+            return load_free_robot(self.model) if self.free else load_robot(self.model)
         if self.model in ROBOTS:
             names = ", ".join(name.replace("_", " ") for name in given)
             raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")
+        if self.free:
+            idle = [
+                name.replace("_", " ") for name in ("sagittal_joints", "locked") if name in given
+            ]
+            if idle:
+                raise ParameterError(f"{', '.join(idle)} hold a robot in its plane: leave them out")
+            return FreeBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
         return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
 
 
@@ -122,7 +133,7 @@ class GaitChoice(Checked):
                 words = name.replace("_", " ")
                 raise ParameterError(f"{words} does not go with gait {self.name}: leave one out")
 
-    def of(self, robot: PlanarBiped) -> WalkingGait | RunningGait:
+    def of(self, robot: Biped) -> WalkingGait | RunningGait:
         """The gait on a robot's template.
 
         Args:
@@ -140,7 +151,7 @@ class GaitChoice(Checked):
             return gait_for_speed(template_for(robot), self.speed, touchdown_angle=angle)
         return default_gait(robot, angle)
 
-    def run_speed(self, robot: PlanarBiped) -> float:
+    def run_speed(self, robot: Biped) -> float:
         """Of a run, dx/dt at apex [m/s].
 
         Args:
@@ -222,7 +233,7 @@ class Ready(NamedTuple):
         planners: one for each kind of stride.
     """
 
-    robot: PlanarBiped
+    robot: Biped
     gait: WalkingGait | RunningGait
     route: ScenarioRoute | None
     planners: Planners

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import Count, Index, NotNegative, Positive
+from template_control.checks.ranges import Count, Index, NotNegative, Positive, Range
+from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
@@ -76,6 +78,20 @@ def check_pushes(pushes: tuple[Push, ...], steps: int) -> None:
 
 
 @dataclass(frozen=True)
+class Course(Checked):
+    """Where a free robot goes, and how wide it steps.
+
+    Attributes:
+        turning_rate: of the heading, to the left positive [rad/s].
+        step_width: distance aside between left and right footholds [m]; None: the one of the
+            embedding's options, by the robot's size.
+    """
+
+    turning_rate: Annotated[float, Range(-2.0, 2.0)] = 0.0
+    step_width: Positive | None = None
+
+
+@dataclass(frozen=True)
 class SimulationOptions(Checked):
     """How a run goes.
 
@@ -84,7 +100,7 @@ class SimulationOptions(Checked):
             the route, or makes 50 steps where the route has no end.
         plant: the world; the type of its options says which. Or a plant of one's own: the run
             resets it, and leaves it open.
-        embedding: the controller's tuning.
+        embedding: the controller's tuning; of a free robot FreeOptions.
         start: (3,) dx/dt, y, dy/dt to start in [m/s, m, m/s], dy/dt 0 at apex; None for the
             route's.
         pose: CoM and feet to start with; None: over the stance foot at VLO, and at apex with the
@@ -96,6 +112,7 @@ class SimulationOptions(Checked):
             physics steps.
         record_every: keep every n-th sample.
         falls: when the robot counts as fallen.
+        course: where a free robot goes; a planar one has none.
 
     Raises:
         ParameterError: if a value is of a wrong type or out of its range, the plant is none, the
@@ -105,7 +122,7 @@ class SimulationOptions(Checked):
 
     steps: Count | None = None
     plant: PlantOptions | MujocoOptions | IdealOptions | Plant = field(default_factory=PlantOptions)
-    embedding: EmbeddingOptions = field(default_factory=EmbeddingOptions)
+    embedding: EmbeddingOptions | FreeOptions = field(default_factory=EmbeddingOptions)
     start: tuple[float, float, float] | None = None
     pose: Pose | None = None
     pushes: tuple[Push, ...] = ()
@@ -113,6 +130,7 @@ class SimulationOptions(Checked):
     delay: NotNegative = 0.0
     record_every: Count = 1
     falls: FallOptions = field(default_factory=FallOptions)
+    course: Course = field(default_factory=Course)
 
     def __post_init__(self) -> None:
         check_world(self.plant)

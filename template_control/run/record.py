@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 FORMAT = "template-control run 4"
 _FIVE_SLOTS = "template-control run 3"  # without push-off
 _WALKS = "template-control run 2"  # which knew VLO and walking steps only
-_LAYOUT = storage.Layout(
+LAYOUT = storage.Layout(
     fields={
         "time": "T",
         "q": "T nv",
@@ -215,7 +215,7 @@ class Record:
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
         return storage.load(
-            cls, path, FORMAT, _LAYOUT, {_WALKS: from_walk, _FIVE_SLOTS: from_five_slots}
+            cls, path, FORMAT, LAYOUT, {_WALKS: from_walk, _FIVE_SLOTS: from_five_slots}
         )
 
 

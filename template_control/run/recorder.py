@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.controller import EmbeddingController
-from template_control.robot.requirements import BASE_DOF
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.solver import Solution
@@ -24,7 +23,8 @@ class Truth(NamedTuple):
 
     Attributes:
         time: [s].
-        q, v: (nv,) true configuration and velocity.
+        q: (nq,) true configuration.
+        v: (nv,) true velocity.
         contact_force: (2, 2) the ground's force on each foot [N].
         push: disturbance on the trunk [N].
     """
@@ -71,8 +71,8 @@ class Recorder:
     def __init__(self, controller: EmbeddingController, every: int = 1) -> None:
         self.controller = controller
         self.every = every
-        nv = controller.robot.nv
-        nu = nv - BASE_DOF
+        robot = controller.robot
+        nu = len(robot.joint_names)
         widths = {
             # Single numbers first: they are written together, and so are the arrays.
             "time": 1,
@@ -83,8 +83,8 @@ class Recorder:
             "rear": 1,
             "solved": 1,
             "push": 1,
-            "q": nv,
-            "v": nv,
+            "q": robot.nq,
+            "v": robot.nv,
             "torque": nu,
             "com": 2,
             "com_velocity": 2,
@@ -131,7 +131,7 @@ class Recorder:
         size = np.abs(torque)
         np.maximum(self.peak_torque, size, out=self.peak_torque)
         self._torque_square += torque * torque
-        speed = v[BASE_DOF:]
+        speed = v[r.base_dof :]
         np.maximum(self.peak_speed, np.abs(speed), out=self.peak_speed)
         self._work += float(np.abs(torque * speed).sum()) * (time - self._before)
         self._before = time

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
 
-_TRANSLATIONS = 2  # the base's x and y come first
 _VELOCITY_NOISE = 20.0  # [1/s] noise of velocities over that of positions
 
 
@@ -62,18 +61,19 @@ class Sensors:
         length: rest length of the template [m].
     """
 
-    def __init__(self, options: SensorOptions, robot: PlanarBiped, length: float) -> None:
+    def __init__(self, options: SensorOptions, robot: Biped, length: float) -> None:
         self.noisy = options.position_noise > 0.0 or options.velocity_noise > 0.0
         self._draws = np.random.default_rng(options.seed)
+        self._robot = robot
         scale = np.ones(robot.nv)
-        scale[:_TRANSLATIONS] = length
+        scale[: robot.directions] = length  # the base's place comes first
         self._deviation = np.outer((options.position_noise, options.velocity_noise), scale)
 
     def measure(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Measure a state; the true arrays are left alone.
 
         Args:
-            q: (nv,) true configuration [m, rad].
+            q: (nq,) true configuration [m, rad].
             v: (nv,) true velocity [m/s, rad/s].
 
         Returns:
@@ -82,7 +82,7 @@ class Sensors:
         if not self.noisy:
             return q, v
         noise = self._deviation * self._draws.standard_normal(self._deviation.shape)
-        return q + noise[0], v + noise[1]
+        return self._robot.moved(q, noise[0]), v + noise[1]
 
 
 class TorqueDelay:

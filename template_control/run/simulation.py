@@ -12,18 +12,19 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
-from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.section_report import SectionReport
-from template_control.embedding.standing.pose import standing_pose
 from template_control.errors import ParameterError
-from template_control.plant.plant import Plant, open_plant, plant_name
+from template_control.plant.plant import Plant, plant_name
+from template_control.robot.biped import Biped
+from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.start import Pose, state_at_vlo, state_in
 from template_control.run.in_use import in_use
+from template_control.run.kinds.free import Free
+from template_control.run.kinds.kind import Kind
+from template_control.run.kinds.planar import Planar
 from template_control.run.metadata import about, outcome
 from template_control.run.options import Push, SimulationOptions, check_pushes
 from template_control.run.record import Record, RunInterrupted
@@ -32,7 +33,7 @@ from template_control.run.sensing import Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.maps.section import APEX, REST, VLO
+from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.catching import CatchingRoute
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
@@ -64,7 +65,7 @@ def perturbed_start(gait: Gait, seed: int) -> tuple[float, float, float]:
 
 @checked
 def simulate(
-    robot: PlanarBiped,
+    robot: Biped,
     route: Route | Scenario | Planner,
     options: SimulationOptions | None = None,
     progress: Callable[[int], None] | None = None,
@@ -95,24 +96,24 @@ def simulate(
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
     """
-    o = options or SimulationOptions()
+    o, kind = options or SimulationOptions(), _kind(robot)
     if isinstance(route, Scenario):
         route = robot_route(robot, route)
     if isinstance(route, Planner):
-        controller = _keeping(robot, route, o.embedding, automaton)
+        controller = _keeping(kind, route, o.embedding, automaton)
     else:
         chosen = planners or default_planners(route)
-        controller = EmbeddingController(robot, chosen, o.embedding, route, automaton)
-    recorder = Recorder(controller, o.record_every)
+        controller = kind.controller(chosen, o.embedding, route, automaton)
+    recorder = kind.recorder(controller, o.record_every)
     last = _last_step(controller, o)
     with in_use(robot, controller.planning.route, *controller.planning.planners.values()):
-        q, v = _start(controller, o)
+        q, v = kind.start(controller, o)
         _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
         # Before the run, which would be lost if this failed after it.
         metadata = about(controller, o)
         begin = time.perf_counter()
         stop: KeyboardInterrupt | None = None
-        with open_plant(robot, o.plant) as plant:
+        with kind.plant(o.plant) as plant:
             plant.reset(q, v)
             try:
                 reason = _loop(plant, controller, recorder, o, (last, progress))
@@ -132,50 +133,28 @@ def simulate(
     return record
 
 
+def _kind(robot: Biped) -> Kind:
+    """How the robot is run.
+
+    Raises:
+        ParameterError: if it is neither planar nor free.
+    """
+    if isinstance(robot, PlanarBiped):
+        return Planar(robot)
+    if isinstance(robot, FreeBiped):
+        return Free(robot)
+    raise ParameterError(f"{robot!r} is of no kind that can be run: give a planar or a free biped")
+
+
 def _keeping(
-    robot: PlanarBiped, planner: Planner, options: EmbeddingOptions, automaton: Automaton
+    kind: Kind, planner: Planner, options: EmbeddingOptions, automaton: Automaton
 ) -> EmbeddingController:
     """A controller that keeps the planner's gait; a walk that cannot go on breaks into a run."""
     steady = SteadyRoute.of(planner.gait, automaton)
     if not options.catches or automaton is not AUTOMATON or steady.section is not VLO:
-        return EmbeddingController(robot, planner, options, steady, automaton)
+        return kind.controller(planner, options, steady, automaton)
     caught = CatchingRoute(steady)
-    return EmbeddingController(robot, default_planners(caught, planner), options, caught, automaton)
-
-
-def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
-    """Start the controller where the run begins, and tell (q, v) there.
-
-    Raises:
-        ParameterError: if the route begins at an apex of a stride whose legs do not take turns,
-            and no pose is given.
-    """
-    robot, route, pose = controller.robot, controller.planning.route, o.pose
-    z = route.start if o.start is None else np.array(o.start)
-    if pose is None and route.section == APEX:
-        pose = _apex_pose(controller, z[: APEX.dimension])
-    if pose is None and route.section == REST:
-        pose = standing_pose(route.parameters)
-    if pose is not None:
-        q, v = state_in(robot, pose)
-        controller.start(pose.rear, pose.swung)
-        return q, v
-    # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
-    swing = np.array([0.0, controller.options.swing.clearance])
-    pitch = controller.first_pitch()
-    q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
-    controller.start()
-    return q, v
-
-
-def _apex_pose(controller: EmbeddingController, z: Array) -> Pose:
-    """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
-    planning, o = controller.planning, controller.options
-    planner, node = planning.begin(APEX)
-    gait = planner.gait
-    pitch = controller.first_pitch()
-    swing = phase_control(o.phases, node).swing or o.swing
-    return apex_pose(controller.robot, ApexStart(z, gait, swing, pitch, planning.automaton))
+    return kind.controller(default_planners(caught, planner), options, caught, automaton)
 
 
 def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
@@ -208,7 +187,7 @@ def _loop(
     dt = o.plant.time_step
     length = controller.parameters.rest_length
     sensors, delay = Sensors(o.sensors, robot, length), TorqueDelay(o.delay_ticks)
-    q, v, forces = np.zeros(robot.nv), np.zeros(robot.nv), np.zeros((2, 2))
+    q, v, forces = robot.neutral(), np.zeros(robot.nv), np.zeros((2, robot.directions))
     threshold = o.falls.contact_force * robot.mass * robot.gravity
     done, tick = 0, 0
     begun: list[tuple[float, float]] = []
@@ -218,7 +197,7 @@ def _loop(
         plant.contact_forces(forces)
         start = time.perf_counter()
         try:
-            solution = controller.tick(*sensors.measure(q, v), forces[:, 1] > threshold, dt)
+            solution = controller.tick(*sensors.measure(q, v), forces[:, -1] > threshold, dt)
         except ParameterError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start
@@ -291,8 +270,8 @@ def _fallen(
     hip = controller.robot.hip_height(q) - o.plant.ground_height(q[0])
     if hip < falls.height * length:
         return f"the hip was {hip:.2f} m above the ground"
-    if abs(q[2]) > falls.pitch:
-        return f"the trunk pitched to {np.degrees(q[2]):.0f} degrees"
+    if controller.robot.tilt(q) > falls.pitch:
+        return f"the trunk tilted to {np.degrees(controller.robot.tilt(q)):.0f} degrees"
     patience = falls.patience * controller.planner.gait.step_duration
     if now - controller.reports[-1].time > patience:
         return "the robot stopped walking"

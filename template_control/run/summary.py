@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
+from template_control.run.kinds.free_record import FreeRecord
+from template_control.run.kinds.free_summary import in_space
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.maps.section import section_of
@@ -127,7 +129,8 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         flight_share (robot, template: of the gait), duty_factor (share of the time that a foot is
         on the ground), control_tick_seconds and qp_solve_seconds (median, p99), plan_seconds
         (median, p99), real_time_factor, steps_not_nominal (plans that left the planner's own law),
-        record.
+        record; of a run in space also what
+        :func:`~template_control.run.kinds.free_summary.in_space` tells.
     """
     m = record.metadata
     duration = m["duration"]
@@ -153,5 +156,6 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "plan_seconds": _quantiles(record.plan_seconds),
         "real_time_factor": duration / m["wall_seconds"],
         "steps_not_nominal": int(np.sum(~record.section_nominal)),
+        **(in_space(record) if isinstance(record, FreeRecord) else {}),
         "record": path,
     }

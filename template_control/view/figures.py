@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError, RecordError
+from template_control.run.kinds.free_record import FreeRecord
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
 from template_control.view.figure_file import save_figure
+from template_control.view.free_figures import FREE_FIGURES
 from template_control.view.running_figures import apex_return, joint_speeds, turning
 from template_control.view.state_figures import (
     energies,
@@ -194,15 +196,19 @@ FIGURES: dict[str, Callable[[Record], Figure]] = {
     "turning": turning,
     "apex_return": apex_return,
 }
-"""Every figure of a run, by file name."""
+"""Every figure of a planar run, by file name."""
+
+_OF_ANY = ("com", "torques", "joint_speeds", "forces", "phase_portrait", "tracking", "sections")
 
 
-def figures_of(record: Record) -> dict[str, Callable[[Record], Figure]]:
+def figures_of(record: Record) -> dict[str, Callable[..., Figure]]:
     """The figures that have something to show of a run: apexes need two that follow each other.
 
     Args:
         record: the run.
     """
+    if isinstance(record, FreeRecord):
+        return {**{name: FIGURES[name] for name in _OF_ANY}, **FREE_FIGURES}
     names = [record.metadata["sections"][i] for i in record.section]
     if (Event.APEX.name, Event.APEX.name) in pairwise(names):
         return FIGURES

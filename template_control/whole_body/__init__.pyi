@@ -1,5 +1,7 @@
 from .com_task import ComTask as ComTask
 from .foot_task import FootTask as FootTask
+from .free.orientation_task import OrientationTask as OrientationTask
+from .free.side_foot_task import SideFootTask as SideFootTask
 from .momentum_task import MomentumTask as MomentumTask
 from .posture_task import PostureTask as PostureTask
 from .solver import QpOptions as QpOptions

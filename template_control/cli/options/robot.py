@@ -33,6 +33,13 @@ def add_robot(parser: argparse.ArgumentParser, default: str | None = _DEFAULT) -
 def add_robot_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--robot`` and what a URDF of one's own may need."""
     add_robot(parser, None)
+    parser.add_argument(
+        "--free",
+        action="store_const",
+        const=True,
+        help="nothing holds the robot: it walks in space, as bolt can and 3D URDFs of two legs with"
+        " hip ab- and adduction",
+    )
     own = parser.add_argument_group("a URDF of your own")
     own.add_argument(
         "--feet",
@@ -78,6 +85,8 @@ def robot_choice(options: argparse.Namespace, base: RobotChoice) -> RobotChoice:
             given[name] = tuple(getattr(options, name))
     if options.foot_radius is not None:
         given["foot_radius"] = options.foot_radius
+    if options.free is not None:
+        given["free"] = True
     if options.locked is not None:
         given["locked"] = dict(map(_locked, options.locked))
     return replace(base, **given)

@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from template_control.cli.options.ranges import check_ranges
+from template_control.embedding.free.options import FreeOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
@@ -86,6 +87,22 @@ def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_course_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--turn`` and ``--step-width``, which go with ``--free``."""
+    parser.add_argument(
+        "--turn",
+        type=float,
+        metavar="RAD/S",
+        help="turning rate of a free robot's heading, to the left positive",
+    )
+    parser.add_argument(
+        "--step-width",
+        type=float,
+        metavar="M",
+        help="distance aside between a free robot's left and right footholds; 0.28 l0 if not given",
+    )
+
+
 def add_length_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--steps`` and ``--record-every``."""
     parser.add_argument(
@@ -117,7 +134,13 @@ def simulation_choice(
     check_ranges(options, _RANGES)
     given: dict[str, Any] = {"plant": _plant(options, base)}
     embedding = {n: getattr(options, n, None) for n in ("friction", "torque_scale", "catches")}
-    given["embedding"] = replace(base.embedding, **_without_none(embedding))
+    tuning = base.embedding
+    if getattr(options, "free", None) and not isinstance(tuning, FreeOptions):
+        tuning = FreeOptions()
+    given["embedding"] = replace(tuning, **_without_none(embedding))
+    course = {"turning_rate": "turn", "step_width": "step_width"}
+    wanted = {name: getattr(options, option, None) for name, option in course.items()}
+    given["course"] = replace(base.course, **_without_none(wanted))
     if options.push is not None:
         given["pushes"] = tuple(map(_push, options.push))
     given["delay"] = options.delay

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rich.table import Table
@@ -50,6 +51,8 @@ def print_table(figures: dict[str, Any]) -> None:
             f"CoM error in {axis}, RMS / max",
             f"{1e3 * rms[axis]:.2f} / {1e3 * worst[axis]:.2f} mm",
         )
+    if "attitude_rms" in figures:
+        _in_space(figures, row)
     for joint, torque in figures["joint_torque"].items():
         row(
             f"{joint} torque, peak / RMS of limit",
@@ -84,6 +87,21 @@ def print_table(figures: dict[str, Any]) -> None:
     row("real-time factor", f"{figures['real_time_factor']:.1f}")
     row("record", figures["record"] or "not saved")
     plain_console().print(table)
+
+
+def _in_space(figures: dict[str, Any], row: Callable[[str, str], None]) -> None:
+    """Rows of a robot that nothing holds."""
+    rms, most = figures["attitude_rms"], figures["attitude_max"]
+    for angle in rms:
+        row(f"{angle}, RMS / max", f"{rms[angle]:.4f} / {most[angle]:.4f} rad")
+    row("heading turned by", f"{figures['turned']:.3f} rad")
+    row("drift of the mean yaw in 100 steps", f"{figures['mean_yaw_drift']:+.4f} rad")
+    width = figures["step_width"]
+    if width is not None:
+        row(
+            "step width, mean / deviation / least",
+            f"{width['mean']:.3f} / {width['deviation']:.3f} / {width['least']:.3f} m",
+        )
 
 
 def nearest_text(nearest: dict[str, float]) -> str:

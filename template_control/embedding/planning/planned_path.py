@@ -14,13 +14,14 @@ class PlannedPath:
     Attributes:
         path: the template's, from the last plan on.
         dues: time on the path at which each :class:`Event` comes next [s], inf if it does not.
+        feet: that were the rear and the front leg's where the path starts.
     """
 
     def __init__(self) -> None:
         self.path: TemplatePath
         self.dues = [np.inf] * NUM_EVENTS
         self._passed = 0  # so many of the path's events are over
-        self._feet = (0, 1)  # rear and front leg's at the start of the path
+        self.feet = (0, 1)
 
     def take(self, path: TemplatePath, feet: tuple[int, int]) -> None:
         """Follow another path, from its start.
@@ -29,7 +30,7 @@ class PlannedPath:
             path: the template's.
             feet: that are the rear and the front leg's where it starts.
         """
-        self.path, self._feet = path, feet
+        self.path, self.feet = path, feet
         self._look_ahead(0)
 
     def due(self, event: Event) -> float:
@@ -47,7 +48,7 @@ class PlannedPath:
 
     def landing(self, foot: int) -> Landing:
         """Where and when on the path a foot next touches down."""
-        return self.path.landings[self._feet.index(foot)]
+        return self.path.landings[self.feet.index(foot)]
 
     @property
     def toe(self) -> float:
@@ -56,4 +57,4 @@ class PlannedPath:
 
     def stand_on(self, foot: int) -> None:
         """The template's rear toe is now the one that was this foot's at the start of the path."""
-        self.path.curve.look[0] = self.path.toes[self._feet.index(foot)]
+        self.path.curve.look[0] = self.path.toes[self.feet.index(foot)]

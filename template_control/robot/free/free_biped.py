@@ -246,6 +246,10 @@ class FreeBiped(Biped):
         """See :meth:`~template_control.robot.biped.Biped.neutral`."""
         return np.asarray(pin.neutral(self.model))
 
+    def moved(self, q: Array, step: Array) -> Array:
+        """See :meth:`~template_control.robot.biped.Biped.moved`."""
+        return np.asarray(pin.integrate(self.model, q, step))
+
     def joint_positions(self, out: Array) -> None:
         """See :meth:`~template_control.robot.biped.Biped.joint_positions`."""
         x0, y0, c, s = self._frame

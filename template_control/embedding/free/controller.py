@@ -1,0 +1,158 @@
+"""The controller of a free robot: the sagittal one on an (x, z) view, and the rest beside it.
+
+The sagittal controller runs as it is: of :class:`~template_control.robot.FreeBiped` it sees x and z
+in the heading frame. Here that frame is turned, the feet are placed sideways, and the forces get
+their third direction.
+"""
+
+from __future__ import annotations
+
+from math import cos, isfinite, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import checked
+from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.free.sideways import SIDES, Sideways
+from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.references.swing_foot import quintic_step
+from template_control.parts import ready
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import Event, Leg
+from template_control.slip.lateral.cycle import LateralWish
+from template_control.slip.lateral.kernels import LATERAL
+from template_control.slip.maps.section import Section
+from template_control.slip.scenario.route import Route
+from template_control.whole_body.solver import Solution, Stance
+
+Array = NDArray[np.float64]
+
+_SIDE = 1  # y, to the left
+
+
+class FreeController(EmbeddingController):
+    """Joint torques of a robot that nothing holds.
+
+    Args:
+        robot: the (nominal) model; every tick updates it.
+        planners: as for :class:`~template_control.embedding.controller.EmbeddingController`.
+        options: tuning.
+        route: which stride comes next.
+        automaton: of the route's strides.
+
+    Attributes:
+        sideways: where the feet land to the left or right.
+    """
+
+    robot: FreeBiped
+    options: FreeOptions
+
+    @checked
+    def __init__(
+        self,
+        robot: FreeBiped,
+        planners: Planners | Planner,
+        options: FreeOptions | None = None,
+        route: Route | None = None,
+        automaton: Automaton = AUTOMATON,
+    ) -> None:
+        unscaled = options or FreeOptions()
+        super().__init__(robot, planners, unscaled, route, automaton)
+        ready(LATERAL)
+        wish = LateralWish(self.options.step_width)
+        self.sideways = Sideways(self.parameters, unscaled.lateral, wish)
+        self._state = (robot.neutral(), np.zeros(robot.nv))
+        self._contact = np.zeros(2, dtype=bool)
+
+    def start(self, rear: int = 0, swung: tuple[float, float] | None = None) -> None:
+        """As :meth:`~template_control.embedding.controller.EmbeddingController.start`."""
+        planner, _ = self.planning.begin(self.planning.route.section)
+        self.sideways.reset(planner.gait)
+        super().start(rear, swung)
+
+    def tick(self, q: Array, v: Array, contact: NDArray[np.bool_], dt: float) -> Solution:
+        """As :meth:`~template_control.embedding.controller.EmbeddingController.tick`."""
+        self._state, self._contact = (q, v), contact
+        return super().tick(q, v, contact, dt)
+
+    # -- sections, touchdowns, liftoffs --------------------------------------------------
+
+    def _decide(self, section: Section) -> None:
+        sideways, first = self.sideways, not self.reports
+        stance = self.feet.of[Leg.REAR]
+        if not first:
+            if self.reports[-1].decision.nominal:
+                sideways.end_step(SIDES[stance], self._foot_side(stance), self.sway())
+            if sideways.wish.turn:
+                self._turn(sideways.wish.turn, self.robot.space.foot[stance, :2].copy())
+        super()._decide(section)
+        sideways.walk(self.planner.gait)
+        sideways.aim(SIDES[stance])
+        sideways.expect(self.planning.due(Event.TOUCHDOWN))
+
+    def _land(self, leg: Leg) -> None:
+        self.sideways.touch_down(self.time - self.reports[-1].time)
+        super()._land(leg)
+
+    def _lift(self, foot: int, swung: float = 0.0) -> None:
+        super()._lift(foot, swung)
+        speed = float(self.robot.contact_velocity[foot, _SIDE])
+        self.wanted.side[foot] = self._foot_side(foot), speed, 0.0
+        self.sideways.aim(SIDES[1 - foot])
+
+    def _turn(self, angle: float, about: Array) -> None:
+        """Turn the heading frame about a point of it; what is kept in it turns back."""
+        self.robot.turn(angle, about)
+        c, s = cos(angle), sin(angle)
+        for foot in range(2):
+            ahead, side = self.wanted.foot[foot, 0], self.wanted.side[foot]
+            ahead[0] -= about[0]
+            side[0] -= about[1]
+            ahead[:], side[:] = c * ahead + s * side, c * side - s * ahead
+            ahead[0] += about[0]
+            side[0] += about[1]
+        self.robot.update(*self._state)
+        self._sense(self._contact)
+
+    def _foot_side(self, foot: int) -> float:
+        return float(self.robot.space.foot[foot, _SIDE])
+
+    def sway(self) -> Array:
+        """(2,) y of the CoM, and dy/dt with the angular momentum as the forward speed has it."""
+        s = self.robot.space
+        height = self._sensed.state[1]
+        speed = s.com_velocity[_SIDE]
+        if self.station.control.momentum_speed:
+            speed = speed - s.momentum[0] / (self.robot.mass * height)
+        return np.array([s.com[_SIDE], speed])
+
+    # -- control ----------------------------------------------------------------------
+
+    def _swing(self, q: Array, v: Array, dt: float) -> None:
+        super()._swing(q, v, dt)
+        planning = self.planning
+        for leg in self.station.swings:
+            foot = self.feet.of[leg]
+            shape, side = self.feet.swing[foot].options, self.wanted.side[foot]
+            due = planning.landing(foot).time - self.phase_time
+            feet = np.array([self._foot_side(foot) for foot in planning.feet])
+            target = self.sideways.foothold(planning.path, self.phase_time, self.sway(), feet)
+            if due <= shape.horizon or not isfinite(target):
+                side[1:] = 0.0
+            else:
+                time = max(due - shape.early, shape.horizon)
+                quintic_step(side, target, 0.0, time, dt)
+
+    def _stance(self) -> Stance:
+        """In space a leg's force points at the CoM sideways too."""
+        stance, s = super()._stance(), self.robot.space
+        force = np.empty((len(stance.feet), 3))
+        planar = stance.force.reshape(-1, 2)
+        for row, foot, (x, z) in zip(force, stance.feet, planar, strict=True):
+            away, up = s.com[_SIDE] - s.foot[foot, _SIDE], s.com[2] - s.foot[foot, 2]
+            row[:] = x, z * away / up, z
+        return stance._replace(force=force)

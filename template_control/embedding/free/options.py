@@ -1,0 +1,37 @@
+"""The tuning of the embedding of a free robot, for the reference template."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from template_control.checks.ranges import Positive
+from template_control.embedding.free.phases import FREE_PHASES
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.phases import PhaseControl
+from template_control.slip.automaton.vocabulary import Phase
+from template_control.slip.lateral.options import LateralOptions
+from template_control.slip.similarity import LENGTH, tuned
+
+
+@dataclass(frozen=True)
+class FreeOptions(EmbeddingOptions):
+    """Tuning of the embedding of a free robot.
+
+    The fields of :class:`~template_control.embedding.options.EmbeddingOptions` come first.
+
+    Attributes:
+        phases: tasks, clock, feet and learners of each phase.
+        catches: a free robot has no run to break into.
+        lateral: how the feet are placed sideways.
+        step_width: distance aside between left and right footholds [m]. Wider, and the
+            robot sways more than its slow steps bear; narrower, and a push leaves less room.
+    """
+
+    kind: ClassVar[str] = "free"
+
+    phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(FREE_PHASES))
+    catches: bool = tuned(False)
+    lateral: LateralOptions = field(default_factory=LateralOptions)
+    step_width: Positive = tuned(0.28, LENGTH)

@@ -1,0 +1,45 @@
+"""What the controller of a free robot does in each phase: the table of walking, in space."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from template_control.embedding.phases import Clock, PhaseControl, Phases
+from template_control.slip.automaton.vocabulary import Leg, Phase
+from template_control.whole_body.com_task import ComTask
+from template_control.whole_body.foot_task import FootTask
+from template_control.whole_body.free.orientation_task import OrientationTask
+from template_control.whole_body.free.side_foot_task import SideFootTask
+
+# Two point feet bear no torque about the line between them: with the height and the trunk held
+# there is one freedom left for x and y, and with the weights of the plane the robot loses speed in
+# every double stance.
+_DOUBLE = PhaseControl(
+    tasks=(ComTask((30.0, 30.0)), OrientationTask((4.0, 4.0, 0.4))), unloads=(Leg.REAR,)
+)
+
+FREE_PHASES: Phases = {
+    Phase.F: PhaseControl(
+        tasks=(
+            OrientationTask((0.01, 0.01, 0.001)),
+            FootTask(Leg.REAR),
+            SideFootTask(Leg.REAR),
+            FootTask(Leg.FRONT),
+            SideFootTask(Leg.FRONT),
+        ),
+        swings=(Leg.REAR, Leg.FRONT),
+        clock=Clock.TIME,
+        momentum_speed=False,
+        weighs=False,
+    ),
+    Phase.SS: PhaseControl(
+        # As in the plane; and the CoM's y is left to the place of the feet.
+        tasks=(ComTask((0.01, 10.0)), OrientationTask(), FootTask(), SideFootTask()),
+        swings=(Leg.FRONT,),
+    ),
+    Phase.DS: replace(_DOUBLE, trims=True),
+    # A planner with push-off leaves the trim nothing to do.
+    "DS_sc^wp": _DOUBLE,
+    "DS_sd^wp": _DOUBLE,
+}
+"""Walking. Nodes of other gaits find the entry of their phase."""

@@ -1,0 +1,139 @@
+"""Where the next foot lands to the left or right: asked at every tick, learnt at every step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.references.template_path import TemplatePath
+from template_control.slip.gaits.gait import Gait
+from template_control.slip.lateral.cycle import LateralCycle, LateralWish, lateral_cycle
+from template_control.slip.lateral.gait import LateralGait, lateral_gait
+from template_control.slip.lateral.learnt import LateralLearnt
+from template_control.slip.lateral.options import LateralOptions
+from template_control.slip.lateral.path import LateralPath, lateral_path
+from template_control.slip.lateral.placing import LateralAim, Placement, lateral_aim, place
+from template_control.slip.lateral.side import Side
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale, scaled
+
+Array = NDArray[np.float64]
+
+SIDES = (Side.LEFT, Side.RIGHT)
+"""Of each foot, in the order of the robot's ``feet``."""
+
+
+class Sideways:
+    """The lateral half of the walk; all positions are y in the heading frame.
+
+    Args:
+        parameters: the template.
+        options: of the reference template.
+        wish: step width, motion aside, turn.
+
+    Attributes:
+        learnt: what the robot adds to the template's sideways motion.
+        wish: see above; it may be changed between two steps.
+        placed: the foothold that was chosen for the foot in the air; None before the first.
+        cycle: the periodic motion of the wish.
+    """
+
+    def __init__(
+        self, parameters: SlipParameters, options: LateralOptions, wish: LateralWish
+    ) -> None:
+        self.wish = wish
+        self._unscaled = options
+        self.options = scaled(options, Scale.of(parameters))
+        self._gravity = parameters.gravity
+        self.learnt = LateralLearnt()
+        self.placed: Placement | None = None
+        self.cycle: LateralCycle
+        self._gait: Gait | None = None
+        self._lateral: LateralGait
+        self._aim: LateralAim
+        self._planar: TemplatePath | None = None
+        self._path: LateralPath
+        self._landed: Placement | None = None
+        self._due = np.inf
+
+    def reset(self, gait: Gait) -> None:
+        """Begin anew; nothing is learnt yet.
+
+        Args:
+            gait: that is walked.
+        """
+        self.learnt, self.placed, self._planar = LateralLearnt(), None, None
+        self._landed, self._due = None, np.inf
+        self.walk(gait)
+
+    def walk(self, gait: Gait) -> None:
+        """Take the periodic motion of a gait, and of what has been learnt.
+
+        Args:
+            gait: that is walked, or walked towards.
+        """
+        if gait is not self._gait:
+            self._gait = gait
+            self._lateral = lateral_gait(gait, self._unscaled)
+        self.cycle = lateral_cycle(self._lateral, self.wish, self.learnt.offset)
+
+    def end_step(self, stance: Side, foot: float, com: Array) -> None:
+        """Learn from a nominal step that has ended at a section.
+
+        Args:
+            stance: side of the foot that stands now.
+            foot: its y [m].
+            com: (2,) y of the CoM and dy/dt [m, m/s].
+        """
+        if self._landed is not None:
+            surprise = com - (foot, 0.0) - self._landed.state(foot)
+            learnt = self.learnt.after_step(stance.other, surprise, self.options.learning)
+            # What one side teaches holds for the other, mirrored. Each for itself would learn a
+            # drift aside that is no offset, but the walk's own: it then grows.
+            mirrored = 0.5 * (learnt.offset[0] - learnt.offset[1])
+            self.learnt = replace(learnt, offset=np.array([mirrored, -mirrored]))
+
+    def expect(self, due: float) -> None:
+        """Take note of when the touchdown is due, at a section.
+
+        Args:
+            due: from now, as the template has it [s].
+        """
+        self._due = due
+
+    def touch_down(self, lasted: float) -> None:
+        """A foot has landed; that tells how long single stance takes.
+
+        Args:
+            lasted: since the section [s].
+        """
+        if np.isfinite(self._due) and self._due > 0.0:
+            options = self.options.learning
+            self.learnt = self.learnt.after_stance(lasted, self._due, options)
+        self._landed, self.placed, self._due = self.placed, None, np.inf
+
+    def aim(self, stance: Side) -> None:
+        """A foot swings.
+
+        Args:
+            stance: side of the other one, beside which it is to land.
+        """
+        self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
+
+    def foothold(self, path: TemplatePath, time: float, com: Array, feet: Array) -> float:
+        """y of the next foothold [m]; NaN where none is known.
+
+        Args:
+            path: the planar path that the robot is on.
+            time: on it [s].
+            com: (2,) y of the CoM and dy/dt [m, m/s].
+            feet: (2,) y of the feet that were rear and front at the start of the path [m].
+        """
+        if path is not self._planar:
+            self._planar, self._path = path, lateral_path(path.strides, self._gravity)
+        found = place(self._path, self._aim, time, com, feet)
+        if found.left > self.options.hold or self.placed is None:
+            self.placed = found
+        return self.placed.y

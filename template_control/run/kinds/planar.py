@@ -1,0 +1,93 @@
+"""Runs of a robot that is held in its plane."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.phases import phase_control
+from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.references.apex_pose import ApexStart, apex_pose
+from template_control.embedding.standing.pose import standing_pose
+from template_control.errors import ParameterError
+from template_control.plant.plant import Plant, World, open_plant
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.start import Pose, state_at_vlo, state_in
+from template_control.run.kinds.kind import Kind
+from template_control.run.options import Course, SimulationOptions
+from template_control.run.recorder import Recorder
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.maps.section import APEX, REST
+from template_control.slip.scenario.route import Route
+
+Array = NDArray[np.float64]
+
+
+class Planar(Kind):
+    """See :class:`~.kind.Kind`.
+
+    Args:
+        robot: that is run.
+    """
+
+    def __init__(self, robot: PlanarBiped) -> None:
+        self.robot = robot
+
+    def controller(
+        self,
+        planners: Planners | Planner,
+        options: EmbeddingOptions,
+        route: Route,
+        automaton: Automaton,
+    ) -> EmbeddingController:
+        """See :meth:`.kind.Kind.controller`."""
+        return EmbeddingController(self.robot, planners, options, route, automaton)
+
+    def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
+        """See :meth:`.kind.Kind.start`; clear at VLO, at rest, and where legs take turns.
+
+        Raises:
+            ParameterError: as there, or if the options have a course.
+        """
+        if o.course != Course():
+            raise ParameterError(
+                f"{self.robot.name} is held in its plane and has no course: leave it out, or take"
+                " a free robot"
+            )
+        robot, route, pose = self.robot, controller.planning.route, o.pose
+        z = route.start if o.start is None else np.array(o.start)
+        if pose is None and route.section == APEX:
+            pose = self._apex_pose(controller, z[: APEX.dimension])
+        if pose is None and route.section == REST:
+            pose = standing_pose(route.parameters)
+        if pose is not None:
+            q, v = state_in(robot, pose)
+            controller.start(pose.rear, pose.swung)
+            return q, v
+        # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
+        swing = np.array([0.0, controller.options.swing.clearance])
+        pitch = controller.first_pitch()
+        q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
+        controller.start()
+        return q, v
+
+    def _apex_pose(self, controller: EmbeddingController, z: Array) -> Pose:
+        """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
+        planning, o = controller.planning, controller.options
+        planner, node = planning.begin(APEX)
+        gait = planner.gait
+        pitch = controller.first_pitch()
+        swing = phase_control(o.phases, node).swing or o.swing
+        return apex_pose(self.robot, ApexStart(z, gait, swing, pitch, planning.automaton))
+
+    def plant(self, world: World) -> AbstractContextManager[Plant]:
+        """See :meth:`.kind.Kind.plant`."""
+        return open_plant(self.robot, world)
+
+    def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
+        """See :meth:`.kind.Kind.recorder`."""
+        return Recorder(controller, every)

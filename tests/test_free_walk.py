@@ -1,0 +1,100 @@
+"""Bolt walks in space on the planar template: straight on, and in a circle."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.cli.main import main
+from template_control.errors import ParameterError
+from template_control.robot.library import load_free_robot
+from template_control.run.kinds.any_record import load_record
+from template_control.run.summary import summarise
+
+STEPS = 12
+
+
+def walked(course=None, steps=STEPS):
+    robot = load_free_robot("bolt")
+    gait = tc.gait_at(tc.template_for(robot), np.radians(68.0), 0.6)
+    options = tc.SimulationOptions(steps=steps, course=course or tc.Course())
+    return tc.simulate(robot, tc.LqrPlanner(gait), options), gait
+
+
+@pytest.fixture(scope="module")
+def straight():
+    return walked()
+
+
+@pytest.mark.slow(seconds=10)
+def test_bolt_walks_free(straight):
+    record, gait = straight
+    assert not record.fell, record.metadata["fall_reason"]
+    assert record.steps == STEPS
+    figures = summarise(record, None)
+    assert figures["qp_failures"] == 0
+    assert figures["mean_speed"] == pytest.approx(gait.mean_speed, rel=0.05)
+    assert figures["attitude_rms"]["roll"] < 0.02
+    assert figures["attitude_rms"]["pitch"] < 0.02
+    assert figures["turned"] == 0.0
+    # Feet never cross, and the way does not drift aside.
+    assert figures["step_width"]["least"] > 0.02
+    assert abs(record.space_com[-1, 1]) < 0.2
+    assert np.all(np.abs(record.torque) <= 2.7 + 1e-9)
+
+
+@pytest.mark.slow(seconds=1)
+def test_the_planar_part_is_the_view_of_the_space(straight):
+    record, _ = straight
+    np.testing.assert_allclose(record.com, record.space_com[:, [0, 2]], atol=1e-12)
+    np.testing.assert_allclose(record.foot, record.space_foot[:, :, [0, 2]], atol=1e-12)
+    np.testing.assert_allclose(record.contact_force, record.space_force[:, :, [0, 2]], atol=1e-9)
+
+
+@pytest.mark.slow(seconds=1)
+def test_a_record_is_read_as_it_was_written(straight, tmp_path):
+    record, _ = straight
+    again = load_record(record.save(tmp_path / "run.npz"))
+    assert isinstance(again, tc.FreeRecord)
+    for name in ("q", "space_com", "attitude", "sway", "side_reference"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(record, name))
+    assert again.metadata == json.loads(json.dumps(record.metadata))
+
+
+@pytest.mark.slow(seconds=10)
+def test_bolt_turns():
+    """The heading turns at each section, and the path with it."""
+    record, gait = walked(tc.Course(turning_rate=0.25))
+    assert not record.fell, record.metadata["fall_reason"]
+    per_step = 0.25 * gait.step_duration
+    assert record.heading[-1] == pytest.approx(STEPS * per_step, abs=1.01 * per_step)
+    a, b = record.space_com[-400, :2], record.space_com[-1, :2]
+    direction = np.arctan2(*(b - a)[::-1])
+    assert direction == pytest.approx(record.heading[-1], abs=0.15)
+
+
+@pytest.mark.slow(seconds=8)
+def test_the_command_walks_free(tmp_path, capfd):
+    words = ["walk", "--robot", "bolt", "--free", "--steps", "4", "--turn", "0.2", "--json"]
+    assert main([*words, "--output", str(tmp_path / "run")]) == 0
+    figures = json.loads(capfd.readouterr().out)
+    assert figures["steps"] == 4
+    assert figures["turned"] > 0.1
+    assert {"from_above.png", "lateral_portrait.png", "attitude.png", "run.toml"} <= {
+        path.name for path in (tmp_path / "run").iterdir()
+    }
+
+
+def test_what_a_free_robot_cannot_do_is_refused(refused):
+    assert "five-link" in refused(["walk", "--free", "--steps", "2"])
+    assert "course" in refused(["walk", "--turn", "0.2", "--steps", "2"])
+    robot = load_free_robot("bolt")
+    planner = tc.LqrPlanner(tc.default_gait(robot))
+    for options, culprit in (
+        (tc.SimulationOptions(plant=tc.IdealOptions()), "ideal"),
+        (tc.SimulationOptions(embedding=replace(tc.EmbeddingOptions(), friction=0.5)), "Free"),
+    ):
+        with pytest.raises(ParameterError, match=culprit):
+            tc.simulate(robot, planner, options)
