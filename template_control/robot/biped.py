@@ -134,11 +134,19 @@ class Biped(ABC):
 
     @abstractmethod
     def hips(self, q: Array, v: Array) -> tuple[Array, float]:
-        """(2,) position of that point [m], and its forward speed [m/s], at the last update."""
+        """(2,) position of that point [m], and its forward speed [m/s].
+
+        Args:
+            q, v: of the last update.
+        """
 
     @abstractmethod
     def trunk(self, q: Array, v: Array) -> tuple[float, float]:
-        """Pitch of the trunk [rad] and its rate [rad/s], at the last update."""
+        """Pitch of the trunk [rad] and its rate [rad/s].
+
+        Args:
+            q, v: of the last update.
+        """
 
     @abstractmethod
     def tilt(self, q: Array) -> float:

@@ -39,10 +39,16 @@ _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 class PlanarBiped(Biped):
     """Model of a planar biped and its kinematics and dynamics at the last :meth:`update`.
 
-    :meth:`from_urdf` makes one from a file. The constructor takes ``path``, ``urdf``, ``model``,
-    ``feet``, ``foot_radius`` and ``walk`` of the attributes.
+    :meth:`from_urdf` makes one from a file. Its attributes are those of
+    :class:`~.biped.Biped`, and those below.
 
-    Its attributes are those of :class:`~.biped.Biped`, and:
+    Args:
+        path: the URDF file.
+        urdf: its text.
+        model: Pinocchio's of it.
+        feet: names of the two foot frames, left then right.
+        foot_radius: of the foot spheres [m].
+        walk: the robot's own gait, or None.
 
     Attributes:
         joint_sign: (nv - 3,) 1 where a joint turns about +y, -1 where it does about -y.

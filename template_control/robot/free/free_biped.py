@@ -61,9 +61,16 @@ class JointLimits(Checked):
 class FreeBiped(Biped):
     """Model of a free biped, and its kinematics and dynamics at the last :meth:`update`.
 
-    :meth:`from_urdf` makes one from a file. The constructor takes ``path``, ``urdf``, ``model``,
-    ``feet``, ``foot_radius`` and ``walk`` of the attributes. These are those of
-    :class:`~template_control.robot.biped.Biped`, and:
+    :meth:`from_urdf` makes one from a file. Its attributes are those of
+    :class:`~template_control.robot.biped.Biped`, and those below.
+
+    Args:
+        path: the URDF file.
+        urdf: its text.
+        model: Pinocchio's of it.
+        feet: names of the two foot frames, left then right.
+        foot_radius: of the foot spheres [m].
+        walk: the robot's own gait, or None.
 
     Attributes:
         heading: angle from the world's x to the heading frame's, to the left positive [rad].
