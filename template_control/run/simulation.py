@@ -29,7 +29,7 @@ from template_control.run.metadata import about, outcome
 from template_control.run.options import Push, SimulationOptions, check_pushes
 from template_control.run.record import Record, RunInterrupted
 from template_control.run.recorder import Recorder, Truth
-from template_control.run.sensing import Sensors, TorqueDelay
+from template_control.run.sensing import Senses, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
@@ -108,6 +108,7 @@ def simulate(
     last = _last_step(controller, o)
     with in_use(robot, controller.planning.route, *controller.planning.planners.values()):
         q, v = kind.start(controller, o)
+        senses = kind.senses(controller, o)
         _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
         # Before the run, which would be lost if this failed after it.
         metadata = about(controller, o)
@@ -116,7 +117,7 @@ def simulate(
         with kind.plant(o.plant) as plant:
             plant.reset(q, v)
             try:
-                reason = _loop(plant, controller, recorder, o, (last, progress))
+                reason = _loop(plant, controller, recorder, o, senses, (last, progress))
             except KeyboardInterrupt as error:
                 if not recorder.rows:
                     raise
@@ -176,6 +177,7 @@ def _loop(
     controller: EmbeddingController,
     recorder: Recorder,
     o: SimulationOptions,
+    senses: Senses,
     until: tuple[float, Callable[[int], None] | None],
 ) -> str:
     """Run until the steps are done ("") or the robot falls (why).
@@ -185,8 +187,7 @@ def _loop(
     last, progress = until
     robot, planning = controller.robot, controller.planning
     dt = o.plant.time_step
-    length = controller.parameters.rest_length
-    sensors, delay = Sensors(o.sensors, robot, length), TorqueDelay(o.delay_ticks)
+    delay = TorqueDelay(o.delay_ticks)
     q, v, forces = robot.neutral(), np.zeros(robot.nv), np.zeros((2, robot.directions))
     threshold = o.falls.contact_force * robot.mass * robot.gravity
     done, tick = 0, 0
@@ -197,11 +198,13 @@ def _loop(
         plant.contact_forces(forces)
         start = time.perf_counter()
         try:
-            solution = controller.tick(*sensors.measure(q, v), forces[:, -1] > threshold, dt)
+            touching = forces[:, -1] > threshold
+            solution = controller.tick(*senses.measure(q, v, touching), touching, dt)
         except ParameterError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start
-        if sensors.noisy:
+        senses.expect(solution.acceleration)
+        if not senses.exact:
             robot.update(q, v)  # what is recorded is true
         if len(begun) < len(controller.reports):
             # A step that changes into another stride keeps its pushes where they were.

@@ -23,6 +23,7 @@ from template_control.run.kinds.free_recorder import FreeRecorder
 from template_control.run.kinds.kind import Kind
 from template_control.run.options import SimulationOptions
 from template_control.run.recorder import Recorder
+from template_control.run.sensing import Senses, SensorOptions, Sensors
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.lateral.cycle import LateralWish
 from template_control.slip.maps.section import VLO
@@ -114,6 +115,19 @@ class Free(Kind):
             f"{self.robot.name} walks free in PyBullet only, and the plant is"
             f" {plant_name(world)}: give PlantOptions"
         )
+
+    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+        """See :meth:`.kind.Kind.senses`.
+
+        Raises:
+            ParameterError: if the state is to be estimated.
+        """
+        if not isinstance(o.sensors, SensorOptions):
+            raise ParameterError(
+                f"{self.robot.name} walks free, and the estimate is that of a planar robot: give"
+                " SensorOptions"
+            )
+        return Sensors(o.sensors, self.robot, controller.parameters.rest_length)
 
     def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
         """See :meth:`.kind.Kind.recorder`."""

@@ -14,6 +14,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.plant.plant import Plant, World
 from template_control.run.options import SimulationOptions
 from template_control.run.recorder import Recorder
+from template_control.run.sensing import Senses
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.scenario.route import Route
 
@@ -58,6 +59,15 @@ class Kind(ABC):
 
         Args:
             world: options of a plant, or a plant.
+        """
+
+    @abstractmethod
+    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+        """What tells the controller the state.
+
+        Args:
+            controller: of the robot.
+            o: how the run goes.
         """
 
     @abstractmethod

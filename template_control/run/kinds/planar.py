@@ -14,15 +14,18 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.standing.pose import standing_pose
 from template_control.errors import ParameterError
+from template_control.estimation.imu import ImuOptions, ImuSensors
 from template_control.plant.plant import Plant, World, open_plant
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, state_at_vlo, state_in
 from template_control.run.kinds.kind import Kind
 from template_control.run.options import Course, SimulationOptions
 from template_control.run.recorder import Recorder
+from template_control.run.sensing import Senses, Sensors
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.maps.section import APEX, REST
 from template_control.slip.scenario.route import Route
+from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
 
@@ -87,6 +90,13 @@ class Planar(Kind):
     def plant(self, world: World) -> AbstractContextManager[Plant]:
         """See :meth:`.kind.Kind.plant`."""
         return open_plant(self.robot, world)
+
+    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+        """See :meth:`.kind.Kind.senses`."""
+        parameters = controller.parameters
+        if isinstance(o.sensors, ImuOptions):
+            return ImuSensors(o.sensors, self.robot, Scale.of(parameters), o.plant.time_step)
+        return Sensors(o.sensors, self.robot, parameters.rest_length)
 
     def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
         """See :meth:`.kind.Kind.recorder`."""
