@@ -1,5 +1,6 @@
 from . import embedding as embedding
 from . import errors as errors
+from . import estimation as estimation
 from . import paper as paper
 from . import plant as plant
 from . import robot as robot

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 import template_control as tc
-from template_control import embedding, run, slip, sweep, whole_body
+from template_control import embedding, estimation, run, slip, sweep, whole_body
 from template_control.plant import BulletPlant, IdealPlant, MujocoPlant
 from template_control.robot import state_at_vlo
 from template_control.robustness import measure, trial
@@ -115,8 +115,8 @@ def targets(folder):
         embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
         embedding.RunningOptions, embedding.StandingOptions, slip.PaceOptions,
         embedding.SwingOptions, embedding.TrimOptions, embedding.UnloadOptions, run.FallOptions,
-        sweep.SweepOptions, whole_body.ComTask, whole_body.FootTask, whole_body.MomentumTask,
-        whole_body.PostureTask, whole_body.QpOptions,
+        estimation.ImuOptions, sweep.SweepOptions, whole_body.ComTask, whole_body.FootTask,
+        whole_body.MomentumTask, whole_body.PostureTask, whole_body.QpOptions,
     )  # fmt: skip
     calls = {kind: {} for kind in options}
     calls |= {

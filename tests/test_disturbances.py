@@ -166,12 +166,12 @@ def test_the_controller_gets_noise_and_the_record_the_truth(robot, gait, monkeyp
 
 
 def test_noise_is_seeded_and_scales_with_the_template(robot):
-    q, v = np.zeros(robot.nv), np.zeros(robot.nv)
+    q, v, contact = np.zeros(robot.nv), np.zeros(robot.nv), np.ones(2, dtype=bool)
     options = SensorOptions(position_noise=1e-3, velocity_noise=0.1, seed=5)
     first, again = Sensors(options, robot, 1.0), Sensors(options, robot, 0.5)
     other = Sensors(SensorOptions(1e-3, 0.1, seed=6), robot, 1.0)
     for _ in range(3):
-        a, b, c = (s.measure(q, v) for s in (first, again, other))
+        a, b, c = (s.measure(q, v, contact) for s in (first, again, other))
         for i in range(2):
             np.testing.assert_allclose(b[i][:2], 0.5 * a[i][:2])
             np.testing.assert_array_equal(b[i][2:], a[i][2:])

@@ -20,8 +20,8 @@ COMMANDS = (
     "automaton", "reproduce",
 )  # fmt: skip
 ROOMS = (
-    "slip", "robot", "whole_body", "embedding", "plant", "run", "robustness", "sweep", "view",
-    "paper",
+    "slip", "robot", "whole_body", "estimation", "embedding", "plant", "run", "robustness",
+    "sweep", "view", "paper",
 )  # fmt: skip
 # What the root exported when it exported everything.
 ONCE_IN_THE_ROOT = (

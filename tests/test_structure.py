@@ -18,7 +18,7 @@ LIBRARY = ROOT / "template_control"
 # A room imports from itself and from rooms of earlier stages; those of one stage are independent.
 STAGES = (
     ("slip", "robot"),
-    ("whole_body",),
+    ("whole_body", "estimation"),
     ("embedding",),
     ("plant",),
     ("run", "sweep"),

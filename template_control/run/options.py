@@ -10,6 +10,7 @@ from template_control.checks.checked import Checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
+from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
@@ -90,8 +91,8 @@ class SimulationOptions(Checked):
         pose: CoM and feet to start with; None: over the stance foot at VLO, and at apex with the
             feet where the gait has them. A stride in which one leg lands again and again needs it.
         pushes: disturbances.
-        sensors: noise on the state the controller gets; the plant and the record have the
-            true one.
+        sensors: what the controller gets to know of the state: all of it, with noise; or what
+            encoders, IMU and contacts make of it. The plant and the record have the true one.
         delay: from a measurement to the torques computed from it [s], a whole number of
             physics steps.
         record_every: keep every n-th sample.
@@ -109,7 +110,7 @@ class SimulationOptions(Checked):
     start: tuple[float, float, float] | None = None
     pose: Pose | None = None
     pushes: tuple[Push, ...] = ()
-    sensors: SensorOptions = field(default_factory=SensorOptions)
+    sensors: SensorOptions | ImuOptions = field(default_factory=SensorOptions)
     delay: NotNegative = 0.0
     record_every: Count = 1
     falls: FallOptions = field(default_factory=FallOptions)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ _VELOCITY_NOISE = 20.0  # [1/s] noise of velocities over that of positions
 
 @dataclass(frozen=True)
 class SensorOptions(Checked):
-    """White Gaussian noise on the measured state, drawn anew at every tick.
+    """The whole state is measured, with white Gaussian noise, drawn anew at every tick.
 
     Attributes:
         position_noise: standard deviation of the pitch and of every joint's angle [rad]; of
@@ -32,6 +33,8 @@ class SensorOptions(Checked):
     Raises:
         ParameterError: if a number is negative or not finite.
     """
+
+    kind: ClassVar[str] = "state"
 
     position_noise: NotNegative = 0.0
     velocity_noise: NotNegative = 0.0
@@ -53,6 +56,33 @@ class SensorOptions(Checked):
         return cls(noise, _VELOCITY_NOISE / scale.time * noise, seed)
 
 
+class Senses(Protocol):
+    """What tells the controller the state, tick by tick."""
+
+    @property
+    def exact(self) -> bool:
+        """Whether what is told is the truth."""
+
+    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Measure a state; the true arrays are left alone.
+
+        Args:
+            q: (nv,) true configuration [m, rad].
+            v: (nv,) true velocity [m/s, rad/s].
+            contact: (2,) whether each foot touches the ground.
+
+        Returns:
+            The q and v that the controller gets.
+        """
+
+    def expect(self, acceleration: Array) -> None:
+        """Hear what the controller expects to happen until the next tick.
+
+        Args:
+            acceleration: (nv,) [m/s^2, rad/s^2].
+        """
+
+
 class Sensors:
     """Measures the state of a robot.
 
@@ -63,26 +93,21 @@ class Sensors:
     """
 
     def __init__(self, options: SensorOptions, robot: PlanarBiped, length: float) -> None:
-        self.noisy = options.position_noise > 0.0 or options.velocity_noise > 0.0
+        self.exact = options.position_noise == options.velocity_noise == 0.0
         self._draws = np.random.default_rng(options.seed)
         scale = np.ones(robot.nv)
         scale[:_TRANSLATIONS] = length
         self._deviation = np.outer((options.position_noise, options.velocity_noise), scale)
 
-    def measure(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Measure a state; the true arrays are left alone.
-
-        Args:
-            q: (nv,) true configuration [m, rad].
-            v: (nv,) true velocity [m/s, rad/s].
-
-        Returns:
-            The measured q and v; without noise these are the true arrays themselves.
-        """
-        if not self.noisy:
+    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """As :meth:`Senses.measure`; without noise the true arrays themselves."""
+        if self.exact:
             return q, v
         noise = self._deviation * self._draws.standard_normal(self._deviation.shape)
         return q + noise[0], v + noise[1]
+
+    def expect(self, acceleration: Array) -> None:
+        """Nothing is expected: each tick is measured for itself."""
 
 
 class TorqueDelay:

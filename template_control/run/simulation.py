@@ -20,6 +20,7 @@ from template_control.embedding.robot_route import robot_route
 from template_control.embedding.section_report import SectionReport
 from template_control.embedding.standing.pose import standing_pose
 from template_control.errors import ParameterError
+from template_control.estimation.imu import ImuOptions, ImuSensors
 from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, state_at_vlo, state_in
@@ -28,7 +29,7 @@ from template_control.run.metadata import about, outcome
 from template_control.run.options import Push, SimulationOptions, check_pushes
 from template_control.run.record import Record, RunInterrupted
 from template_control.run.recorder import Recorder, Truth
-from template_control.run.sensing import Sensors, TorqueDelay
+from template_control.run.sensing import Senses, Sensors, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
@@ -36,6 +37,7 @@ from template_control.slip.maps.section import APEX, REST, VLO
 from template_control.slip.scenario.catching import CatchingRoute
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
 
@@ -206,8 +208,7 @@ def _loop(
     last, progress = until
     robot, planning = controller.robot, controller.planning
     dt = o.plant.time_step
-    length = controller.parameters.rest_length
-    sensors, delay = Sensors(o.sensors, robot, length), TorqueDelay(o.delay_ticks)
+    sensors, delay = _senses(controller, o), TorqueDelay(o.delay_ticks)
     q, v, forces = np.zeros(robot.nv), np.zeros(robot.nv), np.zeros((2, 2))
     threshold = o.falls.contact_force * robot.mass * robot.gravity
     done, tick = 0, 0
@@ -218,11 +219,13 @@ def _loop(
         plant.contact_forces(forces)
         start = time.perf_counter()
         try:
-            solution = controller.tick(*sensors.measure(q, v), forces[:, 1] > threshold, dt)
+            touching = forces[:, 1] > threshold
+            solution = controller.tick(*sensors.measure(q, v, touching), touching, dt)
         except ParameterError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start
-        if sensors.noisy:
+        sensors.expect(solution.acceleration)
+        if not sensors.exact:
             robot.update(q, v)  # what is recorded is true
         if len(begun) < len(controller.reports):
             # A step that changes into another stride keeps its pushes where they were.
@@ -243,6 +246,14 @@ def _loop(
             return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
     return ""
+
+
+def _senses(controller: EmbeddingController, o: SimulationOptions) -> Senses:
+    """What tells the controller the state."""
+    robot, parameters = controller.robot, controller.parameters
+    if isinstance(o.sensors, ImuOptions):
+        return ImuSensors(o.sensors, robot, Scale.of(parameters), o.plant.time_step)
+    return Sensors(o.sensors, robot, parameters.rest_length)
 
 
 def _tell(report: SectionReport, number: int) -> None:

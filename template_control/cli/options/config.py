@@ -10,6 +10,7 @@ from template_control.cli.options.gait import gait_choice, planner_choice, scena
 from template_control.cli.options.robot import robot_choice
 from template_control.cli.options.world import simulation_choice
 from template_control.errors import ParameterError
+from template_control.estimation.imu import ImuOptions
 from template_control.run.config import Ready, RunConfig
 from template_control.run.sensing import SensorOptions
 from template_control.run.simulation import perturbed_start
@@ -70,6 +71,13 @@ def prepared(
     simulation = config.simulation
     if options.seed is not None:
         simulation = replace(simulation, start=perturbed_start(ready.gait, options.seed))
+    estimate = getattr(options, "estimate", False)
+    if estimate and options.noise is not None:
+        raise ParameterError(
+            "--noise does not go with --estimate, which has its own: leave one out"
+        )
+    if estimate:
+        simulation = replace(simulation, sensors=ImuOptions(seed=options.seed or 0))
     if options.noise is not None:
         scale = Scale.of(ready.gait.parameters)
         sensors = SensorOptions.of_size(options.noise, scale, simulation.sensors.seed)

@@ -57,7 +57,7 @@ def add_world_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
-    """Add ``--push``, ``--noise``, ``--delay`` and ``--seed``."""
+    """Add ``--push``, ``--noise``, ``--estimate``, ``--delay`` and ``--seed``."""
     parser.add_argument(
         "--push",
         action="append",
@@ -71,6 +71,12 @@ def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
         metavar="RAD",
         help="standard deviation of the noise on measured angles; on positions it is this times"
         " l0, on velocities 20 times as many per second",
+    )
+    parser.add_argument(
+        "--estimate",
+        action="store_true",
+        help="the controller does not get the state, but what encoders (0.2 mrad), an IMU (5 mrad/s"
+        " and 0.1 m/s^2) and the contacts of the feet make of it",
     )
     parser.add_argument(
         "--delay",

@@ -1,0 +1,99 @@
+"""Walking from an estimated state: simulated encoders, IMU and contacts, and the estimator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Index, NotNegative
+from template_control.estimation.estimator import EstimatorOptions, StateEstimator
+from template_control.estimation.readings import Readings
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.similarity import Scale, scaled
+
+Array = NDArray[np.float64]
+
+_PITCH = 2
+
+
+@dataclass(frozen=True)
+class ImuOptions(Checked):
+    """Encoders, an IMU in the trunk and contacts; the controller gets an estimate of the state.
+
+    The IMU sits where the legs hang. Noise is white and Gaussian, drawn anew at every tick.
+
+    Attributes:
+        encoder_noise: standard deviation of a joint's angle [rad].
+        gyro_noise: of the pitch rate [rad/s].
+        accelerometer_noise: of either component of the specific force [m/s^2].
+        seed: of the draws.
+        estimator: what makes the state of it; scaled to the robot.
+
+    Raises:
+        ParameterError: if a number is negative or not finite.
+    """
+
+    kind: ClassVar[str] = "imu"
+
+    encoder_noise: NotNegative = 2e-4
+    gyro_noise: NotNegative = 5e-3
+    accelerometer_noise: NotNegative = 0.1
+    seed: Index = 0
+    estimator: EstimatorOptions = field(default_factory=EstimatorOptions)
+
+
+class ImuSensors:
+    """Reads a robot's sensors and estimates its state; the state it starts in is known.
+
+    Args:
+        options: the noise.
+        robot: whose state; its last update is overwritten.
+        scale: of the robot's template.
+        time_step: from tick to tick [s].
+    """
+
+    exact = False
+
+    def __init__(
+        self, options: ImuOptions, robot: PlanarBiped, scale: Scale, time_step: float
+    ) -> None:
+        self._options = options
+        self._robot = robot
+        self._estimator = StateEstimator(robot, scaled(options.estimator, scale))
+        self._draws = np.random.default_rng(options.seed)
+        self._dt = time_step
+        self._before: tuple[Array, Array] | None = None
+        self._expected = np.zeros(robot.nv)
+
+    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """As :meth:`~template_control.run.sensing.Senses.measure`."""
+        dt = 0.0 if self._before is None else self._dt
+        if self._before is None:
+            self._estimator.reset(q, v)
+            self._before = q, v
+        found = self._estimator.update(self._read(q, v, contact), self._expected, dt)
+        self._before = q.copy(), v.copy()
+        return found
+
+    def expect(self, acceleration: Array) -> None:
+        """As :meth:`~template_control.run.sensing.Senses.expect`."""
+        self._expected = acceleration
+
+    def _read(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> Readings:
+        o, draws = self._options, self._draws
+        assert self._before is not None
+        old_q, old_v = self._before
+        acceleration = (v[:_PITCH] - old_v[:_PITCH]) / self._dt + (0.0, self._robot.gravity)
+        pitch = 0.5 * (q[_PITCH] + old_q[_PITCH])
+        sine, cosine = np.sin(pitch), np.cos(pitch)
+        turn = np.array([[cosine, -sine], [sine, cosine]])  # from the world into the trunk
+        return Readings(
+            joints=q[3:] + o.encoder_noise * draws.standard_normal(len(q) - 3),
+            pitch_rate=float(v[_PITCH] + o.gyro_noise * draws.standard_normal()),
+            specific_force=turn @ acceleration + o.accelerometer_noise * draws.standard_normal(2),
+            contact=contact,
+        )
