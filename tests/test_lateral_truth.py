@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from space_slip import acceleration as space_acceleration
 from space_slip import energy, step
 
 from template_control.embedding import LqrPlanner
@@ -22,7 +23,7 @@ from template_control.slip import (
     simulate_stride,
 )
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.lateral.transition import transition
+from template_control.slip.lateral.transition import acceleration, transition
 from template_control.slip.maps.section import VLO
 
 P = SlipParameters()
@@ -185,3 +186,16 @@ def test_a_walk_turns_and_keeps_its_width():
     # The way that it goes turns with its heading: at a section it is half a turn ahead.
     way = np.arctan2(walker.state[4], walker.state[3])
     assert abs(walker.heading.yaw(way) - 0.02) < 0.004
+
+
+def test_acceleration_is_the_walkers_to_the_first_order():
+    stride, path = planar(WALK.vlo, WALK.controls)
+    k, feet = WALK.controls[Slot.K_SC], 1e-4 * np.array([0.3, 9.0, -1.0])
+    y = -0.4e-4
+    for time in np.linspace(0.0, 0.999 * stride.duration, 20):
+        row = np.searchsorted(stride.meta[:, 0], time, side="right") - 1
+        x, z, *_ = stride.sample(time)[0]
+        bearing = [i for i in range(2) if stride.meta[row, 5 + i] > 0.0]
+        toes = [(stride.meta[row, 3 + i], feet[path.footholds[row, i]]) for i in bearing]
+        truth = space_acceleration(P, np.array([x, y, z, 0.0, 0.0, 0.0]), toes, [k] * len(toes))
+        assert np.isclose(acceleration(path, time, y, feet), truth[1], rtol=1e-6, atol=1e-12)
