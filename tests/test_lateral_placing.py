@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import minimize_scalar
 
+from template_control.parts import ready
 from template_control.slip import (
     LateralLearnt,
     LateralOptions,
@@ -23,6 +24,7 @@ from template_control.slip import (
     simulate_stride,
 )
 from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.lateral.kernels import LATERAL as KERNELS
 from template_control.slip.lateral.transition import transition
 from template_control.slip.maps.section import VLO
 
@@ -212,3 +214,12 @@ def test_a_learnt_offset_keeps_the_wished_width():
     assert np.isclose(com[0] - stance, cycle.states[side.row, 0], atol=1e-6)
     got = place(PATH, to, 0.0, com, np.array([stance, 0.0]))
     assert np.isclose(side * (stance - got.y), 0.2, atol=1e-5)
+
+
+def test_a_tick_compiles_nothing_anew():
+    ready(KERNELS)
+    known = [len(f.signatures) for f in (place, transition)]
+    options = LateralOptions(step_cost=1, reach=1)  # whole numbers are taken too
+    cycle, two = lateral_cycle(LATERAL, LateralWish(1)), np.zeros(2)
+    place(PATH, lateral_aim(LATERAL, cycle, Side.LEFT, LateralLearnt(), options), 0.0, two, two)
+    assert [len(f.signatures) for f in (place, transition)] == known

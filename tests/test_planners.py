@@ -12,7 +12,7 @@ from template_control.embedding.learners.momentum_trim import (
     TrimOptions,
     uncontrolled,
 )
-from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt
@@ -63,6 +63,24 @@ def test_planner_answers_for_every_state(brisk_gait, speed, height, vertical):
         k0 = P.leg_stiffness
         for slot in (Slot.K_SC, Slot.K_SD):
             assert 0.5 * k0 - 1e-6 <= decision.controls[slot] <= 1.5 * k0 + 1e-6
+
+
+@pytest.mark.parametrize("z", [[1.18, 0.927, -0.14], [1.3, 0.94, -0.4], [1.37, 0.948, -0.39]])
+def test_a_foot_can_be_given_time_until_touchdown(gait, z):
+    earliest, times = 0.03, []
+    for options in (LqrOptions(), LqrOptions(earliest_touchdown=earliest)):
+        decision = LqrPlanner(gait, options).decide(np.array(z))
+        assert decision.feasible
+        stride = simulate_stride(P, STRIDE_START["w"], VLO.state(z), decision.controls)
+        times.append(stride.time_of(Event.TOUCHDOWN))
+    assert times[0] < earliest
+    assert times[1] > 0.99 * earliest
+
+
+def test_time_until_touchdown_changes_nothing_where_there_is_enough(gait):
+    z = gait.vlo + [0.02, 0.003, -0.03]
+    hasty, calm = (LqrPlanner(gait, LqrOptions(earliest_touchdown=t)).decide(z) for t in (0, 0.1))
+    np.testing.assert_array_equal(hasty.controls, calm.controls)
 
 
 @pytest.mark.parametrize("shift", [[0.04, 0.0, 0.0], [0.0, 0.006, 0.0], [0.0, 0.0, 0.1]])

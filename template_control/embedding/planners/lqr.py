@@ -46,6 +46,7 @@ from template_control.slip.similarity import (
     PER_LENGTH_SQUARED,
     PER_SPEED_SQUARED,
     SPEED,
+    TIME,
     Scale,
     scaled,
     tuned,
@@ -137,6 +138,8 @@ class LqrOptions(Checked):
             knees can carry it.
         top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the
             foot would touch down at once.
+        earliest_touchdown: no foot is to touch down so soon after VLO [s]: in a plane the swing
+            leg comes in time, and 0 is no bound; one that has to move aside too needs some.
         trusted_price: the linear law's step is taken without a search below this price.
         spread: half-widths of the search in alpha [rad] and kappa_2 / k0.
         search: points, rounds and weights of the search.
@@ -160,6 +163,7 @@ class LqrOptions(Checked):
     stiffness_range: Interval = tuned((0.5, 1.5))
     angle_range: Interval = tuned((-0.12, 0.065))
     top_margin: NotNegative = tuned(0.01)
+    earliest_touchdown: NotNegative = tuned(0.0, TIME)
     trusted_price: NotNegative = tuned(1.0)
     spread: tuple[NotNegative, NotNegative] = tuned((0.16, 0.25))
     search: SearchOptions = field(default_factory=SearchOptions)
@@ -246,6 +250,7 @@ class LqrPlanner:
             enough=o.trusted_price,
             first_weight=o.search.first_weight,
             top_margin=o.top_margin,
+            earliest=o.earliest_touchdown,
             stiffness=p.leg_stiffness,
             kernel=stride_kernel(p, self.gait.stride),
         )

@@ -64,6 +64,7 @@ class Law(NamedTuple):
         enough: a cost below which no other second step is tried.
         first_weight: of the cost-to-go after the first step beside that after the second.
         top_margin: alpha stays this far [rad] below asin(y / l0).
+        earliest: alpha also stays below asin(y / l0) this long after VLO [s].
         stiffness: k0 [N/m].
         kernel: the template's walking step.
     """
@@ -80,6 +81,7 @@ class Law(NamedTuple):
     enough: float
     first_weight: float
     top_margin: float
+    earliest: float
     stiffness: float
     kernel: Kernel
 
@@ -95,15 +97,20 @@ def _copy(source: Array, target: Array) -> None:
 def bounded(law: Law, z: Array, u: Array) -> None:
     """Clip controls in place to what is admissible at a VLO state.
 
+    The height a short time after VLO comes from its Taylor series to the second order.
+
     Args:
-        law: its bounds and its ``top_margin`` count.
+        law: its bounds, its ``top_margin`` and its ``earliest`` count.
         z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
         u: (c,) alpha [rad], stiffnesses/k0; overwritten.
     """
     for i in range(u.shape[0]):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
-    top = np.arcsin(min(z[1] / law.kernel.rest_length, 1.0)) - law.top_margin
-    u[0] = min(u[0], top)
+    length, t = law.kernel.rest_length, law.earliest
+    top = np.arcsin(min(z[1] / length, 1.0)) - law.top_margin
+    lift = u[1] * law.stiffness / law.kernel.mass * (length - z[1]) - law.kernel.gravity
+    later = z[1] + t * (z[2] + 0.5 * t * lift)
+    u[0] = min(u[0], top, np.arcsin(min(max(later / length, 0.0), 1.0)))
 
 
 @compiled

@@ -94,6 +94,7 @@ def step_search() -> None:
         enough=1.0,
         first_weight=0.3,
         top_margin=0.01,
+        earliest=0.0,
         stiffness=_K0,
         kernel=stride_kernel(_TEMPLATE, "w"),
     )
