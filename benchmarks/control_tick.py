@@ -1,6 +1,6 @@
-"""Time of a control tick, split into its parts, over a walk or a run in PyBullet.
+"""Time of a control tick, split into its parts, over a walk, a run or a walk in space, in PyBullet.
 
-Run: python benchmarks/control_tick.py [steps] [--gait walk] [--gait run] [--speed 3]
+Run: python benchmarks/control_tick.py [steps] [--gait walk] [--gait run] [--gait free] [--speed 3]
 
 Times are those of the thread: whatever else the machine does in between does not count.
 """
@@ -17,18 +17,27 @@ from rich.console import Console
 from rich.table import Table
 
 from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.references.apex_pose import ApexStart, apex_pose
+from template_control.embedding.robot_template import template_for
 from template_control.plant.bullet import BulletPlant, PlantOptions
-from template_control.robot.library import load_robot
+from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.library import load_free_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import state_at_vlo, state_in
+from template_control.run.kinds.free import Free
+from template_control.run.options import SimulationOptions
+from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import SteadyRoute
 
+GAITS = ("walk", "run", "free")
 _WARM_UP = 3  # steps, while the compiled kernels load
 
 Times = dict[str, np.ndarray[Any, Any]]
@@ -68,15 +77,30 @@ def _running(robot: PlanarBiped, speed: float) -> tuple[EmbeddingController, Any
     return controller, q, v
 
 
-def measure(steps: int, speed: float | None = None) -> Times:
+def _free() -> tuple[EmbeddingController, Any, Any]:
+    """As :func:`_walking`, of Bolt in space."""
+    kind = Free(load_free_robot("bolt"))
+    gait = gait_at(template_for(kind.robot), np.radians(68.0), 0.6)
+    route = SteadyRoute.of(gait)
+    controller = kind.controller(LqrPlanner(gait), FreeOptions(), route, AUTOMATON)
+    q, v = kind.start(controller, SimulationOptions())
+    return controller, q, v
+
+
+def measure(steps: int, gait: str = "walk", speed: float = 3.0) -> Times:
     """Seconds of every tick by part.
 
     Args:
         steps: that count; a few more are made before.
-        speed: of a run [m/s]; None: walk.
+        gait: walk, run, or free: a walk in space.
+        speed: of a run [m/s].
     """
-    robot = load_robot("five-link")
-    controller, q, v = _walking(robot) if speed is None else _running(robot, speed)
+    if gait == "free":
+        controller, q, v = _free()
+    else:
+        planar = load_robot("five-link")
+        controller, q, v = _walking(planar) if gait == "walk" else _running(planar, speed)
+    robot = controller.robot
     planning = controller.planning
     update: list[float] = []
     quadratic: list[float] = []
@@ -91,8 +115,11 @@ def measure(steps: int, speed: float | None = None) -> Times:
         workspace.solve = _timed(workspace.solve, solves)  # type: ignore[method-assign]
     ticks: list[float] = []
     physics: list[float] = []
-    forces, dt, warm = np.zeros((2, 2)), 1e-3, 0
-    with BulletPlant(robot, PlantOptions(time_step=dt)) as plant:
+    forces, dt, warm = np.zeros((2, robot.directions)), 1e-3, 0
+    options = PlantOptions(time_step=dt)
+    free = isinstance(robot, FreeBiped)
+    touching = 5e-3 * robot.mass * robot.gravity
+    with FreeBulletPlant(robot, options) if free else BulletPlant(robot, options) as plant:
         plant.reset(q, v)
         while len(controller.reports) <= steps + _WARM_UP:
             if len(controller.reports) <= _WARM_UP:
@@ -102,7 +129,7 @@ def measure(steps: int, speed: float | None = None) -> Times:
             for part in (update, quadratic, plans, solves):
                 part.append(0.0)
             start = time.thread_time()
-            solution = controller.tick(q, v, forces[:, 1] > 4.0, dt)
+            solution = controller.tick(q, v, forces[:, -1] > touching, dt)
             ticks.append(time.thread_time() - start)
             start = time.thread_time()
             plant.step(solution.torque)
@@ -156,11 +183,11 @@ def main() -> None:
     """Print a table for each gait."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("steps", nargs="?", type=int, default=200)
-    parser.add_argument("--gait", action="append", choices=("walk", "run"), help="both if none")
+    parser.add_argument("--gait", action="append", choices=GAITS, help="walk, run if none")
     parser.add_argument("--speed", type=float, default=3.0, help="of the run [m/s]")
     options = parser.parse_args()
     for gait in options.gait or ("walk", "run"):
-        parts = measure(options.steps, None if gait == "walk" else options.speed)
+        parts = measure(options.steps, gait, options.speed)
         _print(f"control tick over {options.steps} steps, {gait}", parts)
 
 

@@ -9,6 +9,8 @@ import pytest
 from template_control.errors import RobotError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.plant.free.mujoco import FreeMujocoPlant
+from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.free.start import FreePose, free_state_in
 from template_control.robot.library import load_free_robot, robot_path
@@ -33,9 +35,8 @@ def of_world(q, v):
     return np.concatenate((rotation @ v[:3], rotation @ v[3:6], v[6:]))
 
 
-def bullet_acceleration(plant, q, v, torque):
+def plant_acceleration(robot, plant, q, v, torque):
     """By one step of the plant, in the world's axes: its integration is semi-implicit."""
-    robot = plant.robot
     after_q, after_v = np.zeros(robot.nq), np.zeros(robot.nv)
     plant.reset(q, v)
     plant.step(torque)
@@ -51,33 +52,46 @@ def model_acceleration(robot, q, v, torque):
     return np.concatenate((linear, rotation @ a[3:6], a[6:]))
 
 
-def test_forward_dynamics_agree_with_pybullet(bolt):
+PLANTS = pytest.mark.parametrize(
+    "plant_of",
+    [
+        lambda robot: FreeBulletPlant(robot, PlantOptions()),
+        lambda robot: FreeMujocoPlant(robot, MujocoOptions()),
+    ],
+    ids=("pybullet", "mujoco"),
+)
+
+
+@PLANTS
+def test_forward_dynamics_agree_with_the_plants(bolt, plant_of):
     """Of torques, of gravity and of velocity."""
     rng = np.random.default_rng(6)
-    with FreeBulletPlant(bolt, PlantOptions()) as plant:
+    with plant_of(bolt) as plant:
         for q, v in states(bolt):
             torque = rng.uniform(-0.5, 0.5, 6)
-            found = bullet_acceleration(plant, q, v, torque)
+            found = plant_acceleration(bolt, plant, q, v, torque)
             np.testing.assert_allclose(found, model_acceleration(bolt, q, v, torque), atol=1e-8)
 
 
-def test_mass_matrix_and_bias_forces_agree_with_pybullet(bolt):
-    """M a + h = S' tau with PyBullet's accelerations; its columns of the torques show M."""
-    with FreeBulletPlant(bolt, PlantOptions()) as plant:
+@PLANTS
+def test_mass_matrix_and_bias_forces_agree_with_the_plants(bolt, plant_of):
+    """M a + h = S' tau with the plant's accelerations; the torques' columns show M."""
+    with plant_of(bolt) as plant:
         for q, v in states(bolt, 3):
             bolt.update(q, v)
             rotation = pin.Quaternion(q[3:7]).matrix()
             for torque in (np.zeros(6), *(0.1 * np.eye(6))):
-                world = bullet_acceleration(plant, q, v, torque)
+                world = plant_acceleration(bolt, plant, q, v, torque)
                 own = rotation.T @ world[:3] - np.cross(v[3:6], v[:3])
                 a = np.concatenate((own, rotation.T @ world[3:6], world[6:]))
                 left = bolt.mass_matrix @ a + bolt.nonlinear_effects
                 np.testing.assert_allclose(left, [*np.zeros(6), *torque], atol=1e-8)
 
 
-def test_the_plant_reads_the_state_it_was_given(bolt):
+@PLANTS
+def test_the_plant_reads_the_state_it_was_given(bolt, plant_of):
     q, v = np.zeros(bolt.nq), np.zeros(bolt.nv)
-    with FreeBulletPlant(bolt, PlantOptions()) as plant:
+    with plant_of(bolt) as plant:
         for wanted_q, wanted_v in states(bolt, 5):
             q[3:7] = wanted_q[3:7]
             plant.reset(wanted_q, wanted_v)

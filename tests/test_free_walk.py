@@ -10,6 +10,7 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.errors import ParameterError
 from template_control.robot.library import load_free_robot
+from template_control.run.data_frame import columns
 from template_control.run.kinds.any_record import load_record
 from template_control.run.summary import summarise
 
@@ -60,6 +61,10 @@ def test_a_record_is_read_as_it_was_written(straight, tmp_path):
     assert isinstance(again, tc.FreeRecord)
     for name in ("q", "space_com", "attitude", "sway", "side_reference"):
         np.testing.assert_array_equal(getattr(again, name), getattr(record, name))
+    table = columns(again)
+    np.testing.assert_array_equal(table["attitude_yaw"].values, record.attitude[:, 2])
+    assert table["v_wx"].unit == "rad/s"
+    assert table["q_FL_HAA"].unit == "rad"
     assert again.metadata == json.loads(json.dumps(record.metadata))
 
 

@@ -33,6 +33,7 @@ GUIDES = (
     "controller.md",
     "running.md",
     "architecture.md",
+    "free.md",
 )
 
 

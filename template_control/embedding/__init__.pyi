@@ -1,5 +1,6 @@
 from .controller import EmbeddingController as EmbeddingController
 from .free.controller import FreeController as FreeController
+from .free.options import FREE_PLANNER as FREE_PLANNER
 from .free.options import FreeOptions as FreeOptions
 from .free.phases import FREE_PHASES as FREE_PHASES
 from .guards import GuardOptions as GuardOptions

@@ -29,7 +29,8 @@ Array = NDArray[np.float64]
 # By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
 _FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
 _CLOSE = 1e-6  # of the robot's mass
-_AXES = {2: (0, 2), 3: (0, 1, 2)}  # of a force's components, by how many there are
+AXES = {2: [0, 2], 3: [0, 1, 2]}
+"""Of a force's components, by how many there are."""
 
 
 def load_body(robot: Biped, client: int, held: bool = True) -> int:
@@ -235,7 +236,7 @@ class BulletPlant:
         divided by that step.
         """
         out[:] = 0.0
-        axes = _AXES[out.shape[1]]
+        axes = AXES[out.shape[1]]
         for contact in self._touching():
             sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
             foot = self._feet.get(link)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import BOX
 from template_control.plant.trunk_box import trunk_corners
+from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF, UNLIMITED
 
@@ -41,46 +42,68 @@ def mjcf(robot: PlanarBiped, world: PlantOptions, contact_time: float) -> str:
         world: friction, time step, mass error, step of the ground.
         contact_time: time constant with which a contact gives way [s].
     """
-    root = Element("mujoco", model="plant")
-    _add(root, "compiler", angle="radian", autolimits="true")
-    option = _add(
-        root,
-        "option",
-        timestep=repr(world.time_step),
-        gravity=_text((0.0, 0.0, -robot.gravity)),
-        cone="elliptic",  # the friction cone as it is, no pyramid in it
-    )
-    # A state that is no number any more is the controller's to refuse, not to be put back.
-    _add(option, "flag", autoreset="disable")
-    ground = _add(root, "worldbody")
-    _add_ground(ground, world, contact_time)
+    root, ground = world_element(robot, world, contact_time)
     _add_robot(ground, robot, world.mass_scale)
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _add(parent: Element, tag: str, **attributes: str) -> Element:
+def world_element(
+    robot: Biped, world: PlantOptions, contact_time: float
+) -> tuple[Element, Element]:
+    """A world with its ground, and the element that a robot is added to.
+
+    Args:
+        robot: whose gravity acts.
+        world: friction, time step, step of the ground.
+        contact_time: time constant with which a contact gives way [s].
+    """
+    root = Element("mujoco", model="plant")
+    add(root, "compiler", angle="radian", autolimits="true")
+    option = add(
+        root,
+        "option",
+        timestep=repr(world.time_step),
+        gravity=text((0.0, 0.0, -robot.gravity)),
+        cone="elliptic",  # the friction cone as it is, no pyramid in it
+    )
+    # A state that is no number any more is the controller's to refuse, not to be put back.
+    add(option, "flag", autoreset="disable")
+    ground = add(root, "worldbody")
+    _add_ground(ground, world, contact_time)
+    return root, ground
+
+
+def add(parent: Element, tag: str, **attributes: str) -> Element:
+    """An element of another.
+
+    Args:
+        parent: the other.
+        tag: of the new one.
+        attributes: of the new one.
+    """
     return ElementTree.SubElement(parent, tag, attributes)
 
 
-def _text(values: ArrayLike) -> str:
+def text(values: ArrayLike) -> str:
+    """Numbers as they are written in MJCF."""
     return " ".join(map(repr, np.asarray(values, dtype=float).tolist()))
 
 
 def _add_ground(parent: Element, world: PlantOptions, contact_time: float) -> None:
     """A plane at the lower level, and a long box up to the higher one."""
     how = {
-        "friction": _text((world.friction, 0.0, 0.0)),
+        "friction": text((world.friction, 0.0, 0.0)),
         "priority": "1",  # the ground's friction and give count, not the robot's
         "condim": "3",
-        "solref": _text((contact_time, 1.0)),
+        "solref": text((contact_time, 1.0)),
         "contype": "1",
         "conaffinity": "0",
     }
     step = world.ground_step
     low = 0.0 if step is None else step.low
-    _add(parent, "geom", type="plane", size="0 0 1", pos=_text((0.0, 0.0, low)), **how)
+    add(parent, "geom", type="plane", size="0 0 1", pos=text((0.0, 0.0, low)), **how)
     if step is not None:
-        _add(parent, "geom", type="box", size=_text(BOX), pos=_text(step.box_centre), **how)
+        add(parent, "geom", type="box", size=text(BOX), pos=text(step.box_centre), **how)
 
 
 def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
@@ -95,12 +118,12 @@ def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
         if model.inertias[joint].mass <= _MASSLESS * robot.mass:
             waiting[joint], bodies[joint] = chain, bodies[parent]
             continue
-        place = pin.SE3.Identity()
+        pose = pin.SE3.Identity()
         for above in chain:
-            place = place * model.jointPlacements[above]
+            pose = pose * model.jointPlacements[above]
         name = TRUNK if joint == BASE_DOF else model.names[joint] + " link"
-        body = _add(bodies[parent], "body", name=name, **_place(place))
-        here = place.inverse()
+        body = add(bodies[parent], "body", name=name, **place(pose))
+        here = pose.inverse()
         for above in chain:
             here = here * model.jointPlacements[above]
             _add_joint(body, model, above, here, axes[:, above - 1])
@@ -108,10 +131,10 @@ def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
         bodies[joint] = body
     for i, foot in enumerate(robot.feet):
         frame = model.frames[model.getFrameId(foot)]
-        centre = _text(frame.placement.translation)
-        _add_ball(bodies[frame.parentJoint], f"{FOOT}{i}", centre, robot.foot_radius)
+        centre = text(frame.placement.translation)
+        add_ball(bodies[frame.parentJoint], f"{FOOT}{i}", centre, robot.foot_radius)
     for i, (x, z) in enumerate(trunk_corners(robot).T):
-        _add_ball(bodies[BASE_DOF], f"{TRUNK}{i}", _text((x, 0.0, z)), _CORNER)
+        add_ball(bodies[BASE_DOF], f"{TRUNK}{i}", text((x, 0.0, z)), _CORNER)
 
 
 def _axes(model: pin.Model) -> Array:
@@ -125,9 +148,10 @@ def _axes(model: pin.Model) -> Array:
     return np.array(columns).T
 
 
-def _place(place: pin.SE3) -> dict[str, str]:
-    x, y, z, w = pin.Quaternion(place.rotation).coeffs()
-    return {"pos": _text(place.translation), "quat": _text((w, x, y, z))}
+def place(pose: pin.SE3) -> dict[str, str]:
+    """Attributes that put an element somewhere in its parent."""
+    x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
+    return {"pos": text(pose.translation), "quat": text((w, x, y, z))}
 
 
 def _add_joint(body: Element, model: pin.Model, joint: int, here: pin.SE3, axis: Array) -> None:
@@ -136,30 +160,38 @@ def _add_joint(body: Element, model: pin.Model, joint: int, here: pin.SE3, axis:
     about = {
         "name": model.names[joint],
         "type": "hinge" if hinge else "slide",
-        "axis": _text(here.rotation @ (axis[3:] if hinge else axis[:3])),
-        "pos": _text(here.translation),
+        "axis": text(here.rotation @ (axis[3:] if hinge else axis[:3])),
+        "pos": text(here.translation),
     }
     low, high = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
     if joint > BASE_DOF and max(abs(low), abs(high)) < UNLIMITED:
-        about["range"] = _text((low, high))
-    _add(body, "joint", **about)
+        about["range"] = text((low, high))
+    add(body, "joint", **about)
 
 
 def _add_inertia(body: Element, inertia: pin.Inertia, scale: float) -> None:
     # The robot turns about y only, where any rotation leaves the inertia as it is. MuJoCo refuses
     # the flat inertias of a planar model, in which the other two axes have none.
     about_y = scale * inertia.inertia[1, 1]
-    _add(
+    add(
         body,
         "inertial",
         mass=repr(float(scale * inertia.mass)),
-        pos=_text(inertia.lever),
-        diaginertia=_text((about_y, about_y, about_y)),
+        pos=text(inertia.lever),
+        diaginertia=text((about_y, about_y, about_y)),
     )
 
 
-def _add_ball(body: Element, name: str, centre: str, radius: float) -> None:
-    _add(
+def add_ball(body: Element, name: str, centre: str, radius: float) -> None:
+    """A sphere that meets the ground.
+
+    Args:
+        body: that it is a part of.
+        name: its own.
+        centre: in the body's frame, as :func:`text` writes it [m].
+        radius: its own [m].
+    """
+    add(
         body,
         "geom",
         name=name,

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
-from template_control.plant.bullet import PlantOptions
+from template_control.plant.bullet import AXES, PlantOptions
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
+from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.requirements import BASE_DOF
 
 Array = NDArray[np.float64]
 
@@ -76,24 +76,32 @@ class MujocoPlant:
     """
 
     @checked
-    def __init__(self, robot: PlanarBiped, options: MujocoOptions) -> None:
+    def __init__(self, robot: Biped, options: MujocoOptions) -> None:
         self.options = options
         self._engine = engine = _mujoco()
         try:
-            text = mjcf(robot, options, options.contact_time)
-            self.model = engine.MjModel.from_xml_string(text)
+            self.model = engine.MjModel.from_xml_string(self._text(robot))
         except ValueError as error:
             raise RobotError(f"MuJoCo does not take {robot.path} ({error}): change it") from None
         self.data = engine.MjData(self.model)
-        names = list(robot.model.names)[1:]
+        names = list(robot.model.names)[robot.model.njoints - self._told(robot) :]
         self._q = np.array([self.model.joint(name).qposadr[0] for name in names])
         self._v = np.array([self.model.joint(name).dofadr[0] for name in names])
-        self._actuated = self._v[BASE_DOF:]
+        self._actuated = self._v[-len(robot.joint_names) :]
         self._trunk = self.model.body(TRUNK).id
         shapes = [self.model.geom(i).name for i in range(self.model.ngeom)]
         self._feet = {shapes.index(f"{FOOT}{i}"): i for i in range(len(robot.feet))}
         self._trunk_shapes = {i for i, name in enumerate(shapes) if name.startswith(TRUNK)}
         self._force = np.zeros(6)
+
+    def _text(self, robot: Biped) -> str:
+        """The world as MJCF."""
+        assert isinstance(robot, PlanarBiped)
+        return mjcf(robot, self.options, self.options.contact_time)
+
+    def _told(self, robot: Biped) -> int:
+        """How many joints MuJoCo tells by a number each: the model's last ones."""
+        return robot.model.njoints - 1
 
     @property
     def time_step(self) -> float:
@@ -116,6 +124,7 @@ class MujocoPlant:
     def contact_forces(self, out: Array) -> None:
         """See :meth:`~.plant.Plant.contact_forces`."""
         out[:] = 0.0
+        axes = AXES[out.shape[1]]
         for i in range(self.data.ncon):
             contact = self.data.contact[i]
             ours = 1 if contact.geom[1] in self._feet else 0
@@ -125,7 +134,7 @@ class MujocoPlant:
             self._engine.mj_contactForce(self.model, self.data, i, self._force)
             # The contact's axes are the rows of its frame; its force acts on the second shape.
             force = contact.frame.reshape(3, 3).T @ self._force[:3]
-            out[foot] += force[[0, 2]] if ours else -force[[0, 2]]
+            out[foot] += force[axes] if ours else -force[axes]
 
     def trunk_touches_ground(self) -> bool:
         """True where the trunk itself lies on the ground."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
+from template_control.embedding.free.options import FREE_PLANNER
 from template_control.embedding.planners.default import default_planners, first_speed
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
@@ -352,7 +353,8 @@ class RunConfig(Checked):
         if isinstance(self.planner, ModifiedOptions):
             return ModifiedPlanner(gait, self.planner)
         assert isinstance(self.planner, LqrOptions)
-        return LqrPlanner(gait, self.planner)
+        default = self.robot.free and self.planner == LqrOptions()
+        return LqrPlanner(gait, FREE_PLANNER if default else self.planner)
 
     @checked
     def save(self, path: str | Path) -> Path:

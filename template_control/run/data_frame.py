@@ -12,8 +12,10 @@ from template_control.errors import MissingPackageError
 
 _AXES = ("x", "y")
 _LEGS = ("rear", "front")
-_BASE = ("x", "y", "pitch")
-_BASE_UNITS = ("m", "m", "rad")
+_SPACE = ("x", "y", "z")
+_BASE = {"x": "m", "y": "m", "pitch": "rad"}
+_FREE_BASE = {**dict.fromkeys(_SPACE, "m"), **dict.fromkeys(("qx", "qy", "qz", "qw"), "")}
+_FREE_RATES = {**dict.fromkeys(_SPACE, "m/s"), **dict.fromkeys(("wx", "wy", "wz"), "rad/s")}
 
 
 class Column(NamedTuple):
@@ -50,10 +52,11 @@ def columns(record: Any) -> dict[str, Column]:
             words = [axis[i] for axis, i in zip(labels, index, strict=True)]
             found["_".join((name, *words))] = Column(values[:, *index], units[index[0]])
 
-    angles = ["rad"] * len(joints)
-    positions = [*_BASE_UNITS, *angles]
-    add("q", positions, [*_BASE, *joints])
-    add("v", [f"{unit}/s" for unit in positions], [*_BASE, *joints])
+    free = hasattr(record, "space_com")
+    base = _FREE_BASE if free else _BASE
+    rates = _FREE_RATES if free else {name: f"{unit}/s" for name, unit in _BASE.items()}
+    for name, first, unit in (("q", base, "rad"), ("v", rates, "rad/s")):
+        add(name, [*first.values(), *[unit] * len(joints)], [*first, *joints])
     add("torque", "N m", joints)
     add("com", "m", _AXES)
     add("com_velocity", "m/s", _AXES)
@@ -69,6 +72,14 @@ def columns(record: Any) -> dict[str, Column]:
     found["solved"] = Column(record.solved, "")
     add("swing_reference", "m", feet, _AXES)
     found["push"] = Column(record.push, "N")
+    if free:
+        add("space_com", "m", _SPACE)
+        add("space_foot", "m", feet, _SPACE)
+        add("space_force", "N", feet, _SPACE)
+        add("attitude", "rad", ("roll", "pitch", "yaw"))
+        found["heading"] = Column(record.heading, "rad")
+        add("sway", ["m", "m/s"], ("place", "rate"))
+        add("side_reference", "m", feet)
     return found
 
 

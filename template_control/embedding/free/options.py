@@ -10,6 +10,7 @@ from template_control.checks.ranges import Positive
 from template_control.embedding.free.phases import FREE_PHASES
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PhaseControl
+from template_control.embedding.planners.lqr import LqrOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.lateral.options import LateralOptions
 from template_control.slip.similarity import LENGTH, tuned
@@ -35,3 +36,7 @@ class FreeOptions(EmbeddingOptions):
     catches: bool = tuned(False)
     lateral: LateralOptions = field(default_factory=LateralOptions)
     step_width: Positive = tuned(0.28, LENGTH)
+
+
+FREE_PLANNER = LqrOptions(earliest_touchdown=0.1)
+"""The planner's tuning of a free robot: its swing leg has to move aside too, and needs time."""

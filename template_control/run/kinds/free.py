@@ -16,6 +16,8 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.plant.free.mujoco import FreeMujocoPlant
+from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.plant import Plant, World, plant_name
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.free.start import FreePose, free_state_in
@@ -109,11 +111,13 @@ class Free(Kind):
         """
         if isinstance(world, Plant) and not isinstance(world, PlantOptions):
             return nullcontext(world)
-        if type(world) is PlantOptions:
+        if isinstance(world, MujocoOptions):
+            return FreeMujocoPlant(self.robot, world)
+        if isinstance(world, PlantOptions):
             return FreeBulletPlant(self.robot, world)
         raise ParameterError(
-            f"{self.robot.name} walks free in PyBullet only, and the plant is"
-            f" {plant_name(world)}: give PlantOptions"
+            f"{self.robot.name} walks free in PyBullet and MuJoCo, and the plant is"
+            f" {plant_name(world)}: give PlantOptions or MujocoOptions"
         )
 
     def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
