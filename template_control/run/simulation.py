@@ -34,8 +34,8 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import APEX, REST, VLO
-from template_control.slip.scenario.catching import CatchingRoute
-from template_control.slip.scenario.route import Route, SteadyRoute
+from template_control.slip.scenario.catching import CATCHING_STRIDES, CatchingRoute
+from template_control.slip.scenario.route import Route, ScenarioRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.similarity import Scale
 
@@ -80,8 +80,8 @@ def simulate(
     Args:
         robot: model of the controller, and whose URDF the plant loads.
         route: which stride comes next and towards which state; or a scenario, which is put on
-            the robot's template; or a planner, whose gait the robot keeps. A walk then breaks
-            into a run where it cannot go on, and walks again
+            the robot's template; or a planner, whose gait the robot keeps. A walk of a scenario
+            or of a planner breaks into a run where it cannot go on, and walks again
             (:class:`~template_control.slip.scenario.catching.CatchingRoute`).
         options: how the run goes.
         progress: called with the number of completed steps after each.
@@ -100,14 +100,11 @@ def simulate(
     o = options or SimulationOptions()
     if isinstance(route, Scenario):
         route = robot_route(robot, route)
-    if isinstance(route, Planner):
-        controller = _keeping(robot, route, o.embedding, automaton)
-    else:
-        chosen = planners or default_planners(route)
-        controller = EmbeddingController(robot, chosen, o.embedding, route, automaton)
+    controller = _controller(robot, route, planners, o.embedding, automaton)
     recorder = Recorder(controller, o.record_every)
     last = _last_step(controller, o)
-    with in_use(robot, controller.planning.route, *controller.planning.planners.values()):
+    parts = (route, controller.planning.route, *controller.planning.planners.values())
+    with in_use(robot, *parts):
         q, v = _start(controller, o)
         _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
         # Before the run, which would be lost if this failed after it.
@@ -134,15 +131,26 @@ def simulate(
     return record
 
 
-def _keeping(
-    robot: PlanarBiped, planner: Planner, options: EmbeddingOptions, automaton: Automaton
+def _controller(
+    robot: PlanarBiped,
+    route: Route | Planner,
+    planners: Planners | None,
+    options: EmbeddingOptions,
+    automaton: Automaton,
 ) -> EmbeddingController:
-    """A controller that keeps the planner's gait; a walk that cannot go on breaks into a run."""
-    steady = SteadyRoute.of(planner.gait, automaton)
-    if not options.catches or automaton is not AUTOMATON or steady.section is not VLO:
-        return EmbeddingController(robot, planner, options, steady, automaton)
-    caught = CatchingRoute(steady)
-    return EmbeddingController(robot, default_planners(caught, planner), options, caught, automaton)
+    """Follows a route or keeps a planner's gait; a walk that cannot go on breaks into a run."""
+    catches = options.catches and automaton is AUTOMATON
+    if isinstance(route, Planner):
+        steady = SteadyRoute.of(route.gait, automaton)
+        if not catches or steady.section is not VLO:
+            return EmbeddingController(robot, route, options, steady, automaton)
+        caught = CatchingRoute(steady)
+        chosen = default_planners(caught, route)
+        return EmbeddingController(robot, chosen, options, caught, automaton)
+    chosen = planners or default_planners(route)
+    if catches and isinstance(route, ScenarioRoute) and chosen.keys() >= CATCHING_STRIDES:
+        route = CatchingRoute(route)
+    return EmbeddingController(robot, chosen, options, route, automaton)
 
 
 def _start(controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
