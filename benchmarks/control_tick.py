@@ -24,6 +24,7 @@ from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_template import template_for
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.robot.biped import Biped
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.library import load_free_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
@@ -41,6 +42,13 @@ GAITS = ("walk", "run", "free")
 _WARM_UP = 3  # steps, while the compiled kernels load
 
 Times = dict[str, np.ndarray[Any, Any]]
+
+
+def _plant(robot: Biped, options: PlantOptions) -> BulletPlant | FreeBulletPlant:
+    if isinstance(robot, FreeBiped):
+        return FreeBulletPlant(robot, options)
+    assert isinstance(robot, PlanarBiped)
+    return BulletPlant(robot, options)
 
 
 def _timed(function: Callable[..., Any], into: list[float]) -> Callable[..., Any]:
@@ -117,9 +125,8 @@ def measure(steps: int, gait: str = "walk", speed: float = 3.0) -> Times:
     physics: list[float] = []
     forces, dt, warm = np.zeros((2, robot.directions)), 1e-3, 0
     options = PlantOptions(time_step=dt)
-    free = isinstance(robot, FreeBiped)
     touching = 5e-3 * robot.mass * robot.gravity
-    with FreeBulletPlant(robot, options) if free else BulletPlant(robot, options) as plant:
+    with _plant(robot, options) as plant:
         plant.reset(q, v)
         while len(controller.reports) <= steps + _WARM_UP:
             if len(controller.reports) <= _WARM_UP:
