@@ -18,7 +18,9 @@ from .embedding.planners.lqr import LqrPlanner as LqrPlanner
 from .embedding.planners.modified import ModifiedPlanner as ModifiedPlanner
 from .embedding.planners.running import RunningPlanner as RunningPlanner
 from .embedding.robot_template import default_gait as default_gait
+from .embedding.robot_template import robot_gait_for_speed as robot_gait_for_speed
 from .embedding.robot_template import template_for as template_for
+from .embedding.robot_template import walking_speeds as walking_speeds
 from .errors import TemplateControlError as TemplateControlError
 from .plant.bullet import PlantOptions as PlantOptions
 from .plant.ground import GroundStep as GroundStep

@@ -68,7 +68,7 @@ def test_the_command_tells_the_same_range(capsys, tmp_path):
     for speed in ("0.1", "2"):
         assert main(["walk", "--speed", speed, "--output", str(tmp_path)]) == 2
         lines.add(capsys.readouterr().err.split(": ")[-1])
-    assert lines == {"give one from 0.22 to 1.50 m/s\n"}
+    assert lines == {"give one from 0.30 to 1.45 m/s\n"}
 
 
 @pytest.mark.slow(seconds=60)

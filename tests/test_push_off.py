@@ -6,11 +6,13 @@ import pytest
 from template_control.embedding.learners.momentum_trim import uncontrolled
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.touchdown import free_controls
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.vocabulary import MapKind, Outcome, Phase, Slot
-from template_control.slip.dynamics.stride import controls
+from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome, Phase, Slot
+from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import vlo_jacobians, with_push_off, without_push_off
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -94,3 +96,42 @@ def test_the_paper_s_planner_walks_without_it(pushing):
     assert planner.gait.stride == "w"
     assert planner.decide(planner.gait.vlo).controls[Slot.K_PUSH] == 0.0
     np.testing.assert_array_equal(without_push_off(pushing).controls, planner.gait.controls)
+
+
+@pytest.mark.parametrize("push", [-0.12, 0.12])
+def test_a_push_in_double_stance_is_answered_at_once(pushing, push):
+    planner, simulator = LqrPlanner(pushing), StrideSimulator(P)
+    decision = planner.decide(pushing.vlo)
+    first = simulator.run("SS_av^wp", VLO.state(pushing.vlo), decision.controls)
+    node, time = "DS_sc^wp", first.time_of(Event.TOUCHDOWN)
+    state = first.sample(np.array([time]))[0, :4] + [0.0, 0.0, push, 0.0]
+    toes = (float(first.meta[-1, 3]) - pushing.step_length, float(first.meta[-1, 3]))
+
+    def ahead(u):
+        rest = simulator.run(node, state, u, toes)
+        return VLO.of(rest.state), rest.outcome
+
+    free = free_controls(AUTOMATON, AUTOMATON.node(node))
+    again = planner.land(ahead, decision, pushing.vlo, free)
+    left, better = (abs(ahead(d.controls)[0][0] - pushing.vlo[0]) for d in (decision, again))
+    assert better < 0.8 * left
+    np.testing.assert_array_equal(again.controls[Slot.TOUCHDOWN_ANGLE], decision.controls[0])
+    # The offset is still learnt from the whole step.
+    moved = ahead(again.controls)[0] - ahead(decision.controls)[0]
+    np.testing.assert_allclose(again.predicted - decision.predicted, moved)
+
+
+def test_where_nothing_completes_the_step_that_is_told(pushing):
+    planner = LqrPlanner(pushing)
+    decision = planner.decide(pushing.vlo)
+    lost = planner.land(
+        lambda u: (np.full(3, np.nan), Outcome.FALL), decision, pushing.vlo, [int(Slot.K_PUSH)]
+    )
+    assert not (lost.feasible or lost.nominal)
+    np.testing.assert_array_equal(lost.controls, decision.controls)
+
+
+def test_three_controls_leave_the_rest_of_a_step(gait):
+    planner = LqrPlanner(gait)
+    decision = planner.decide(gait.vlo)
+    assert planner.land(lambda u: (gait.vlo, Outcome.SECTION), decision, gait.vlo, []) is decision

@@ -156,7 +156,7 @@ def test_the_library_s_family_is_what_the_search_makes():
 
 
 @pytest.mark.slow(seconds=15)
-@pytest.mark.parametrize(("name", "speed"), [("five-link", 0.35), ("rabbit", 0.75)])
+@pytest.mark.parametrize(("name", "speed"), [("human", 0.4), ("rabbit", 0.62)])
 def test_robots_walk_where_they_could_not(name, speed):
     robot = tc.load_robot(name)
     gait = tc.gait_for_speed(tc.template_for(robot), speed)
@@ -164,3 +164,30 @@ def test_robots_walk_where_they_could_not(name, speed):
     assert (record.steps, record.fell) == (30, False)
     last = record.section_state[-10:].mean(axis=0) - gait.vlo
     assert np.all(np.abs(last) < [0.01, 0.003, 0.02])
+
+
+def test_a_robot_s_range_is_its_own_and_the_rest_is_refused(capsys, tmp_path):
+    rabbit = tc.load_robot("rabbit")
+    low, high = tc.walking_speeds(rabbit)
+    template = FAMILY.range(tc.template_for(rabbit))
+    assert template[0] < low < 0.62 < 0.95 < high < template[1]  # heavy legs, weak hips
+    for speed in (low - 0.01, high + 0.01):
+        with pytest.raises(GaitError, match=f"give one from {low:.2f} to {high:.2f} m/s"):
+            tc.robot_gait_for_speed(rabbit, speed)
+    for speed in (low, high):
+        assert tc.robot_gait_for_speed(rabbit, speed).mean_speed == pytest.approx(speed, abs=1e-8)
+    assert main(["walk", "--robot", "rabbit", "--speed", "1.1", "--output", str(tmp_path)]) == 2
+    told = capsys.readouterr().err.strip()
+    assert told.endswith(f"give one from {low:.2f} to {high:.2f} m/s")
+    assert "\n" not in told
+
+
+def test_light_legs_walk_at_all_speeds_and_weak_hips_at_fewer():
+    robot = tc.load_robot("five-link")
+    whole = tc.walking_speeds(robot)
+    assert whole == (0.30, 1.45)
+    slowest, fastest = tc.walking_speeds(robot, 0.2)
+    assert slowest == whole[0]
+    assert fastest < whole[1]
+    with pytest.raises(GaitError, match="five-link walks at no speed"):
+        tc.walking_speeds(robot, 0.001)

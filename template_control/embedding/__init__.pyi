@@ -37,7 +37,9 @@ from .references.template_path import PathOptions as PathOptions
 from .robot_route import robot_route as robot_route
 from .robot_template import default_gait as default_gait
 from .robot_template import paper_gait as paper_gait
+from .robot_template import robot_gait_for_speed as robot_gait_for_speed
 from .robot_template import template_for as template_for
+from .robot_template import walking_speeds as walking_speeds
 from .section_report import SectionReport as SectionReport
 from .standing.default import standing_planners as standing_planners
 from .standing.options import StandingOptions as StandingOptions

@@ -1,4 +1,4 @@
-"""The template of a robot, the gaits it walks, and the apexes at which its knees can run."""
+"""The template of a robot, the gaits and speeds it walks, the apexes at which its knees can run."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Angle, Positive
 from template_control.errors import GaitError
 from template_control.robot.biped import Biped
-from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import Event, Slot
+from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
+from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
 from template_control.slip.maps.section_map import RESULTS
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale
@@ -25,6 +30,13 @@ _KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in 
 _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
 _SHORTEST = 0.8  # of l0, at the bottom: shorter, and the knees come to their stops
 _HEIGHTS = np.linspace(0.9, 1.3, 161)  # over l0, that are tried
+_WALKED = (0.0957, 0.463)  # over sqrt(g l0): 0.30 and 1.45 m/s; bolt fell with 0.08 and 0.48
+_SWING_TORQUE = 0.55  # of a hip's limit: rabbit walked with 0.51, and fell with 0.63
+_UNEVEN = 0.42  # of the speed at VLO: rabbit walked with 0.41, and fell with 0.46
+_EVERY = 3  # link of the family's chains is looked at
+_ROUNDING = 1e-6  # of a centimetre per second
+# Of the quintic that a foot follows, over its length and duration.
+_QUINTIC_SPEED, _QUINTIC_ACCELERATION = 1.875, 10.0 / float(np.sqrt(3.0))
 
 
 @checked
@@ -74,6 +86,89 @@ def template_for(robot: Biped) -> SlipParameters:
     relative = REFERENCE.leg_stiffness * REFERENCE.rest_length
     relative /= REFERENCE.mass * REFERENCE.gravity
     return SlipParameters(robot.mass, robot.gravity, length, relative * weight / length)
+
+
+@checked
+def walking_speeds(robot: Biped, torque_scale: Positive = 1.0) -> tuple[float, float]:
+    """Slowest and fastest mean speed that a robot walks at [m/s], to a centimetre per second.
+
+    They are those at which a robot with light legs and strong motors walked, without the fast ones
+    whose swing takes most of a hip's torque, and without the slow ones in which the swing of heavy
+    legs makes the CoM's speed uneven: the template's legs weigh nothing. The slowest is as far above
+    these as that speed varies.
+
+    Args:
+        robot: its last update is overwritten.
+        torque_scale: share of the URDF's torque limits that may be used.
+
+    Raises:
+        GaitError: if no gait of the template is left.
+    """
+    p = template_for(robot)
+    family = walking_by_speed()
+    unit = float(np.sqrt(p.gravity * p.rest_length))
+    slowest, fastest = (unit * speed for speed in _WALKED)
+    swings = []
+    for chain in family.chains:
+        for speed in chain.vlo_speed[::_EVERY]:
+            gait = chain.gait(p, unit * float(speed))
+            swings.append((gait.mean_speed, gait.vlo[0], *_swing(robot, gait)))
+    mean, vlo, uneven, share = np.array(swings).T
+    heavy = uneven > _UNEVEN * vlo
+    low = float(np.max((mean + uneven)[heavy], initial=slowest))
+    hasty = np.flatnonzero(share > _SWING_TORQUE * torque_scale)
+    if len(hasty) and hasty[0] > 0:
+        pair = slice(hasty[0] - 1, hasty[0] + 1)
+        last = float(np.interp(_SWING_TORQUE * torque_scale, share[pair], mean[pair]))
+        fastest = min(fastest, last)
+    if low >= fastest or (len(hasty) and hasty[0] == 0):
+        raise GaitError(f"{robot.name} walks at no speed: its legs are too heavy for its hips")
+    low, high = 100.0 * low - _ROUNDING, 100.0 * fastest + _ROUNDING
+    return float(np.ceil(low)) / 100.0, float(np.floor(high)) / 100.0
+
+
+@checked
+def robot_gait_for_speed(
+    robot: Biped, mean_speed: float, torque_scale: Positive = 1.0
+) -> WalkingGait:
+    """The gait of the family by speed with which a robot walks at a mean speed.
+
+    Args:
+        robot: its last update is overwritten.
+        mean_speed: step length over step duration [m/s].
+        torque_scale: share of the URDF's torque limits that may be used.
+
+    Raises:
+        GaitError: naming the robot's range, if the speed is out of it.
+    """
+    slowest, fastest = walking_speeds(robot, torque_scale)
+    if not slowest <= round(mean_speed, 9) <= fastest:
+        raise GaitError(
+            f"{robot.name} does not walk at a mean speed of {mean_speed:g} m/s: give one from"
+            f" {slowest:.2f} to {fastest:.2f} m/s"
+        )
+    return gait_for_speed(template_for(robot), mean_speed)
+
+
+def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
+    """What the legs' swing asks for, estimated with a straight leg that follows the quintic.
+
+    Returns:
+        The largest difference that it makes between the speeds of CoM and template [m/s], and the
+        largest hip torque over its limit.
+    """
+    p = gait.parameters
+    stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
+    double = stride.time_of(Event.REAR_LIFTOFF) - stride.time_of(Event.TOUCHDOWN)
+    time = gait.step_duration - double
+    # The foot goes two steps while the hips move on.
+    angle = (2.0 * gait.step_length - gait.mean_speed * time) / robot.leg_length
+    template_for(robot)  # which leaves the robot updated with straight legs
+    joint = robot.legs[0][-2]  # the knee comes last
+    hip = robot.base_dof + joint
+    momentum = abs(float(robot.angular_momentum_jacobian[hip])) * _QUINTIC_SPEED * angle / time
+    torque = float(robot.mass_matrix[hip, hip]) * _QUINTIC_ACCELERATION * angle / time**2
+    return float(momentum / (p.mass * gait.vlo[1])), float(torque / robot.torque_limit[joint])
 
 
 def knee_torque(robot: Biped, gait: RunningGait) -> float:

@@ -30,6 +30,7 @@ from template_control.embedding.robot_template import (
     check_apex,
     default_gait,
     paper_gait,
+    robot_gait_for_speed,
     template_for,
 )
 from template_control.errors import ParameterError
@@ -134,20 +135,23 @@ class GaitChoice(Checked):
                 words = name.replace("_", " ")
                 raise ParameterError(f"{words} does not go with gait {self.name}: leave one out")
 
-    def of(self, robot: Biped) -> WalkingGait | RunningGait:
+    def of(self, robot: Biped, torque_scale: float = 1.0) -> WalkingGait | RunningGait:
         """The gait on a robot's template.
 
         Args:
             robot: its last update is overwritten.
+            torque_scale: share of the URDF's torque limits that may be used.
 
         Raises:
-            GaitError: if the template has no such gait.
+            GaitError: if the template has no such gait, or it is too slow or fast for the robot.
         """
         if self.name == "run":
             return running_gait(template_for(robot), self.run_speed(robot), self.apex_height)
         if self.name == "paper":
             return paper_gait(template_for(robot))
         angle = None if self.touchdown_angle is None else float(np.radians(self.touchdown_angle))
+        if self.speed is not None and angle is None:
+            return robot_gait_for_speed(robot, self.speed, torque_scale)
         if self.speed is not None:
             return gait_for_speed(template_for(robot), self.speed, touchdown_angle=angle)
         return default_gait(robot, angle)
@@ -297,7 +301,7 @@ class RunConfig(Checked):
             choice, scale = self.gait, self.simulation.embedding.torque_scale
             if choice.apex_height is not None:
                 check_apex(robot, choice.run_speed(robot), choice.apex_height, scale)
-            gait = choice.of(robot)
+            gait = choice.of(robot, scale)
             return Ready(robot, gait, None, {gait.stride: self._planner(gait)})
         route = robot_route(robot, self.scenario)
         walk = walking_gait(route.parameters, first_speed(route))

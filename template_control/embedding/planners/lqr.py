@@ -8,7 +8,8 @@ gait and not beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -25,7 +26,8 @@ from template_control.checks.ranges import (
     Range,
     Share,
 )
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.planners.planner import ANY_ANGLE, Ahead, Decision
+from template_control.embedding.planners.rest_of_step import choose_rest
 from template_control.embedding.planners.step_search import (
     FALL_PRICE,
     Grid,
@@ -213,6 +215,7 @@ class LqrPlanner:
         self.a, self.b = vlo_jacobians(gait)
         o = self.options
         costs = (*o.control_cost, o.push_off.cost) if self._pushes else o.control_cost
+        self._costs = np.array(costs)
         q, r = np.diag(o.state_cost), np.diag(costs)
         self._cost = solve_discrete_are(self.a, self.b, q, r)
         self._gain = np.linalg.solve(
@@ -284,6 +287,23 @@ class LqrPlanner:
         controls[slots] = u * units
         nominal = nominal and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
+
+    def land(
+        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+    ) -> Decision:
+        """See :meth:`~.planner.LandingPlanner.land`.
+
+        Without push-off there is too little to choose. The offset is still learnt from the whole
+        step: its prediction moves by as much as the choice does.
+        """
+        if not self._pushes:
+            return decision
+        u, end, change = choose_rest(self._law, self._costs, ahead, decision.controls, free)
+        if end is None:
+            return replace(decision, feasible=False, nominal=False)
+        if change is None:
+            return Decision(u, end, True, True, False)
+        return replace(decision, controls=u, predicted=decision.predicted + change)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
