@@ -77,11 +77,11 @@ def choose_rest(law: Law, costs: Array, ahead: Ahead, controls: Array, free: Seq
         upper=law.upper[places] * law.stiffness,
         rounds=_ROUNDS,
     )
-    root = np.linalg.cholesky(law.cost).T
+    root: Array = np.linalg.cholesky(law.cost).T.astype(np.float64)
     rest = FromHere(_Weighed(ahead, root), slots)
     u, weighed = solve_stride(rest, root @ law.target, prior, np.ones(3))
     if weighed is None:
         return Rest(u, None, None)
-    end = np.linalg.solve(root, weighed)
+    end: Array = np.linalg.solve(root, weighed).astype(np.float64)
     before, outcome = ahead(controls)
     return Rest(u, end, end - before if outcome is Outcome.SECTION else None)
