@@ -94,8 +94,8 @@ def walking_speeds(robot: Biped, torque_scale: Positive = 1.0) -> tuple[float, f
 
     They are those at which a robot with light legs and strong motors walked, without the fast ones
     whose swing takes most of a hip's torque, and without the slow ones in which the swing of heavy
-    legs makes the CoM's speed uneven: the template's legs weigh nothing. The slowest is as far above
-    these as that speed varies.
+    legs makes the CoM's speed uneven: the template's legs weigh nothing. The slowest is as far
+    above these as that speed varies.
 
     Args:
         robot: its last update is overwritten.
