@@ -24,6 +24,7 @@ from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_template import template_for
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.robot.biped import Biped
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.library import load_free_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
@@ -87,6 +88,12 @@ def _free() -> tuple[EmbeddingController, Any, Any]:
     return controller, q, v
 
 
+def _plant(robot: Biped, options: PlantOptions) -> BulletPlant:
+    if isinstance(robot, FreeBiped):
+        return FreeBulletPlant(robot, options)
+    return BulletPlant(robot, options)
+
+
 def measure(steps: int, gait: str = "walk", speed: float = 3.0) -> Times:
     """Seconds of every tick by part.
 
@@ -117,9 +124,8 @@ def measure(steps: int, gait: str = "walk", speed: float = 3.0) -> Times:
     physics: list[float] = []
     forces, dt, warm = np.zeros((2, robot.directions)), 1e-3, 0
     options = PlantOptions(time_step=dt)
-    free = isinstance(robot, FreeBiped)
     touching = 5e-3 * robot.mass * robot.gravity
-    with FreeBulletPlant(robot, options) if free else BulletPlant(robot, options) as plant:
+    with _plant(robot, options) as plant:
         plant.reset(q, v)
         while len(controller.reports) <= steps + _WARM_UP:
             if len(controller.reports) <= _WARM_UP:
