@@ -39,7 +39,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.library import ROBOTS, load_free_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.run.options import SimulationOptions
+from template_control.run.options import Course, SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import STEPS, simulate
 from template_control.slip.gaits.gait import WalkingGait
@@ -295,6 +295,11 @@ class RunConfig(Checked):
         Raises:
             TemplateControlError: if one of them is not to be had.
         """
+        if not self.robot.free and self.simulation.course != Course():
+            raise ParameterError(
+                "a course, of turning rate or step width, is for a free robot: give --free, or"
+                " leave it out"
+            )
         robot = self.robot.load()
         ready(WALK)  # before the gait is looked for, which would compile a part of it alone
         if self.scenario is None:

@@ -105,7 +105,7 @@ def add_course_options(parser: argparse.ArgumentParser) -> None:
         "--step-width",
         type=float,
         metavar="M",
-        help="distance aside between a free robot's left and right footholds; 0.28 l0 if not given",
+        help="distance aside between a free robot's left and right footholds; 0.22 l0 if not given",
     )
 
 

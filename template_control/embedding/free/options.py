@@ -35,7 +35,7 @@ class FreeOptions(EmbeddingOptions):
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(FREE_PHASES))
     catches: bool = tuned(False)
     lateral: LateralOptions = field(default_factory=LateralOptions)
-    step_width: Positive = tuned(0.28, LENGTH)
+    step_width: Positive = tuned(0.22, LENGTH)
 
 
 FREE_PLANNER = LqrOptions(earliest_touchdown=0.1)
