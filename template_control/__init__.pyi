@@ -54,6 +54,9 @@ from .slip.scenario.route import ScenarioRoute as ScenarioRoute
 from .slip.scenario.run import simulate_scenario as simulate_scenario
 from .slip.scenario.scenario import example_one as example_one
 from .slip.scenario.scenario import load_scenario as load_scenario
+from .slip.scenario.speed_command import SpeedCommand as SpeedCommand
+from .slip.scenario.speed_command import SpeedProfile as SpeedProfile
+from .slip.scenario.speed_route import SpeedRoute as SpeedRoute
 from .version import __version__ as __version__
 from .view.figures import plot as plot
 from .view.figures import save_figures as save_figures

@@ -112,6 +112,7 @@ def targets(folder):
         tc.SensorOptions,
         tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
         embedding.LoadOptions,
+        embedding.AheadOptions, embedding.RehearsalOptions,
         embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
         embedding.RunningOptions, embedding.StandingOptions, slip.PaceOptions,
         embedding.SwingOptions, embedding.TrimOptions, embedding.UnloadOptions, run.FallOptions,

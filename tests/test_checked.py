@@ -94,6 +94,7 @@ OPTIONS = [
     tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
     tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
     embedding.LoadOptions,
+    embedding.AheadOptions, embedding.RehearsalOptions,
     embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
     embedding.RunningOptions, TransitionOptions, run.GaitChoice,
     embedding.SwingOptions, embedding.TrimOptions, embedding.UnloadOptions, run.FallOptions,

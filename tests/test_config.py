@@ -162,7 +162,7 @@ def test_a_wrong_file_is_one_line_with_file_and_key(text, told, refused, tmp_pat
         ("--touchdown-angle 20", "no walking gait with touchdown angle 20.00 deg"),
         ("--locked knee", "--locked knee: give JOINT=ANGLE"),
         ("--locked knee=0.1", "locked go with a URDF, not with five-link"),
-        ("--planner best", "--planner is 'best': give lqr, modified or module:Class"),
+        ("--planner best", "--planner is 'best': give lqr, ahead, modified or module:Class"),
         ("--planner none_such:Planner", "there is no module none_such"),
         ("--planner math:Planner", "module math has no class Planner"),
         ("--planner queue:Empty:x", "module queue has no class Empty:x"),

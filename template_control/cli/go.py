@@ -12,6 +12,7 @@ from rich.table import Table
 
 from template_control import view
 from template_control.cli.options.config import add_config, prepared
+from template_control.cli.options.gait import add_strict
 from template_control.cli.options.output import add_output_options
 from template_control.cli.options.robot import add_robot_options
 from template_control.cli.options.world import (
@@ -25,15 +26,16 @@ from template_control.cli.report.output import INTERRUPTED
 from template_control.cli.report.run_table import nearest_text
 from template_control.errors import ParameterError
 from template_control.run.record import Record
-from template_control.run.summary import STANDING, STRIDES, summarise
+from template_control.run.summary import OTHERS, STRIDES, summarise
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.terminal import plain_console
 
 NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (
-    "robot", "fell", "fall_reason", "duration", "speed_error_rms", "nearest_speed_taken",
-    "joint_torque", "joint_speed", "saturated_share", "qp_failures", "real_time_factor",
+    "robot", "fell", "fall_reason", "duration", "speed_error_rms", "accepted_speed",
+    "nearest_speed_taken", "joint_torque", "joint_speed", "saturated_share", "qp_failures",
+    "real_time_factor",
 )  # fmt: skip
 
 
@@ -55,6 +57,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_config(parser)
     add_robot_options(parser)
+    add_strict(parser)
     add_world_options(parser)
     add_disturbance_options(parser)
     add_catch_option(parser)
@@ -104,7 +107,7 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
         "top_speed": float(record.section_state[:, 0].max()),
         "strides": {
             **{name: run["strides"].get(name, 0) for name in STRIDES.values()},
-            **{name: run["strides"][name] for name in STANDING.values() if name in run["strides"]},
+            **{name: run["strides"][name] for name in OTHERS.values() if name in run["strides"]},
         },
         "template": {
             "completed": template.completed,
@@ -129,6 +132,10 @@ def _print(figures: dict[str, Any]) -> None:
     ):
         values = (figures[key], other[key])
         table.add_row(name, *("" if x is None else f"{x:.3f} {unit}" for x in values))
+    accepted = figures["accepted_speed"]
+    if accepted["strides"]:
+        table.add_row("change of speed reduced", nearest_text(accepted))
+        table.add_row("speed less the accepted, RMS", f"{accepted['error_rms']:.3f} m/s")
     nearest = figures["nearest_speed_taken"]
     if nearest["strides"]:
         table.add_row("nearest speed taken", nearest_text(nearest))

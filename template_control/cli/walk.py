@@ -10,6 +10,7 @@ from template_control.cli.options.gait import (
     add_gait_options,
     add_planner_options,
     add_stand_options,
+    add_strict,
 )
 from template_control.cli.options.output import add_output_options
 from template_control.cli.options.robot import add_robot_options
@@ -43,6 +44,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_gait_options(parser)
     add_stand_options(parser)
     add_planner_options(parser)
+    add_strict(parser)
     add_world_options(parser)
     add_disturbance_options(parser)
     add_catch_option(parser)

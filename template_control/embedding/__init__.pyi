@@ -1,3 +1,7 @@
+from .ahead.options import AheadOptions as AheadOptions
+from .ahead.planner import AheadPlanner as AheadPlanner
+from .ahead.rehearsal import RehearsalOptions as RehearsalOptions
+from .ahead.rehearsal import rehearse as rehearse
 from .controller import EmbeddingController as EmbeddingController
 from .free.controller import FreeController as FreeController
 from .free.options import FREE_PLANNER as FREE_PLANNER

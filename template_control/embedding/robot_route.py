@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from template_control.checks.checked import checked
+from template_control.embedding.ahead.gait_row import STATE
+from template_control.embedding.ahead.gait_table import gait_table, row_at
+from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.planners.running import AGILE
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.biped import Biped
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.gaits.by_speed.speed_family import family_speeds
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.gaits.walking_family import speed_range
+from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
 from template_control.slip.similarity import Scale, scaled
@@ -21,21 +29,52 @@ _WHERE = {"walk": "at VLO", "run": "at apex"}
 
 
 @checked
-def robot_route(robot: Biped, scenario: Scenario) -> ScenarioRoute:
+def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) -> ScenarioRoute:
     """The scenario on the robot's own template.
 
     Args:
         robot: its last update is overwritten.
         scenario: speeds in m/s, as they are; its heights are scaled with l0.
+        push_off: whether its walk has the gaits of the family by speed, in steps with push-off,
+            and their heights at VLO; None: where a planar robot walks only. Its planner then takes
+            the nearest speed where a segment wants what cannot be had.
 
     Raises:
-        ScenarioError: if a segment or the start wants a speed that no gait of the robot has, or a
-            segment a change of speed that is beyond a stride's reach.
+        ScenarioError: if the start, or a segment of another walk, wants a speed that no gait of
+            the robot has, or a segment a change of speed that is beyond a stride's reach.
     """
     own = scenario.on(template_for(robot))
     p = own.parameters
     unit = float(np.sqrt(p.gravity * p.rest_length))
-    _check_accelerations(robot, own)
+    if push_off is None:
+        push_off = own.only_walks and isinstance(robot, PlanarBiped)
+    if push_off and not own.only_walks:
+        raise ScenarioError(
+            "the scenario does more than walk: its walk has no push-off; leave planner ahead out"
+        )
+    if not push_off:
+        _check_speeds(robot, own)
+        _check_accelerations(robot, own)
+    slowest, fastest = (family_speeds if push_off else speed_range)(p)
+    moves = own.segments[0].gait in _RANGES
+    if moves and not slowest <= own.start[0] <= fastest:
+        raise ScenarioError(
+            f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from {slowest:.3g} to"
+            f" {fastest:.3g} m/s"
+        )
+    vlo_height = _family_height(p) if push_off else None
+    return ScenarioRoute(
+        own, lambda speed: suited_height(speed / unit) * p.rest_length, vlo_height=vlo_height
+    )
+
+
+def _family_height(p: SlipParameters) -> Callable[[float], float]:
+    table = gait_table(p, scaled(AheadOptions(), Scale.of(p)))
+    return lambda speed: float(row_at(table, speed)[STATE + 1])
+
+
+def _check_speeds(robot: Biped, own: Scenario) -> None:
+    """Refuse speeds that no gait has."""
     for number, segment in enumerate(own.segments, 1):
         if segment.gait not in _RANGES:
             continue
@@ -47,14 +86,6 @@ def robot_route(robot: Biped, scenario: Scenario) -> ScenarioRoute:
                     f" {robot.name} can {segment.gait} from {slowest:.3g} to {fastest:.3g} m/s"
                     f" {_WHERE[segment.gait]}"
                 )
-    slowest, fastest = speed_range(own.parameters)
-    moves = own.segments[0].gait in _RANGES
-    if moves and not slowest <= own.start[0] <= fastest:
-        raise ScenarioError(
-            f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from {slowest:.3g} to"
-            f" {fastest:.3g} m/s"
-        )
-    return ScenarioRoute(own, lambda speed: suited_height(speed / unit) * p.rest_length)
 
 
 def _check_accelerations(robot: Biped, own: Scenario) -> None:

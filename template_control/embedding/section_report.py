@@ -54,3 +54,9 @@ class SectionReport:
     offset: Array
     learnt: Learnt
     plan_seconds: float
+
+    @property
+    def accepted(self) -> float:
+        """dx/dt that the planner took for the target's [m/s]."""
+        taken = self.decision.accepted
+        return float(self.target[0]) if taken is None else taken

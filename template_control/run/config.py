@@ -18,6 +18,8 @@ import numpy as np
 
 from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
+from template_control.embedding.ahead.options import AheadOptions
+from template_control.embedding.ahead.planner import AheadPlanner
 from template_control.embedding.free.options import FREE_PLANNER
 from template_control.embedding.planners.default import default_planners, first_speed
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
@@ -224,7 +226,7 @@ class OwnPlanner(Checked):
 _STAND = 2.0  # a walk's first and last stand [s]
 _PLANNER_MEMBERS = ("gait", "offset", "reset", "decide", "observe")
 
-PlannerChoice = LqrOptions | ModifiedOptions | RunningOptions | OwnPlanner
+PlannerChoice = LqrOptions | AheadOptions | ModifiedOptions | RunningOptions | OwnPlanner
 """Which planner, with its tuning."""
 
 
@@ -267,7 +269,8 @@ class RunConfig(Checked):
     Attributes:
         robot: which one.
         gait: which one, where there is no scenario.
-        planner: which one, with its tuning.
+        planner: which one, with its tuning; None: ahead where a planar robot has a scenario that
+            walks only, else lqr.
         simulation: how the run goes.
         scenario: a speed profile instead of one gait.
 
@@ -277,7 +280,7 @@ class RunConfig(Checked):
 
     robot: RobotChoice = field(default_factory=RobotChoice)
     gait: GaitChoice = field(default_factory=GaitChoice)
-    planner: PlannerChoice = field(default_factory=LqrOptions)
+    planner: PlannerChoice | None = None
     simulation: SimulationOptions = field(default_factory=SimulationOptions)
     scenario: Scenario | None = None
 
@@ -288,6 +291,15 @@ class RunConfig(Checked):
                 if getattr(self.gait, f.name) != f.default:
                     words = "gait" if f.name == "name" else f.name.replace("_", " ")
                     raise ParameterError(f"{words} does not go with a scenario: leave one out")
+
+    @property
+    def chosen(self) -> PlannerChoice:
+        """The planner, with its tuning."""
+        if self.planner is not None:
+            return self.planner
+        planar = not self.robot.free
+        walks = planar and self.scenario is not None and self.scenario.only_walks
+        return AheadOptions() if walks else LqrOptions()
 
     def prepare(self) -> Ready:
         """Load the robot and make its gait, route and planner.
@@ -307,8 +319,14 @@ class RunConfig(Checked):
             if choice.apex_height is not None:
                 check_apex(robot, choice.run_speed(robot), choice.apex_height, scale)
             gait = choice.of(robot, scale)
-            return Ready(robot, gait, None, {gait.stride: self._planner(gait)})
-        route = robot_route(robot, self.scenario)
+            planner = self._planner(gait)
+            kept = planner.gait if isinstance(planner, AheadPlanner) else gait
+            return Ready(robot, kept, None, {kept.stride: planner})
+        if isinstance(self.chosen, AheadOptions):
+            route = robot_route(robot, self.scenario, push_off=True)
+            ahead = AheadPlanner(route.parameters, self.chosen, first_speed(route))
+            return Ready(robot, ahead.gait, route, default_planners(route, ahead))
+        route = robot_route(robot, self.scenario, push_off=False)
         walk = walking_gait(route.parameters, first_speed(route))
         return Ready(robot, walk, route, default_planners(route, self._planner(walk)))
 
@@ -350,20 +368,23 @@ class RunConfig(Checked):
         return replace(self, gait=GaitChoice(), simulation=options, scenario=scenario)
 
     def _planner(self, gait: WalkingGait | RunningGait) -> Planner:
-        if isinstance(self.planner, OwnPlanner):
-            return self.planner.make(gait)
-        if isinstance(gait, RunningGait) != isinstance(self.planner, RunningOptions):
+        chosen = self.chosen
+        if isinstance(chosen, OwnPlanner):
+            return chosen.make(gait)
+        if isinstance(gait, RunningGait) != isinstance(chosen, RunningOptions):
             raise ParameterError(
-                f"planner {self.planner.kind} does not plan gait {gait.name}: leave one out"
+                f"planner {chosen.kind} does not plan gait {gait.name}: leave one out"
             )
         if isinstance(gait, RunningGait):
-            assert isinstance(self.planner, RunningOptions)
-            return RunningPlanner(gait, self.planner)
-        if isinstance(self.planner, ModifiedOptions):
-            return ModifiedPlanner(gait, self.planner)
-        assert isinstance(self.planner, LqrOptions)
-        default = self.robot.free and self.planner == LqrOptions()
-        return LqrPlanner(gait, FREE_PLANNER if default else self.planner)
+            assert isinstance(chosen, RunningOptions)
+            return RunningPlanner(gait, chosen)
+        if isinstance(chosen, ModifiedOptions):
+            return ModifiedPlanner(gait, chosen)
+        if isinstance(chosen, AheadOptions):
+            return AheadPlanner(gait.parameters, chosen, float(gait.vlo[0]))
+        assert isinstance(chosen, LqrOptions)
+        default = self.robot.free and chosen == LqrOptions()
+        return LqrPlanner(gait, FREE_PLANNER if default else chosen)
 
     @checked
     def save(self, path: str | Path) -> Path:
@@ -373,7 +394,8 @@ class RunConfig(Checked):
             RecordError: if the file cannot be written.
             ParameterError: if something in it can be given in Python only.
         """
-        return storage.write_text(path, _HEAD + settings.text(settings.to_table(self)))
+        whole = replace(self, planner=self.chosen)
+        return storage.write_text(path, _HEAD + settings.text(settings.to_table(whole)))
 
     @classmethod
     @checked

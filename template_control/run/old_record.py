@@ -1,6 +1,7 @@
 """Records of earlier versions.
 
-Format 2 knew one section, VLO, and one stride, the walking step; format 3 knew no push-off.
+Format 2 knew one section, VLO, and one stride, the walking step; format 3 knew no push-off; with
+format 4 planners took every target as it was.
 """
 
 from __future__ import annotations
@@ -26,6 +27,18 @@ RENAMED = {
 """Fields of format 2, as they are called now."""
 
 
+def from_taken(fields: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a record as they are now, from those of format 4.
+
+    Args:
+        fields: arrays and the metadata by their names.
+
+    Raises:
+        KeyError: if one of them is missing.
+    """
+    return {**fields, "section_accepted": np.array(fields["section_target"])[:, 0].copy()}
+
+
 def from_five_slots(fields: dict[str, Any]) -> dict[str, Any]:
     """The fields of a record as they are now, from those of format 3.
 
@@ -35,7 +48,8 @@ def from_five_slots(fields: dict[str, Any]) -> dict[str, Any]:
     Raises:
         KeyError: if one of them is missing.
     """
-    return {**fields, "section_controls": padded_controls(fields["section_controls"])}
+    now = {**fields, "section_controls": padded_controls(fields["section_controls"])}
+    return from_taken(now)
 
 
 def from_walk(fields: dict[str, Any]) -> dict[str, Any]:

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from template_control import storage
 from template_control.checks.checked import checked
 from template_control.run.data_frame import to_dataframe
-from template_control.run.old_record import from_five_slots, from_walk
+from template_control.run.old_record import from_five_slots, from_taken, from_walk
 
 Array = NDArray[np.float64]
 
-FORMAT = "template-control run 4"
+FORMAT = "template-control run 5"
+_TAKEN = "template-control run 4"  # which took every target as it was
 _FIVE_SLOTS = "template-control run 3"  # without push-off
 _WALKS = "template-control run 2"  # which knew VLO and walking steps only
 LAYOUT = storage.Layout(
@@ -48,6 +49,7 @@ LAYOUT = storage.Layout(
         "section_state": "S 3",
         "stride": "S <strides",
         "section_target": "S 3",
+        "section_accepted": "S",
         "section_predicted": "S 3",
         "section_controls": "S 6",
         "section_offset": "S 3",
@@ -98,6 +100,8 @@ class Record:
             over the stance foot's ground, dy/dt, as measured.
         stride: (S,) index into ``metadata["strides"]`` of the kind of stride that begins there.
         section_target: (S, 3) state that the stride is to end in.
+        section_accepted: (S,) dx/dt that the planner took for the target's: another one where the
+            wanted change could not be had [m/s].
         section_predicted: (S, 3) state the planner expected it to end in.
         section_controls: (S, NUM_SLOTS) controls of the stride, by Slot.
         section_offset: (S, 3) the planner's offset estimate.
@@ -133,6 +137,7 @@ class Record:
     section_state: Array
     stride: NDArray[np.int64]
     section_target: Array
+    section_accepted: Array
     section_predicted: Array
     section_controls: Array
     section_offset: Array
@@ -215,7 +220,11 @@ class Record:
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
         return storage.load(
-            cls, path, FORMAT, LAYOUT, {_WALKS: from_walk, _FIVE_SLOTS: from_five_slots}
+            cls,
+            path,
+            FORMAT,
+            LAYOUT,
+            {_WALKS: from_walk, _FIVE_SLOTS: from_five_slots, _TAKEN: from_taken},
         )
 
 

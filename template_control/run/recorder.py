@@ -215,6 +215,7 @@ class Recorder:
             section_state=np.array([r.state for r in reports]),
             stride=np.array([strides.index(r.goal.stride) for r in reports], dtype=np.int64),
             section_target=np.array([r.target for r in reports]),
+            section_accepted=np.array([r.accepted for r in reports]),
             section_predicted=np.array([r.decision.predicted for r in reports]),
             section_controls=np.array([r.decision.controls for r in reports]),
             section_offset=np.array([r.offset for r in reports]),

@@ -29,8 +29,12 @@ STANDING = {
 }
 """The kinds of stride of a scenario that stands."""
 
+OTHERS = {"wp": "walking with push-off", **STANDING}
+"""The kinds of stride that only some runs have."""
+
 _STATE = ("speed", "height", "vertical_speed")
 _LAST = 50  # strides that a gait is judged by
+_TAKEN = 1e-3  # [m/s]: a speed so near the wanted one is the wanted one
 _NEAR = 0.02  # of sqrt(g l0): a plan that ends so near the wanted speed aims at it
 
 
@@ -60,7 +64,7 @@ def completed_strides(record: Record) -> dict[str, int]:
         record: the run.
     """
     kinds = Counter(record.metadata["strides"][i] for i in record.stride[:-1])
-    names = STRIDES | STANDING
+    names = STRIDES | OTHERS
     return {names.get(kind, kind): count for kind, count in kinds.items()}
 
 
@@ -92,6 +96,18 @@ def _speed_error(record: Record) -> float | None:
     return float(np.sqrt(np.mean(error**2))) if error.size else None
 
 
+def _accepted(record: Record) -> dict[str, Any]:
+    """Where the planner took another speed for the wanted one, and how well that was kept."""
+    accepted = record.section_accepted[:-1]
+    off = np.abs(accepted - record.section_target[:-1, 0])
+    error = record.section_state[1:, 0] - accepted
+    return {
+        "strides": int(np.sum(off > _TAKEN)),
+        "most": float(off.max(initial=0.0)),
+        "error_rms": float(np.sqrt(np.mean(error**2))) if error.size else None,
+    }
+
+
 def _nearest(record: Record) -> dict[str, float]:
     """Strides that were planned to end at another speed than the wanted one, and how far off.
 
@@ -120,7 +136,9 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         robot, gait, steps, strides (count by kind), fell, fall_reason, duration, mean_speed,
         vlo_target and vlo_mean_last_50 (speed, height, vertical_speed), or where the run ends at
         an apex apex_target and apex_mean_last_50 (speed, height), speed_error_rms (of dx/dt where
-        strides end, against their targets), nearest_speed_taken (strides planned to end at another
+        strides end, against their targets), accepted_speed (strides whose planner took another
+        speed for the wanted one, the most that one was off, and error_rms of dx/dt against the
+        speeds taken [m/s]), nearest_speed_taken (strides planned to end at another
         speed than the wanted one, the nearest within their reach, and the most that one was off
         [m/s]), com_error_rms and com_error_max (x, y, while a foot is
         to stand), com_error_flight_rms (x, y; None without flight), joint_torque (per joint peak,
@@ -146,6 +164,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "mean_speed": walked / max(float(record.time[-1]), 1e-9),
         **_sections(record),
         "speed_error_rms": _speed_error(record),
+        "accepted_speed": _accepted(record),
         "nearest_speed_taken": _nearest(record),
         **{name: value for name, value in m["summary"].items() if name != "joint_work"},
         "cost_of_transport": _cost_of_transport(record, walked),

@@ -87,4 +87,7 @@ from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import Segment as Segment
 from .scenario.scenario import example_one as example_one
 from .scenario.scenario import load_scenario as load_scenario
+from .scenario.speed_command import SpeedCommand as SpeedCommand
+from .scenario.speed_command import SpeedProfile as SpeedProfile
+from .scenario.speed_route import SpeedRoute as SpeedRoute
 from .similarity import Scale as Scale

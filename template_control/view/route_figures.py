@@ -79,6 +79,11 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
         record.section_time[1:], record.section_target[:-1, 0], where="pre", color=RIGHT,
         linewidth=1.0, label="wanted at the next section",
     )  # fmt: skip
+    if np.any(record.section_accepted != record.section_target[:, 0]):
+        speed.step(
+            record.section_time[1:], record.section_accepted[:-1], ":", where="pre", color=TRUNK,
+            linewidth=1.2, label="accepted",
+        )  # fmt: skip
     speed.set_ylabel("dx/dt [m/s]")
     path.plot(*record.com.T, color=COM, linewidth=1.0, label="robot's CoM")
     path.plot(

@@ -245,6 +245,11 @@ def section_states(record: Record) -> Figure:
         axes.update_datalim([(0.0, wanted[0] - least), (0.0, wanted[0] + least)])
         axes.autoscale_view()
         axes.ticklabel_format(axis="y", useOffset=False)
+    if np.any(record.section_accepted[:-1] != target[1:, 0]):
+        panels[0].step(
+            steps[1:], record.section_accepted[:-1], where="mid", color=TRUNK, linewidth=1.0,
+            linestyle="--", label="accepted",
+        )  # fmt: skip
     far = np.flatnonzero(~record.section_nominal)
     if len(far):
         panels[0].plot(

@@ -9,6 +9,8 @@ from pathlib import Path
 from template_control.cli.options.gait import gait_choice, planner_choice, scenario_choice
 from template_control.cli.options.robot import robot_choice
 from template_control.cli.options.world import simulation_choice
+from template_control.embedding.ahead.planner import AheadPlanner
+from template_control.embedding.ahead.rehearsal import rehearse
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.run.config import Ready, RunConfig
@@ -68,6 +70,8 @@ def prepared(
     if options.seed is not None and config.scenario is not None:
         raise ParameterError("--seed does not go with a scenario: leave one out")
     ready = config.prepare()
+    if getattr(options, "strict", False):
+        _check_strictly(ready)
     simulation = config.simulation
     if options.seed is not None:
         simulation = replace(simulation, start=perturbed_start(ready.gait, options.seed))
@@ -83,3 +87,18 @@ def prepared(
         sensors = SensorOptions.of_size(options.noise, scale, simulation.sensors.seed)
         simulation = replace(simulation, sensors=sensors)
     return replace(config, simulation=simulation), ready
+
+
+def _check_strictly(ready: Ready) -> None:
+    """Refuse a walk that cannot be had as it is wanted.
+
+    Raises:
+        ScenarioError: if it cannot.
+        ParameterError: if that is known only of walks of any speed.
+    """
+    planner = next(iter(ready.planners.values()))
+    if ready.route is None or not isinstance(planner, AheadPlanner):
+        raise ParameterError(
+            "--strict goes with a scenario that only walks, and with planner ahead: leave it out"
+        )
+    rehearse(ready.route, planner)

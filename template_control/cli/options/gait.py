@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from template_control.cli.options.ranges import check_ranges
+from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.errors import ParameterError
@@ -14,7 +15,7 @@ from template_control.run.config import GaitChoice, OwnPlanner, PlannerChoice
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.scenario import Scenario, load_scenario
 
-_PLANNERS = {options.kind: options for options in (LqrOptions, ModifiedOptions)}
+_PLANNERS = {options.kind: options for options in (LqrOptions, AheadOptions, ModifiedOptions)}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)}
 _GIVEN = {
     "name": "gait",
@@ -58,6 +59,16 @@ def add_gait_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_strict(parser: argparse.ArgumentParser) -> None:
+    """Add ``--strict``."""
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse a scenario whose walk wants a speed or a change of speed that cannot be had;"
+        " without this the nearest is taken, and the table says so",
+    )
+
+
 def add_stand_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--from-stand`` and ``--to-stand``."""
     parser.add_argument(
@@ -88,9 +99,10 @@ def add_planner_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--planner",
         metavar="NAME|MODULE:CLASS",
-        help="lqr (if not given): LQR on the VLO state with an offset estimate; modified: the"
-        " paper's modified walking controller, equation (38); or a class of your own, called with"
-        " the gait",
+        help="lqr: LQR on the VLO state with an offset estimate; ahead: plans several steps at"
+        " once, towards any speed; modified: the paper's modified walking controller, equation"
+        " (38); or a class of your own, called with the gait. If not given: ahead where a scenario"
+        " walks only, else lqr",
     )
     parser.add_argument(
         "--map",
@@ -128,12 +140,15 @@ def scenario_choice(options: argparse.Namespace, base: Scenario | None) -> Scena
     return base if path is None else load_scenario(path)
 
 
-def planner_choice(options: argparse.Namespace, base: PlannerChoice) -> PlannerChoice:
+def planner_choice(options: argparse.Namespace, base: PlannerChoice | None) -> PlannerChoice | None:
     """The planner that was asked for.
 
     Args:
         options: as parsed.
         base: what holds where an option was not given.
+
+    Returns:
+        None where neither says one: the run's own default.
 
     Raises:
         ParameterError: if there is no such planner, or it takes no map.
@@ -141,7 +156,7 @@ def planner_choice(options: argparse.Namespace, base: PlannerChoice) -> PlannerC
     chosen = base
     if not hasattr(options, "planner"):
         return chosen
-    if options.planner in _PLANNERS and options.planner != base.kind:
+    if options.planner in _PLANNERS and (base is None or options.planner != base.kind):
         chosen = _PLANNERS[options.planner]()
     elif options.planner is not None and options.planner not in _PLANNERS:
         if ":" not in options.planner:
@@ -153,7 +168,7 @@ def planner_choice(options: argparse.Namespace, base: PlannerChoice) -> PlannerC
         return chosen
     if not isinstance(chosen, ModifiedOptions):
         raise ParameterError(
-            f"--map does not go with planner {chosen.kind}: leave it out, or give --planner"
-            " modified"
+            f"--map does not go with planner {chosen.kind if chosen else 'lqr'}: leave it out, or"
+            " give --planner modified"
         )
     return replace(chosen, map_kind=_MAPS[options.map])

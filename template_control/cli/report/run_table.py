@@ -42,6 +42,10 @@ def print_table(figures: dict[str, Any]) -> None:
                 row(f"{section}, {name}", _state(z))
     if figures["speed_error_rms"] is not None:
         row("speed at the sections less the target, RMS", f"{figures['speed_error_rms']:.4f} m/s")
+    accepted = figures["accepted_speed"]
+    if accepted["strides"]:
+        row("change of speed reduced", nearest_text(accepted))
+        row("speed at the sections less the accepted, RMS", f"{accepted['error_rms']:.4f} m/s")
     nearest = figures["nearest_speed_taken"]
     if nearest["strides"]:
         row("nearest speed taken for the wanted one", nearest_text(nearest))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from template_control.checks.checked import checked
+from template_control.embedding.ahead.planner import AheadPlanner
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
@@ -24,6 +25,7 @@ from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.catching import CatchingRoute
 from template_control.slip.scenario.route import Route, ScenarioRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.slip.similarity import REFERENCE
 
 # A slow stride lasts 1.3 sqrt(l0 / g); a run that is behind its profile must be able to catch up.
@@ -64,7 +66,8 @@ def _followed(route: Route) -> Route:
 def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 
-    That is walking steps for a route that begins at VLO, and running ones for one at an apex.
+    That is walking steps for a route that begins at VLO, and running ones for one at an apex. A
+    route whose walk has any speed is walked with the planner that looks several steps ahead.
 
     Args:
         route: whose template and first target they are for.
@@ -82,6 +85,11 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
     followed = _followed(route)
+    if isinstance(followed, SpeedRoute) or (
+        isinstance(followed, ScenarioRoute) and followed.any_speed
+    ):
+        ahead = walking or AheadPlanner(p, speed=speed)
+        return {ahead.gait.stride: ahead}
     scenario = followed.scenario if isinstance(followed, ScenarioRoute) else None
     standing: Planners = {}
     if scenario is not None and scenario.stands:

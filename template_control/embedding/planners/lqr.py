@@ -221,7 +221,7 @@ class LqrPlanner:
         self._gain = np.linalg.solve(
             r + self.b.T @ self._cost @ self.b, self.b.T @ self._cost @ self.a
         )
-        self._settling = _settling_map(self.a, self.b, np.array(o.tolerance), o.control_weight)
+        self._settling = settling_map(self.a, self.b, np.array(o.tolerance), o.control_weight)
         self._law = self._aim()
 
     def __repr__(self) -> str:
@@ -317,12 +317,17 @@ class LqrPlanner:
         self._law = self._aim()
 
 
-def _settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:
+def settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:
     """(3 + c, 3) map from an offset d to the shift (dz, du) of the fixed point.
 
     Minimises |dz / tolerance|^2 + control_weight |du|^2 subject to (I - A) dz = B du + d. Without
     push-off the controls act in two directions only, so not every offset can be cancelled with
     dz = 0.
+
+    Args:
+        a, b: (3, 3), (3, c) Jacobians of the VLO map.
+        tolerance: (3,) changes of the state that cost 1.
+        control_weight: cost of a change of a control by 1.
     """
     weight = np.concatenate((1.0 / tolerance**2, np.full(b.shape[1], control_weight)))
     constraint, n = np.hstack((np.eye(3) - a, -b)), len(weight)

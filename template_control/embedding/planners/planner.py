@@ -33,6 +33,8 @@ class Decision(Checked):
         lasting: whether it also completes the stride after that, as far as the planner looks.
         nominal: the planner follows its own law, towards the target that was asked for. Nothing
             is learnt from other strides.
+        accepted: dx/dt at the stride's end that the planner leads to where it takes another one
+            than the target's [m/s]; None: it takes the target's.
     """
 
     controls: Annotated[Array, Shape((NUM_SLOTS,), finite=False)]
@@ -40,6 +42,7 @@ class Decision(Checked):
     feasible: bool
     lasting: bool
     nominal: bool
+    accepted: float | None = None
 
 
 @runtime_checkable

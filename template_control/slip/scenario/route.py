@@ -35,10 +35,12 @@ _STRIDES: dict[tuple[Section, Gait], str] = {
     (REST, "walk"): "sw",
     (VLO, "stand"): "ws",
 }
+_PAPER, _PUSH_OFF = "w", "wp"  # a walking step's kinds
 _CHANGE = "ww"
 _TRANSITIONS = ("wr", "rw", "sw", "ws", _CHANGE)
 _LEADS_TO: dict[str, tuple[Section, Gait]] = {
     "w": (VLO, "walk"),
+    _PUSH_OFF: (VLO, "walk"),
     "wr": (APEX, "run"),
     "r": (APEX, "run"),
     "rw": (VLO, "walk"),
@@ -249,6 +251,11 @@ class ScenarioRoute:
         scenario: the profile.
         apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
         paces: when a walk changes its speed by a stride of its own.
+        vlo_height: y wanted at VLO [m] by dx/dt there [m/s], in steps with push-off; None: the
+            scenario's, in steps as in the paper.
+
+    Attributes:
+        any_speed: its walk is made of steps with push-off.
     """
 
     @checked
@@ -257,8 +264,12 @@ class ScenarioRoute:
         scenario: Scenario,
         apex_height: Callable[[float], float] | None = None,
         paces: PaceOptions | None = None,
+        vlo_height: Callable[[float], float] | None = None,
     ) -> None:
         self.scenario = scenario
+        self.any_speed = vlo_height is not None
+        self._walking = _PUSH_OFF if self.any_speed else _PAPER
+        self._vlo_height = vlo_height or (lambda speed: scenario.vlo[0])
         self.paces = paces or PaceOptions()
         self._apex_height = apex_height or (lambda speed: scenario.apex_height)
         self.parameters = scenario.parameters
@@ -304,8 +315,8 @@ class ScenarioRoute:
             return here, None
         s = self.scenario
         segment = s.segments[here.index]
-        kind = _STRIDES[section, segment.gait]
-        if kind in ("ws", "w"):
+        kind = self._kind(section, segment.gait)
+        if kind in ("ws", self._walking):
             here, kind = self._reached(here, kind, float(z[0]), now)
         # A transition aims at where the profile begins, the others at where they will end.
         aims = kind not in _TRANSITIONS or (kind == _CHANGE and here.walking)
@@ -315,11 +326,20 @@ class ScenarioRoute:
         if segment.gait == STAND:
             speed = self.paces.slowed * self._unit if kind == _CHANGE else 0.0
         runs = segment.gait == "run"
-        target = (speed, self._apex_height(speed)) if runs else (speed, *s.vlo)
+        target = (
+            (speed, self._apex_height(speed))
+            if runs
+            else (speed, self._vlo_height(speed), s.vlo[1])
+        )
         if _LEADS_TO[kind][0] is REST:
             target = (0.0, s.stand_height, 0.0)
         goal = StrideGoal(kind, np.array(target), speed, here.index, self._then(kind, here.index))
         return replace(here, last=(kind, now)), goal
+
+    def _kind(self, section: Section, gait: Gait) -> str:
+        """The stride of a segment's gait from a section."""
+        kind = _STRIDES[section, gait]
+        return self._walking if kind == _PAPER else kind
 
     def _reached(
         self, here: _Progress, kind: str, speed: float, now: float
@@ -340,9 +360,9 @@ class ScenarioRoute:
         """The next kind of stride after those of ``kind`` in segment ``index``."""
         section, gait = _LEADS_TO[kind]
         if kind in _TRANSITIONS:
-            return _STRIDES[section, gait]
+            return self._kind(section, gait)
         later = (segment.gait for segment in self.scenario.segments[index:])
-        return next((_STRIDES[section, other] for other in later if other != gait), None)
+        return next((self._kind(section, other) for other in later if other != gait), None)
 
     def _segment(self, here: _Progress, speed: float, now: float) -> _Progress:
         """Enter the segment that holds at ``now``."""

@@ -129,6 +129,11 @@ class Scenario(Checked):
         """Whether a segment is a stand."""
         return STAND in self.gaits
 
+    @property
+    def only_walks(self) -> bool:
+        """Whether all segments are walks."""
+        return self.gaits == {"walk"}
+
     def in_motion(self) -> Scenario | None:
         """The scenario without its stands, from a VLO on; None where nothing is left."""
         if not self.stands:

@@ -51,6 +51,18 @@ class Chain:
         columns = (np.log(self.stiffness), self.touchdown_angle, self.height)
         return PchipInterpolator(self.vlo_speed, np.column_stack(columns))
 
+    @cached_property
+    def _by_mean_speed(self) -> PchipInterpolator:
+        return PchipInterpolator(
+            self.mean_speed, np.column_stack((self.vlo_speed, self.height)), extrapolate=False
+        )
+
+    def vlo_at(self, mean_speed: float) -> tuple[float, float]:
+        """Speed and height at VLO for a mean speed, all without dimension; ends count beyond."""
+        at = np.clip(mean_speed, self.mean_speed[0], self.mean_speed[-1])
+        speed, height = self._by_mean_speed(at).tolist()
+        return speed, height
+
     def gait(self, parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
         """The gait with a speed at VLO; the nearest end's coordinates serve beyond it.
 
@@ -129,6 +141,20 @@ class SpeedFamily:
             )
         return self._chain(parameters, mean_speed).gait_for(parameters, mean_speed)
 
+    def vlo_for(self, parameters: SlipParameters, mean_speed: float) -> tuple[float, float]:
+        """dx/dt and y at VLO of the gait with a mean speed, interpolated, without looking for it.
+
+        Args:
+            parameters: the template.
+            mean_speed: step length over step duration [m/s]; beyond the range its end counts.
+
+        Returns:
+            dx/dt [m/s], y [m].
+        """
+        chain, unit = self._chain(parameters, mean_speed), _unit(parameters)
+        speed, height = chain.vlo_at(mean_speed / unit)
+        return speed * unit, height * parameters.rest_length
+
     def chain_of(self, gait: WalkingGait) -> Chain:
         """The chain that a gait is on, by its mean speed."""
         return self._chain(gait.parameters, gait.mean_speed)
@@ -152,3 +178,9 @@ def family_from(data: Mapping[str, Any]) -> SpeedFamily:
 def walking_by_speed() -> SpeedFamily:
     """The library's family, as ``template-control gaits --family`` made it."""
     return family_from(json.loads(files(__package__).joinpath(_FILE).read_text(encoding="utf-8")))
+
+
+def family_speeds(parameters: SlipParameters) -> tuple[float, float]:
+    """Slowest and fastest dx/dt at VLO of the library's family [m/s]."""
+    chains, unit = walking_by_speed().chains, _unit(parameters)
+    return float(chains[0].vlo_speed[0]) * unit, float(chains[-1].vlo_speed[-1]) * unit

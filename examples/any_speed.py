@@ -1,0 +1,101 @@
+"""Walk at a speed that changes at any time: random profiles, or one from a file.
+
+    python examples/any_speed.py [--trials 4] [--first 0] [--duration 60] [--robot five-link]
+    python examples/any_speed.py --ramp 0.3
+    python examples/any_speed.py --profile FILE [--save run.npz]
+
+A random profile goes at 0.1 to 0.5 m/s^2 from one speed to the next, all within 0.3 to 1.4 m/s for
+l0 = 1 m, and keeps each for 1 to 5 s. Its number is its seed. A ramp goes from 0.4 to 1.4 m/s with
+this acceleration, stays, and goes back. FILE is TOML with two lists, times [s] and speeds [m/s].
+"""
+
+import argparse
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+import template_control as tc
+from template_control.robustness import wilson_interval
+from template_control.run.summary import summarise
+from template_control.slip import Scale
+
+STAY = 12.0  # [s] at the end of a ramp: the robot may be slower than the ramp
+
+
+def random_profile(seed: int, duration: float, unit: float) -> tc.SpeedProfile:
+    """A profile drawn with its seed; ``unit`` is that of speeds."""
+    rng = np.random.default_rng(seed)
+    times, speeds = [0.0], [rng.uniform(0.3, 1.4)]
+    while times[-1] < duration:
+        speed, acceleration = rng.uniform(0.3, 1.4), rng.uniform(0.1, 0.5)
+        times.append(times[-1] + abs(speed - speeds[-1]) / acceleration)
+        times.append(times[-1] + rng.uniform(1.0, 5.0))
+        speeds += [speed, speed]
+    return tc.SpeedProfile(tuple(times), tuple(unit * v for v in speeds))
+
+
+def ramp(acceleration: float, unit: float) -> tc.SpeedProfile:
+    """0.4 to 1.4 m/s and back."""
+    rise = 1.0 / acceleration
+    times = np.cumsum([0.0, 2.0, rise, STAY, rise, STAY])
+    return tc.SpeedProfile(tuple(times), tuple(unit * v for v in (0.4, 0.4, 1.4, 1.4, 0.4, 0.4)))
+
+
+def walk(name: str, robot: str, profile: tc.SpeedProfile, duration: float) -> tc.Record:
+    """Walk a profile, and say how it went."""
+    model = tc.load_robot(robot)
+    route = tc.SpeedRoute(tc.template_for(model), profile, duration)
+    record = tc.simulate(model, route, tc.SimulationOptions(record_every=10))
+    told, speed = summarise(record, None), record.section_state[:, 0]
+    ended = f"FELL: {told['fall_reason']}" if record.fell else "no fall"
+    accepted, torques = told["accepted_speed"], told["joint_torque"].values()
+    print(
+        f"{name}: {ended}, {record.steps} steps in {told['duration']:.1f} s,"
+        f" {speed.min():.2f} to {speed.max():.2f} m/s at VLO,"
+        f" off the accepted {accepted['error_rms']:.3f} m/s RMS,"
+        f" reduced {accepted['strides']} times by up to {accepted['most']:.2f} m/s,"
+        f" |dy/dt| up to {np.abs(record.section_state[:, 2]).max():.2f} m/s,"
+        f" torque up to {max(joint['peak'] for joint in torques):.0f} N m, at the limit in"
+        f" {100 * told['saturated_share']:.2f} % of the ticks",
+        flush=True,
+    )
+    return record
+
+
+def main() -> None:
+    """Walk what was asked for."""
+    parser = argparse.ArgumentParser(description="Walk at a speed that changes at any time.")
+    parser.add_argument("--trials", type=int, default=4)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first trial")
+    parser.add_argument("--duration", type=float, default=60.0, help="of a random profile [s]")
+    parser.add_argument("--ramp", type=float, help="acceleration [m/s^2]")
+    parser.add_argument("--profile", type=Path, help="TOML with times and speeds")
+    parser.add_argument("--robot", default="five-link")
+    parser.add_argument("--save", type=Path, help="file of the last run's record")
+    chosen = parser.parse_args()
+    unit = Scale.of(tc.template_for(tc.load_robot(chosen.robot))).speed
+    if chosen.profile is not None:
+        data = tomllib.loads(chosen.profile.read_text(encoding="utf-8"))
+        profile = tc.SpeedProfile(tuple(data["times"]), tuple(data["speeds"]))
+        record = walk(str(chosen.profile), chosen.robot, profile, profile.times[-1])
+    elif chosen.ramp is not None:
+        profile = ramp(chosen.ramp, unit)
+        record = walk(f"{chosen.ramp:g} m/s^2", chosen.robot, profile, profile.times[-1])
+    else:
+        falls = 0
+        for seed in range(chosen.first, chosen.first + chosen.trials):
+            profile = random_profile(seed, chosen.duration, unit)
+            record = walk(f"seed {seed}", chosen.robot, profile, chosen.duration)
+            falls += record.fell
+        low, high = wilson_interval(chosen.trials - falls, chosen.trials)
+        print(
+            f"{chosen.trials - falls} of {chosen.trials} did not fall"
+            f" ({100 * low:.0f} to {100 * high:.0f} % with 95 % confidence)"
+        )
+    if chosen.save is not None:
+        print(record.save(chosen.save))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,223 @@
+"""The planner that looks several steps ahead: its derivatives, its bounds and its governor."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.cli.main import main
+from template_control.embedding.ahead.gait_row import CONTROL, CONTROLS, STATE, STIFFNESS, WIDTH
+from template_control.embedding.ahead.gait_table import SLOTS, gait_table, row_at
+from template_control.embedding.ahead.look_ahead import (
+    Aim,
+    Plan,
+    Workspace,
+    aimed,
+    look_ahead,
+    residuals,
+    slopes,
+)
+from template_control.embedding.ahead.options import AheadOptions
+from template_control.embedding.ahead.planner import AheadPlanner, prospect
+from template_control.embedding.ahead.rehearsal import rehearse
+from template_control.embedding.planners.planner import ANY_ANGLE
+from template_control.errors import ScenarioError
+from template_control.run.summary import summarise
+from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.dynamics.kernel import new_scratch
+from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.scenario.speed_command import SpeedProfile
+from template_control.slip.scenario.speed_route import SpeedRoute
+
+P = tc.SlipParameters()
+OPTIONS = AheadOptions()
+TABLE = gait_table(P, OPTIONS)
+SCENARIO = """
+start = [0.4, 0.977, 0.0]
+[[segment]]
+gait = "walk"
+speed = 0.4
+acceleration = {acceleration}
+until_speed = {until}
+"""
+
+
+@pytest.fixture(scope="module")
+def planner():
+    return AheadPlanner(P)
+
+
+def plan_from(z, speed, steps=3, **changes):
+    """A plan's cost, the plan, and what it was made with."""
+    known = prospect(P, replace(OPTIONS, **changes), TABLE)
+    plan = Plan(np.empty((steps + 1, 3)), np.empty((steps, CONTROLS)), np.empty(WIDTH))
+    work = Workspace(new_scratch(), new_scratch(complex))
+    aim = Aim(speed, np.zeros(3), ANY_ANGLE)
+    return look_ahead(known, work, z, aim, plan), plan, (known, work, aim)
+
+
+def test_derivatives_are_those_of_the_residuals():
+    z = row_at(TABLE, 0.8)[STATE : STATE + 3] + [0.03, 0.002, 0.16]
+    _, plan, (known, work, aim) = plan_from(z, 0.9, rounds=1)
+    target, factor = np.empty(7), np.empty((3, 3))
+    aimed(known, aim, plan, target, factor)
+    size = plan.controls.size
+    rows = np.empty((8 * len(plan.controls), size))
+    slopes(known, work, plan, factor, rows)
+    step = ReturnMap(P, "wp")
+
+    def missed(change):
+        states, controls = [plan.states[0]], plan.controls + change.reshape(plan.controls.shape)
+        for row in controls:
+            u = np.zeros(6)
+            u[SLOTS] = row * [1.0, *[plan.row[STIFFNESS]] * 3]
+            states.append(step.step(states[-1], u)[0])
+        out = np.empty(len(rows))
+        residuals(known, Plan(np.array(states), controls, plan.row), target, factor, out)
+        return out
+
+    for column, change in zip(rows.T, 1e-6 * np.eye(size), strict=True):
+        difference = (missed(change) - missed(-change)) / 2e-6
+        np.testing.assert_allclose(column, difference, rtol=1e-4, atol=1e-4 * np.abs(rows).max())
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.36, 0.8, 1.3])
+def test_a_gait_is_kept(planner, speed):
+    row = row_at(TABLE, speed)
+    z = row[STATE : STATE + 3]
+    decision = planner.decide(z, z)
+    assert decision.accepted is None
+    assert decision.nominal
+    np.testing.assert_allclose(decision.predicted, z, atol=2e-3)
+    k = row[STIFFNESS]
+    np.testing.assert_allclose(decision.controls[SLOTS[1:]], k, rtol=0.02)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_plan_stays_within_its_bounds(seed):
+    rng = np.random.default_rng(seed)
+    speed = rng.uniform(0.3, 1.2)
+    z = row_at(TABLE, speed)[STATE : STATE + 3] + rng.uniform(-1, 1, 3) * [0.15, 0.006, 0.15]
+    cost, plan, (known, *_) = plan_from(z, speed)
+    if not np.isfinite(cost):
+        pytest.skip("no plan from there")
+    low, high = known.bounds.copy()
+    low[0] += plan.row[CONTROL]
+    high[0] += plan.row[CONTROL]
+    assert np.all(plan.controls >= low - 1e-12)
+    assert np.all(plan.controls <= high + 1e-12)
+    top = np.arcsin(np.minimum(plan.states[0, 1], 1.0))
+    assert plan.controls[0, 0] <= top - known.top_margin + 1e-12
+
+
+def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
+    z = row_at(TABLE, 0.9)[STATE : STATE + 3]
+    free = planner.decide(z, z + [0.1, 0.0, 0.0])
+    angle = free.controls[0] + 0.01
+    held = planner.decide(z, z + [0.1, 0.0, 0.0], (angle, angle + 1e-9))
+    assert held.controls[0] == pytest.approx(angle, abs=1e-8)
+
+
+def test_dy_dt_costs_above_its_bound():
+    z = row_at(TABLE, 0.9)[STATE : STATE + 3]
+    below, *_ = plan_from(z + [0.0, 0.0, 0.1], 0.9, rounds=1)
+    calm, plan, _ = plan_from(z + [0.0, 0.0, 0.1], 0.9)
+    assert calm <= below
+    assert np.abs(plan.states[1:, 2]).max() < OPTIONS.rise + OPTIONS.rise_tolerance
+
+
+def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
+    z = row_at(TABLE, 0.9)[STATE : STATE + 3]
+    taken = planner.decide(z, z + [0.05, 0.0, 0.0])
+    assert taken.accepted is None
+    reduced = planner.decide(z, z + [0.5, 0.0, 0.0])
+    assert 0.9 < reduced.accepted <= 0.9 + OPTIONS.pace
+    assert 0.9 < reduced.predicted[0] < reduced.accepted
+    assert planner.gait.vlo[0] == pytest.approx(reduced.accepted)
+
+
+@pytest.mark.parametrize(("wanted", "end"), [(0.02, 0), (3.0, 1)])
+def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
+    there = planner.speeds[end]
+    z = row_at(TABLE, there)[STATE : STATE + 3]
+    decision = planner.decide(z, np.array([wanted, z[1], 0.0]))
+    assert decision.accepted == pytest.approx(there)
+
+
+def test_a_plan_that_is_not_cheap_gives_way_to_a_search():
+    hasty = AheadPlanner(P, AheadOptions(cheap=1e-9))
+    z = row_at(TABLE, 0.9)[STATE : STATE + 3] + [0.1, 0.0, 0.0]
+    decision = hasty.decide(z, z)
+    assert decision.feasible
+    assert decision.lasting
+    assert not decision.nominal
+    assert decision.accepted == pytest.approx(z[0], abs=OPTIONS.spacing)
+
+
+def test_the_template_goes_through_all_speeds_and_back(planner):
+    """Across the gap of the family too, up and down."""
+    step, z, speeds = ReturnMap(P, "wp"), walking_by_speed().gait_for(P, 0.35).vlo, []
+    for wanted in [1.3] * 28 + [0.27] * 28:
+        decision = planner.decide(z, np.array([wanted, 0.0, 0.0]))
+        assert decision.nominal
+        z, outcome = step.step(z, decision.controls)
+        assert outcome is Outcome.SECTION
+        assert abs(z[2]) < OPTIONS.rise
+        speeds.append(z[0])
+    assert max(speeds) == pytest.approx(1.3, abs=0.02)
+    assert speeds[-1] == pytest.approx(0.27, abs=0.02)
+
+
+def test_a_table_scales_with_the_template():
+    small = replace(P, mass=10.0, rest_length=0.3)
+    unit = np.sqrt(0.3)
+    low, high = AheadPlanner(small).speeds
+    assert (low / unit, high / unit) == pytest.approx((TABLE.speed[0], TABLE.speed[-1]))
+
+
+def test_a_rehearsal_refuses_what_cannot_be_had(planner):
+    rehearse(SpeedRoute(P, SpeedProfile((0.0, 8.0), (0.8, 0.95)), 8.0), planner)
+    with pytest.raises(ScenarioError, match=r"wants .* m/s at VLO .* can be had then"):
+        rehearse(SpeedRoute(P, SpeedProfile((2.0, 2.5), (0.5, 1.2)), 8.0), planner)
+
+
+def test_strict_refuses_a_scenario_in_one_line(tmp_path, capsys):
+    path = tmp_path / "scenario.toml"
+    path.write_text(SCENARIO.format(acceleration=0.5, until=1.2))
+    assert main(["walk", "--scenario", str(path), "--strict", "--output", str(tmp_path)]) == 2
+    line = capsys.readouterr().err.strip()
+    assert "segment 1 wants" in line
+    assert len(line.splitlines()) == 1
+    assert main(["walk", "--strict", "--steps", "1", "--output", str(tmp_path)]) == 2
+    assert "--strict goes with a scenario" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_robot_changes_its_speed_and_tells_what_it_accepted(tmp_path):
+    """Through the gap, and faster than it can: no fall, and what was accepted is kept."""
+    template = tc.template_for(tc.load_robot("five-link"))
+    profile = SpeedProfile((1.0, 1.6, 6.0, 7.0), (0.38, 0.7, 0.7, 0.4))
+    record = tc.simulate(tc.load_robot("five-link"), SpeedRoute(template, profile, 11.0))
+    assert not record.fell
+    record = tc.Record.load(record.save(tmp_path / "run.npz"))
+    speed = record.section_state[:, 0]
+    assert speed.max() > 0.5
+    assert speed[-1] < 0.42
+    accepted = summarise(record, None)["accepted_speed"]
+    assert accepted["strides"] > 3
+    assert accepted["error_rms"] < 0.08
+    assert np.all(record.section_nominal)
+
+
+@pytest.mark.slow
+def test_a_scenario_walks_where_it_was_refused(tmp_path, capfd):
+    path = tmp_path / "scenario.toml"
+    path.write_text(SCENARIO.format(acceleration=0.2, until=0.5))
+    run = ["walk", "--scenario", str(path), "--json", "--no-figures", "--output", str(tmp_path)]
+    assert main(run) == 0
+    figures = json.loads(capfd.readouterr().out)
+    assert figures["strides"] == {"walking with push-off": figures["steps"]}
+    assert figures["vlo_target"]["speed"] == pytest.approx(0.5, abs=0.12)
