@@ -59,7 +59,7 @@ class StandingGait:
         return cls(parameters, state, np.zeros(NUM_SLOTS), options.beat)
 
 
-class _Curves:
+class Curves:
     """What the planners here have in common: they learn nothing, and plan curves.
 
     Args:
@@ -132,7 +132,7 @@ class _Curves:
         return changed, chained(first, second)
 
 
-class StandPlanner(_Curves):
+class StandPlanner(Curves):
     """Stands: the CoM comes to rest between the feet, and stays there."""
 
     lands = False
@@ -158,7 +158,7 @@ class StandPlanner(_Curves):
         return replace(decision, feasible=self._fits(found)), stride
 
 
-class StartPlanner(_Curves):
+class StartPlanner(Curves):
     """Starts to walk: back, and forward to where the rear foot lifts off."""
 
     def decide(
@@ -197,7 +197,7 @@ class StopPlanner(StandPlanner):
         return self._step(min(steps, key=cost) if steps else None, self.gait.state, 0.0)
 
 
-class ChangePlanner(_Curves):
+class ChangePlanner(Curves):
     """Makes a step to another speed."""
 
     def decide(

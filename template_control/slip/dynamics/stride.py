@@ -70,6 +70,11 @@ class Stride:
     node_names: tuple[str, ...]
 
     @property
+    def start(self) -> str:
+        """The node that it starts in."""
+        return self.node_names[int(self.meta[0, 2])]
+
+    @property
     def completed(self) -> bool:
         """True where the stride reached its section."""
         return self.outcome is Outcome.SECTION

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,25 +26,26 @@ from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segme
 
 Array = NDArray[np.float64]
 
+_WALK, _CHANGE, _STOP, _CLOSE = "w", "ww", "ws", "sf"
 _STRIDES: dict[tuple[Section, Gait], str] = {
-    (VLO, "walk"): "w",
+    (VLO, "walk"): _WALK,
     (VLO, "run"): "wr",
     (APEX, "run"): "r",
     (APEX, "walk"): "rw",
     (REST, "stand"): "s",
     (REST, "walk"): "sw",
-    (VLO, "stand"): "ws",
+    (VLO, "stand"): _STOP,
 }
-_CHANGE = "ww"
-_TRANSITIONS = ("wr", "rw", "sw", "ws", _CHANGE)
+_TRANSITIONS = ("wr", "rw", "sw", _STOP, _CLOSE, _CHANGE)
 _LEADS_TO: dict[str, tuple[Section, Gait]] = {
-    "w": (VLO, "walk"),
+    _WALK: (VLO, "walk"),
     "wr": (APEX, "run"),
     "r": (APEX, "run"),
     "rw": (VLO, "walk"),
     "s": (REST, "stand"),
     "sw": (VLO, "walk"),
-    "ws": (REST, "stand"),
+    _STOP: (REST, "stand"),
+    _CLOSE: (REST, "stand"),
     _CHANGE: (VLO, "walk"),
 }
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
@@ -202,6 +203,11 @@ class _Progress:
     took: float | None = None
     over: bool = False
 
+    @property
+    def kind(self) -> str:
+        """Of the stride under way."""
+        return "" if self.last is None else self.last[0]
+
     def arrived(self, now: float) -> _Progress:
         """At a section: the stride that was under way is done."""
         if self.last is None:
@@ -249,6 +255,7 @@ class ScenarioRoute:
         scenario: the profile.
         apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
         paces: when a walk changes its speed by a stride of its own.
+        walks: kind of its walking steps, "wp" with push-off.
     """
 
     @checked
@@ -257,8 +264,10 @@ class ScenarioRoute:
         scenario: Scenario,
         apex_height: Callable[[float], float] | None = None,
         paces: PaceOptions | None = None,
+        walks: Literal["w", "wp"] = "w",
     ) -> None:
         self.scenario = scenario
+        self.walks = walks
         self.paces = paces or PaceOptions()
         self._apex_height = apex_height or (lambda speed: scenario.apex_height)
         self.parameters = scenario.parameters
@@ -305,7 +314,9 @@ class ScenarioRoute:
         s = self.scenario
         segment = s.segments[here.index]
         kind = _STRIDES[section, segment.gait]
-        if kind in ("ws", "w"):
+        if section is REST and self._progress.kind == _STOP:
+            kind = _CLOSE  # the last step of a walk is a long one
+        if kind in (_STOP, _WALK):
             here, kind = self._reached(here, kind, float(z[0]), now)
         # A transition aims at where the profile begins, the others at where they will end.
         aims = kind not in _TRANSITIONS or (kind == _CHANGE and here.walking)
@@ -318,8 +329,13 @@ class ScenarioRoute:
         target = (speed, self._apex_height(speed)) if runs else (speed, *s.vlo)
         if _LEADS_TO[kind][0] is REST:
             target = (0.0, s.stand_height, 0.0)
-        goal = StrideGoal(kind, np.array(target), speed, here.index, self._then(kind, here.index))
+        then = self._then(kind, here.index)
+        goal = StrideGoal(self._named(kind), np.array(target), speed, here.index, then)
         return replace(here, last=(kind, now)), goal
+
+    def _named(self, kind: str) -> str:
+        """The kind of stride that a kind of the tables is made as."""
+        return self.walks if kind == _WALK else kind
 
     def _reached(
         self, here: _Progress, kind: str, speed: float, now: float
