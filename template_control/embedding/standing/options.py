@@ -19,7 +19,8 @@ class StandingOptions(Checked):
         height: of the CoM over the ground [m].
         spacing: of the feet where a run begins [m].
         place: of the CoM between the feet, as a share of their spacing from the rear one.
-        beat: a stand is planned anew, and the route asked, after this time [s].
+        beat: a stand is planned anew, and the route asked, after this time [s]; a step from a stand
+            ends this long after its curve, when the robot has come to rest too.
         shifts: places, as shares of the spacing, from which a start may set off.
         durations: shortest and longest quintic [s].
         trials: number of durations tried between them, and of rest places.

@@ -92,6 +92,14 @@ class Curves:
     def _between(self, toes: tuple[float, float]) -> BetweenFeet:
         return BetweenFeet(toes, self.parameters, self.options)
 
+    def _stilled(self, found: Found, duration: float) -> tuple[Quintic, ...]:
+        """A curve to rest, and some time [s] in which the robot comes to it."""
+        if duration <= 0.0:
+            return found.pieces
+        still = np.zeros_like(found.pieces[-1].coefficients)
+        still[:, 0] = found.pieces[-1].end()[:, 0]
+        return (*found.pieces, Quintic(still, duration))
+
     def _fits(self, found: Found) -> bool:
         return found.excess <= self.options.slack
 
@@ -148,13 +156,8 @@ class StandPlanner(Curves):
     ) -> tuple[Decision, Stride]:
         """See :class:`~.planner.CurvePlanner`."""
         found = self._between(toes).to_rest(start, self.lands)
-        pieces = [*found.pieces]
-        left = self.options.beat - sum(piece.duration for piece in pieces)
-        if left > 0.0:
-            still = np.zeros_like(pieces[-1].coefficients)
-            still[:, 0] = pieces[-1].end()[:, 0]
-            pieces.append(Quintic(still, left))
-        stride = timed_stride(self.automaton, node, pieces, toes)
+        left = self.options.beat - sum(piece.duration for piece in found.pieces)
+        stride = timed_stride(self.automaton, node, self._stilled(found, left), toes)
         return replace(decision, feasible=self._fits(found)), stride
 
 

@@ -154,7 +154,8 @@ class StepPlanner(Curves):
     ) -> tuple[Decision, Stride]:
         """The foot has landed: to rest."""
         found = self._resting(self._turned(start), (self._way * toes[0], self._way * toes[1]))
-        stride = timed_stride(self.automaton, node, self._back(found.pieces), toes)
+        pieces = self._back(self._stilled(found, self.options.beat))
+        stride = timed_stride(self.automaton, node, pieces, toes)
         return replace(decision, feasible=self._fits(found)), stride
 
     def _resting(self, start: Array, toes: tuple[float, float]) -> Found:
@@ -201,5 +202,6 @@ class StepPlanner(Curves):
         )
         end = stride.sample(np.nextafter(landing.time, 0.0))[0].reshape(3, 2).T
         found = self._resting(self._turned(end), (self._way * both[0], self._way * both[1]))
-        rest = timed_stride(self.automaton, landing.target, self._back(found.pieces), both)
+        pieces = self._back(self._stilled(found, self.options.beat))
+        rest = timed_stride(self.automaton, landing.target, pieces, both)
         return chained(cut, rest), True
