@@ -235,6 +235,13 @@ def test_a_route_stands_starts_walks_and_stops():
     assert [speed for _, speed in found[3:8]] == [0.8, 0.8, 0.8, pytest.approx(0.345, abs=0.01), 0]
 
 
+def test_a_route_walks_in_the_steps_it_is_told():
+    """Its other strides stay what they are."""
+    told = ScenarioRoute(Scenario(segments=(WALK, STAND)), walks="wp")
+    z = np.array([0.8, 0.97, 0.0])
+    assert [told.next(VLO, z, t).stride for t in (0.0, 1.0, 3.0)] == ["wp", "wp", "ww"]
+
+
 def test_a_route_begins_where_its_scenario_does():
     standing = ScenarioRoute(Scenario(segments=(STAND, WALK)))
     assert standing.section is REST
