@@ -214,6 +214,8 @@ def test_transitions_are_chosen_at_their_own_section():
         (starts["w"], starts["ws"]),
         (starts["w"], starts["ww"]),
         (starts["s"], starts["sw"]),
+        (starts["s"], starts["sf"]),
+        (starts["s"], starts["sb"]),
     }
 
 

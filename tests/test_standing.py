@@ -226,11 +226,20 @@ def test_a_route_stands_starts_walks_and_stops():
         (VLO, 0.8, 4.8),  # two seconds after it came to its speed
         (VLO, 0.4, 5.5),
         (REST, 0.0, 6.2),
-        (REST, 0.0, 7.2),
+        (REST, 0.0, 7.5),  # its feet are nearer to each other now
+        (REST, 0.0, 8.5),
     )
-    assert [stride for stride, _ in found[:-1]] == ["s", "s", "sw", "ww", "w", "w", "ww", "ws", "s"]
+    kinds = [stride for stride, _ in found[:-1]]
+    assert kinds == ["s", "s", "sw", "ww", "w", "w", "ww", "ws", "sf", "s"]
     assert found[-1] is None
     assert [speed for _, speed in found[3:8]] == [0.8, 0.8, 0.8, pytest.approx(0.345, abs=0.01), 0]
+
+
+def test_a_route_walks_in_the_steps_it_is_told():
+    """Its other strides stay what they are."""
+    told = ScenarioRoute(Scenario(segments=(WALK, STAND)), walks="wp")
+    z = np.array([0.8, 0.97, 0.0])
+    assert [told.next(VLO, z, t).stride for t in (0.0, 1.0, 3.0)] == ["wp", "wp", "ww"]
 
 
 def test_a_route_begins_where_its_scenario_does():
@@ -264,17 +273,18 @@ def test_the_template_leaves_stands_out():
 
 def test_standing_belongs_to_a_scenario_that_stands():
     route = ScenarioRoute(Scenario(segments=(WALK,)))
-    assert not {"s", "sw", "ws", "ww"} & set(tc.embedding.default_planners(route))
+    standing = {"s", "sw", "ws", "ww", "sf", "sb"}
+    assert not standing & set(tc.embedding.default_planners(route))
     route = ScenarioRoute(Scenario(segments=(STAND, WALK)))
-    assert {"s", "sw", "ws", "ww"} < set(tc.embedding.default_planners(route))
+    assert standing < set(tc.embedding.default_planners(route))
 
 
 def test_every_kind_of_stride_leads_on():
     """A stride that ends at a section is followed by one that begins there."""
-    for start in ("s", "sw", "ws", "ww"):
+    for start in ("s", "sw", "ws", "ww", "sf", "sb"):
         begin, end = AUTOMATON.sections(AUTOMATON.start(start).name)
-        assert (begin is Event.REST) == (start in ("s", "sw"))
-        assert (end is Event.REST) == (start in ("s", "ws"))
+        assert (begin is Event.REST) == (start in ("s", "sw", "sf", "sb"))
+        assert (end is Event.REST) == (start in ("s", "ws", "sf", "sb"))
 
 
 # ---- the robot
@@ -330,4 +340,4 @@ def test_the_robot_stands_walks_and_stands(spacing, speed):
     last = record.time > record.time[-1] - 0.8
     assert np.ptp(record.com[last], axis=0).max() < 1e-3
     assert np.abs(record.com_velocity[last]).max() < 2e-3
-    assert np.ptp(record.foot[-1, :, 0]) < 0.46
+    assert 0.2 < np.ptp(record.foot[-1, :, 0]) < 0.3

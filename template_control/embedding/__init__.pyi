@@ -45,6 +45,7 @@ from .robot_template import robot_gait_for_speed as robot_gait_for_speed
 from .robot_template import template_for as template_for
 from .robot_template import walking_speeds as walking_speeds
 from .section_report import SectionReport as SectionReport
+from .standing.default import gaits_by_speed as gaits_by_speed
 from .standing.default import standing_planners as standing_planners
 from .standing.options import StandingOptions as StandingOptions
 from .standing.planners import ChangePlanner as ChangePlanner
@@ -53,3 +54,4 @@ from .standing.planners import StandPlanner as StandPlanner
 from .standing.planners import StartPlanner as StartPlanner
 from .standing.planners import StopPlanner as StopPlanner
 from .standing.pose import standing_pose as standing_pose
+from .standing.stepping import StepPlanner as StepPlanner

@@ -231,7 +231,7 @@ class EmbeddingController:
 
     def _take(self, edge: Edge) -> None:
         """Go along an edge: roles and swings of the feet, plan, node."""
-        before, stood = self.station, self._standing()
+        before, stood, roles = self.station, self._standing(), self.feet.of
         self.planning.pass_event(edge.event)
         self._enter(str(edge.target))
         self.feet.apply(edge.reset)
@@ -240,7 +240,13 @@ class EmbeddingController:
         for foot in lifted:
             self._lift(foot)
         s = self._sensed
-        if lifted:
+        if self.feet.landed in lifted and self.station.stance:
+            # A step back: the other foot is the one on the ground.
+            self.feet.landed = self.feet.of[self.station.stance[0]]
+            ground = float(self.robot.foot_position[self.feet.landed, 1])
+            s.state[1] += self.ground - ground
+            self.ground = ground
+        if lifted or self.feet.of != roles:
             self._rear_shift = 0.0
             rear, front = self.feet.of
             s.toes[:] = self.robot.foot_position[[rear, front], 0]
@@ -281,13 +287,13 @@ class EmbeddingController:
         if leg is not Leg.REAR:
             back = s.state[0] - s.toes[Leg.REAR]
             moved = np.sqrt(max(back**2 + s.state[1] ** 2 - height**2, 0.0))
-            self._rear_shift = float(back - moved)
+            self._rear_shift = float(back - np.copysign(moved, back))
             s.toes[Leg.REAR] += self._rear_shift
         self.ground, s.state[1] = ground, height
         if self.station.control.lands:
             self.planning.land(self.node, s, self.time)
         else:
-            self.planning.follow(self.node, s, self.time)
+            self._enter(self.planning.follow(self.node, s, self.time).name)
         self._on_new_path()
 
     def _decide(self, section: Section) -> None:

@@ -104,14 +104,15 @@ class RobotGuards:
         beta = np.arctan2(sensed.state[1], sensed.state[0] - sensed.toes[0])
         return bool(beta <= angle)
 
-    def _rest(self, edge: Edge, sensed: Sensed, due: float) -> bool:
+    def _due(self, edge: Edge, sensed: Sensed, due: float) -> bool:
         return due <= 0.0
 
 
 _NOT_GEOMETRIC: dict[Event, Callable[[RobotGuards, Edge, Sensed, float], bool]] = {
     Event.TOUCHDOWN: RobotGuards._touchdown,
     Event.REAR_LIFTOFF: RobotGuards._rear_liftoff,
-    Event.REST: RobotGuards._rest,
+    Event.FRONT_LIFTOFF: RobotGuards._due,
+    Event.REST: RobotGuards._due,
 }
 _FELT = [_NOT_GEOMETRIC.get(event) for event in Event]
 """By Event: how the robot feels what it does not read off the template's geometry."""

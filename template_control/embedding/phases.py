@@ -86,6 +86,16 @@ _UNTRIMMED = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(L
 _STANDING = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, curved=True)
 _LIFTING_OFF = replace(_STANDING, unloads=(Leg.REAR,), weighs=False)
 
+_SINGLE_STANCE = PhaseControl(
+    # Height before the swing foot: near VLO its pull on the ground would need more normal
+    # force than the template has there. A point foot cannot change the momentum about
+    # itself: the CoM's x is left nearly free.
+    tasks=(ComTask((0.01, 10.0)), PostureTask(), FootTask(Leg.FRONT)),
+    swings=(Leg.FRONT,),
+)
+# A step from a stand may go back, and nearly rest over its foot: directions tell no time.
+_STEPPING = replace(_SINGLE_STANCE, clock=Clock.TIME, curved=True)
+
 PHASES: Phases = {
     Phase.F: PhaseControl(
         # The CoM is ballistic, and the trunk can only be turned against the legs.
@@ -98,13 +108,7 @@ PHASES: Phases = {
     ),
     "SS_sc^r": replace(_RUNNING_STANCE, lands=True),
     "SS_sd^r": _RUNNING_STANCE,
-    Phase.SS: PhaseControl(
-        # Height before the swing foot: near VLO its pull on the ground would need more normal
-        # force than the template has there. A point foot cannot change the momentum about
-        # itself: the CoM's x is left nearly free.
-        tasks=(ComTask((0.01, 10.0)), PostureTask(), FootTask(Leg.FRONT)),
-        swings=(Leg.FRONT,),
-    ),
+    Phase.SS: _SINGLE_STANCE,
     Phase.DS: PhaseControl(
         tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,), trims=True
     ),
@@ -120,6 +124,12 @@ PHASES: Phases = {
     "DS_br^ws": replace(_STANDING, weighs=False),
     "DS_ar^sw": _LIFTING_OFF,
     "DS_bl^ww": _LIFTING_OFF,
+    "DS_al^sf": _LIFTING_OFF,
+    "SS_bt^sf": _STEPPING,
+    "DS_br^sf": replace(_STANDING, weighs=False),
+    "DS_al^sb": replace(_LIFTING_OFF, unloads=(Leg.FRONT,)),
+    "SS_bt^sb": _STEPPING,
+    "DS_br^sb": replace(_STANDING, weighs=False),
 }
 """What walking and running need in each phase; transitions may start from it."""
 

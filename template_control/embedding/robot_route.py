@@ -62,9 +62,11 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
             f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from {slowest:.3g} to"
             f" {fastest:.3g} m/s"
         )
-    vlo_height = _family_height(p) if push_off else None
     return ScenarioRoute(
-        own, lambda speed: suited_height(speed / unit) * p.rest_length, vlo_height=vlo_height
+        own,
+        lambda speed: suited_height(speed / unit) * p.rest_length,
+        vlo_height=_family_height(p) if push_off else None,
+        walks="wp" if push_off else "w",
     )
 
 

@@ -21,6 +21,7 @@ from template_control.embedding.planning.planned_path import PlannedPath
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.planning.route_planners import RoutePlanners
+from template_control.embedding.planning.stepping_out import follow_curve
 from template_control.embedding.references.template_path import join
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
@@ -150,12 +151,12 @@ class StridePlanning(PlannedPath):
         state = sensed.state.copy()
         if start is not z:
             state[:4] = section.state(start, state[0])
-        self._follow(node, state, sensed, now)
+        node = self._follow(node, state, sensed, now)
         if not decision.lasting and not self.arrived:
             return self._break(node, sensed, 0.0, now)
         return node
 
-    def follow(self, node: Node, sensed: Sensed, now: float, angle_drop: float = 0.0) -> None:
+    def follow(self, node: Node, sensed: Sensed, now: float, angle_drop: float = 0.0) -> Node:
         """Template path from here to the touchdown after the next section.
 
         Args:
@@ -163,26 +164,28 @@ class StridePlanning(PlannedPath):
             sensed: the robot's state.
             now: time [s].
             angle_drop: how much lower the touchdown angle is than decided [rad].
+
+        Returns:
+            The node that the path begins in: of another stride where a curve led to no rest.
         """
-        self._follow(node, sensed.state, sensed, now, angle_drop)
+        return self._follow(node, sensed.state, sensed, now, angle_drop)
 
     def _follow(
         self, node: Node, state: Array, sensed: Sensed, now: float, angle_drop: float = 0.0
-    ) -> None:
+    ) -> Node:
         report = self.reports[-1]
         u = report.decision.controls.copy()
         u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
         self.reaching = angle_drop > 0.0
         if node.name in self.curved:
-            decision, first = self._rest.curve(
-                node.name, sensed, state, self.planner, report.decision
-            )
-            self.reports[-1] = replace(report, decision=decision)
+            self.reports[-1], first = follow_curve(self._rest, node.name, sensed, state, report)
+            node = self.automaton.node(first.start)
         else:
             first = self._rest.onward(node.name, sensed, state, u)
         strides, self._whole = self._rest.strides(node, first, report.goal, now)
         self.take(join(strides, self.options.path), sensed.feet)
         self._planned_at = now
+        return node
 
     def land(self, node: Node, sensed: Sensed, now: float) -> None:
         """A foot has landed: choose again what is still free, from where it did.
@@ -303,5 +306,5 @@ class StridePlanning(PlannedPath):
                 lasting = decision.lasting
         elif isinstance(planner, LandingPlanner):
             self._choose_again(planner, node, sensed)
-        self.follow(node, sensed, now)
+        node = self.follow(node, sensed, now)
         return node if lasting and self._whole else self._break(node, sensed, 0.0, now)

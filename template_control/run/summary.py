@@ -26,6 +26,8 @@ STANDING = {
     "sw": "stand to walk",
     "ws": "walk to stand",
     "ww": "to another speed",
+    "sf": "step from a stand",
+    "sb": "step back from a stand",
 }
 """The kinds of stride of a scenario that stands."""
 

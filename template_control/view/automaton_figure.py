@@ -32,6 +32,8 @@ GAIT_NAMES = {
     "ws": "stop",
     "ww": "to another speed",
     "wp": "walking with push-off",
+    "sf": "step from a stand",
+    "sb": "step back from a stand",
 }
 """Gaits by the superscripts of Table I, and of standing."""
 

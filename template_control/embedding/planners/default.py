@@ -16,7 +16,7 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
-from template_control.embedding.standing.default import standing_planners
+from template_control.embedding.standing.default import gaits_by_speed, standing_planners
 from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
@@ -62,6 +62,16 @@ def _followed(route: Route) -> Route:
     return route.followed if isinstance(route, CatchingRoute) else route
 
 
+def _standing(route: Route) -> Planners:
+    """The planners of a scenario that stands; others need none."""
+    if not (isinstance(route, ScenarioRoute) and route.scenario.stands):
+        return {}
+    p = route.parameters
+    relative = route.scenario.stand_height / p.rest_length * REFERENCE.rest_length
+    family = gaits_by_speed(p) if route.pushes_off else None
+    return standing_planners(p, StandingOptions(height=relative), family)
+
+
 @checked
 def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
@@ -85,16 +95,13 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
     followed = _followed(route)
+    scenario = followed.scenario if isinstance(followed, ScenarioRoute) else None
+    standing = _standing(followed)
     if isinstance(followed, SpeedRoute) or (
-        isinstance(followed, ScenarioRoute) and followed.any_speed
+        isinstance(followed, ScenarioRoute) and followed.pushes_off
     ):
         ahead = walking or AheadPlanner(p, speed=speed)
-        return {ahead.gait.stride: ahead}
-    scenario = followed.scenario if isinstance(followed, ScenarioRoute) else None
-    standing: Planners = {}
-    if scenario is not None and scenario.stands:
-        relative = scenario.stand_height / p.rest_length * REFERENCE.rest_length
-        standing = standing_planners(p, StandingOptions(height=relative))
+        return {ahead.gait.stride: ahead, **standing}
     walk = walking or LqrPlanner(walking_gait(p, speed))
     options = _CATCHING if scenario is None else _keeping_up(scenario)
 

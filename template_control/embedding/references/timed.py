@@ -105,7 +105,8 @@ def timed_stride(
     event = FiredEvent(
         float(durations.sum()), edge.event, node, str(edge.target), state, edge.reset
     )
-    after = np.array((toes[1], toes[0]) if edge.reset is Reset.SHIFT else toes)
+    exchanged = edge.reset in (Reset.SHIFT, Reset.SWAP)
+    after = np.array(toes[::-1] if exchanged else toes)
     return Stride(
         outcome=Outcome.SECTION,
         node=str(edge.target),

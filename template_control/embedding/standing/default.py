@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
+import numpy as np
+
 from template_control.checks.checked import checked
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.standing.options import StandingOptions
@@ -13,10 +15,24 @@ from template_control.embedding.standing.planners import (
     StartPlanner,
     StopPlanner,
 )
+from template_control.embedding.standing.stepping import StepPlanner
 from template_control.embedding.standing.vaults import Family, Vaults
+from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
 from template_control.slip.gaits.walking_family import speed_range, walking_gait
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
+
+
+def gaits_by_speed(parameters: SlipParameters) -> Family:
+    """The gaits of the family by speed, with push-off; slower walks pass over a stiff leg.
+
+    Args:
+        parameters: the template.
+    """
+    chain = walking_by_speed().chains[-1]
+    unit = float(np.sqrt(parameters.gravity * parameters.rest_length))
+    ends = (float(chain.vlo_speed[0]) * unit, float(chain.vlo_speed[-1]) * unit)
+    return Family(partial(chain.gait, parameters), ends)
 
 
 @checked
@@ -25,18 +41,22 @@ def standing_planners(
     options: StandingOptions | None = None,
     family: Family | None = None,
 ) -> dict[str, Planner]:
-    """A planner for standing, starting to walk, stopping and changing a walk's speed.
+    """A planner for standing, starting to walk, stopping, changing a walk's speed, and a step.
 
     Args:
         parameters: the template.
         options: tuning, for the reference template.
-        family: the gaits that a walk may have; None: the library's own.
+        family: the gaits that a walk may have, such as :func:`gaits_by_speed`; None: the library's
+            own.
     """
     gaits = family or Family(partial(walking_gait, parameters), speed_range(parameters))
     vaults = Vaults(parameters, scaled(options or StandingOptions(), Scale.of(parameters)), gaits)
+    forward = StepPlanner(vaults, "sf")
     return {
         "s": StandPlanner(vaults),
         "sw": StartPlanner(vaults),
         "ws": StopPlanner(vaults),
         "ww": ChangePlanner(vaults),
+        "sf": forward,
+        "sb": StepPlanner(vaults, "sb", forward.passes),
     }

@@ -19,7 +19,8 @@ class StandingOptions(Checked):
         height: of the CoM over the ground [m].
         spacing: of the feet where a run begins [m].
         place: of the CoM between the feet, as a share of their spacing from the rear one.
-        beat: a stand is planned anew, and the route asked, after this time [s].
+        beat: a stand is planned anew, and the route asked, after this time [s]; a step from a stand
+            ends this long after its curve, when the robot has come to rest too.
         shifts: places, as shares of the spacing, from which a start may set off.
         durations: shortest and longest quintic [s].
         trials: number of durations tried between them, and of rest places.
@@ -38,8 +39,16 @@ class StandingOptions(Checked):
         steps: shortest and longest step [m].
         loads: shares of the load that the front foot may take up at once where it has landed.
         fall: largest downward acceleration that a curve begins with, over g.
-        closing: the feet should stand this far apart where a walk ends [m].
+        closing: the feet should stand this far apart after a step from a stand, and where a walk
+            ends [m].
         narrow: a metre further apart counts as this much excess.
+        step: such a step takes about this long [s].
+        passes: number of speeds at VLO tried for it, and the fastest, over sqrt(g l0).
+        late: its foot lifts off this long after VLO at the latest [s].
+        nimble: largest mean speed of its foot in the air [m/s].
+        spare: distance of the capture point from either foot where that foot lands, if it can be
+            had [m].
+        launch: excess with which it is still made [m]; without it the robot would fall.
         angles: touchdown angles tried, and the flattest [rad].
         stiffness: least and greatest of the leg before touchdown, over k0.
         yielding: its stiffnesses tried, over that with which it keeps its length. The CoM sinks
@@ -71,6 +80,12 @@ class StandingOptions(Checked):
     fall: Share = tuned(0.5)
     closing: Positive = tuned(0.25, LENGTH)
     narrow: NotNegative = tuned(0.02)
+    step: Positive = tuned(1.5, TIME)
+    passes: tuple[Count, Positive] = tuned((10, 0.16))
+    late: NotNegative = tuned(0.15, TIME)
+    nimble: Positive = tuned(1.8, SPEED)
+    spare: NotNegative = tuned(0.06, LENGTH)
+    launch: NotNegative = tuned(0.05, LENGTH)
     angles: tuple[Count, Angle] = tuned((12, 1.08))
     stiffness: Interval = tuned((0.5, 4.0))
     yielding: tuple[Positive, ...] = tuned((1.0, 0.85, 0.7))

@@ -59,7 +59,7 @@ class StandingGait:
         return cls(parameters, state, np.zeros(NUM_SLOTS), options.beat)
 
 
-class _Curves:
+class Curves:
     """What the planners here have in common: they learn nothing, and plan curves.
 
     Args:
@@ -91,6 +91,14 @@ class _Curves:
 
     def _between(self, toes: tuple[float, float]) -> BetweenFeet:
         return BetweenFeet(toes, self.parameters, self.options)
+
+    def _stilled(self, found: Found, duration: float) -> tuple[Quintic, ...]:
+        """A curve to rest, and some time [s] in which the robot comes to it."""
+        if duration <= 0.0:
+            return found.pieces
+        still = np.zeros_like(found.pieces[-1].coefficients)
+        still[:, 0] = found.pieces[-1].end()[:, 0]
+        return (*found.pieces, Quintic(still, duration))
 
     def _fits(self, found: Found) -> bool:
         return found.excess <= self.options.slack
@@ -132,7 +140,7 @@ class _Curves:
         return changed, chained(first, second)
 
 
-class StandPlanner(_Curves):
+class StandPlanner(Curves):
     """Stands: the CoM comes to rest between the feet, and stays there."""
 
     lands = False
@@ -148,17 +156,12 @@ class StandPlanner(_Curves):
     ) -> tuple[Decision, Stride]:
         """See :class:`~.planner.CurvePlanner`."""
         found = self._between(toes).to_rest(start, self.lands)
-        pieces = [*found.pieces]
-        left = self.options.beat - sum(piece.duration for piece in pieces)
-        if left > 0.0:
-            still = np.zeros_like(pieces[-1].coefficients)
-            still[:, 0] = pieces[-1].end()[:, 0]
-            pieces.append(Quintic(still, left))
-        stride = timed_stride(self.automaton, node, pieces, toes)
+        left = self.options.beat - sum(piece.duration for piece in found.pieces)
+        stride = timed_stride(self.automaton, node, self._stilled(found, left), toes)
         return replace(decision, feasible=self._fits(found)), stride
 
 
-class StartPlanner(_Curves):
+class StartPlanner(Curves):
     """Starts to walk: back, and forward to where the rear foot lifts off."""
 
     def decide(
@@ -197,7 +200,7 @@ class StopPlanner(StandPlanner):
         return self._step(min(steps, key=cost) if steps else None, self.gait.state, 0.0)
 
 
-class ChangePlanner(_Curves):
+class ChangePlanner(Curves):
     """Makes a step to another speed."""
 
     def decide(

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.references.timed import derivatives
 from template_control.embedding.standing.curve_search import curves
 from template_control.embedding.standing.options import StandingOptions
 from template_control.parts import ready
@@ -27,6 +26,9 @@ from template_control.slip.parameters import SlipParameters
 Array = NDArray[np.float64]
 
 _FLAT = 0.02  # touchdown angle of a leg that does not land [rad]
+_FLATTER = 0.05  # the way past VLO goes on beyond the flattest landing [rad]
+_POINTS = 120  # of a way, between which a landing is looked for
+_NEWTON = 3
 _STATES = 12
 _SPEEDS = 25  # that gaits and vaults are kept for
 
@@ -179,32 +181,25 @@ class Vaults:
         return [s for s in steps if s.late >= 0.0] or sorted(steps, key=lambda s: -s.late)[:1]
 
     def _landings(self, z: Array, stiffness: float, angles: tuple[float, float]) -> list[Touchdown]:
-        number, flattest = self.options.angles
-        top = float(np.arcsin(min(z[1] / self.parameters.rest_length, 1.0))) - 0.005
+        """Of all angles from one way past VLO: the foot lands when the CoM sinks to its leg."""
+        p, (number, flattest) = self.parameters, self.options.angles
+        top = float(np.arcsin(min(z[1] / p.rest_length, 1.0))) - 0.005
         tried = np.unique(np.clip(np.linspace(flattest, top, number), *angles))
-        found = (self._landing(z, controls(float(a), stiffness, stiffness)) for a in tried)
-        shortest, longest = self.options.steps
-        return [
-            step
-            for step in found
-            if step is not None and (shortest <= step.toes[1] <= longest or len(tried) == 1)
-        ]
-
-    def _landing(self, z: Array, u: Array) -> Touchdown | None:
-        """Where a step with controls ``u`` (5,) from VLO lands; None if it does not."""
+        u = controls(max(float(tried[0]) - _FLATTER, _FLAT), stiffness, stiffness)
         stride = self._simulator.run(self._node, VLO.state(z), u)
-        time = stride.time_of(Event.TOUCHDOWN)
-        if not np.isfinite(time):
-            return None
-        # As the foot touches down, and is not carried by it yet.
-        row = int(np.searchsorted(stride.meta[:, 0], time)) - 1
-        path = np.stack((stride.cx[row], stride.cy[row]))
-        state = derivatives(path, np.array(time - stride.meta[row, 0]))
-        angle, stiffness = float(u[Slot.TOUCHDOWN_ANGLE]), float(u[Slot.K_SC])
-        toe = float(state[0, 0] + self.parameters.rest_length * np.cos(angle))
-        swift = toe / (self.options.swiftness * max(float(z[0]), 1e-6))
-        least = float(np.clip(swift, *self.options.landing))
-        return Touchdown(angle, stiffness, state, (0.0, toe), float(time) - least)
+        times = _sinking(stride, p.rest_length * np.sin(tried))
+        landed = np.isfinite(times)
+        states = stride.sample(times[landed]).reshape(-1, 3, 2).swapaxes(1, 2)
+        shortest, longest = self.options.steps
+        found = []
+        for angle, time, state in zip(tried[landed], times[landed], states, strict=True):
+            toe = float(state[0, 0] + p.rest_length * np.cos(angle))
+            if shortest <= toe <= longest or len(tried) == 1:
+                swift = toe / (self.options.swiftness * max(float(z[0]), 1e-6))
+                least = float(np.clip(swift, *self.options.landing))
+                late = float(time) - least
+                found.append(Touchdown(float(angle), stiffness, state, (0.0, toe), late))
+        return found
 
     def arriving(self, node: str, state: Array, u: Array, toes: Array) -> Stride:
         """The template's stride from a node on.
@@ -216,3 +211,18 @@ class Vaults:
             toes: (2,) x of the rear and the front foot [m].
         """
         return self._simulator.run(node, state, u, toes)
+
+
+def _sinking(stride: Stride, heights: Array) -> Array:
+    """Times (n,) at which the CoM of a stride sinks to each of (n,) heights; NaN if never [s]."""
+    time = stride.time_of(Event.TOUCHDOWN)
+    end = time if np.isfinite(time) else stride.duration
+    grid = np.linspace(0.0, end, _POINTS)
+    levels = stride.sample(grid)[:, 1]
+    falls = (levels[:-1, None] > heights) & (levels[1:, None] <= heights)
+    ever = falls.any(axis=0)
+    times = np.where(ever, grid[falls.argmax(axis=0) + 1], np.nan)
+    for _ in range(_NEWTON):
+        path = stride.sample(times[ever])
+        times[ever] -= (path[:, 1] - heights[ever]) / path[:, 3]
+    return times

@@ -333,6 +333,41 @@ def _standing() -> tuple[Node, ...]:
     )
 
 
+def _stepping(gait: str, lifts: Edge, rests: Edge) -> tuple[Node, ...]:
+    """From a stand, over one leg, to a stand; ``lifts`` and ``rests`` begin and end it."""
+    return (
+        Node(f"DS_al^{gait}", Phase.DS, None, None, (lifts, *_CURVE_FAILURES)),
+        Node(
+            f"SS_bt^{gait}",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, f"DS_br^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
+            ),
+        ),
+        Node(f"DS_br^{gait}", Phase.DS, None, None, (rests, *_CURVE_FAILURES)),
+    )
+
+
+def _steps_from_a_stand() -> tuple[Node, ...]:
+    """A step forward, and one back, whose foot lands behind the other: then they change roles."""
+    return (
+        *_stepping(
+            "sf",
+            Edge(Event.REAR_LIFTOFF, "SS_bt^sf", Reset.SHIFT, "G_l^sf"),
+            Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^sf", section=True),
+        ),
+        *_stepping(
+            "sb",
+            Edge(Event.FRONT_LIFTOFF, "SS_bt^sb", Reset.NONE, "G_l^sb"),
+            Edge(Event.REST, "DS_ar^s", Reset.SWAP, "G_r^sb", section=True),
+        ),
+    )
+
+
 AUTOMATON = Automaton(
     nodes=(
         *_walking("w", (Slot.K_SC, Slot.K_SD)),
@@ -342,6 +377,7 @@ AUTOMATON = Automaton(
         *_simplified_walk_to_run(),
         *_standing(),
         *_walking("wp", (Slot.K_PUSH, Slot.K_PUSH)),
+        *_steps_from_a_stand(),
     ),
     starts={
         "w": "SS_av^w",
@@ -354,6 +390,8 @@ AUTOMATON = Automaton(
         "ws": "SS_av^ws",
         "ww": "SS_av^ww",
         "wp": "SS_av^wp",
+        "sf": "DS_al^sf",
+        "sb": "DS_al^sb",
     },
 )
 """The one automaton of the library."""

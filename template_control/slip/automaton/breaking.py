@@ -1,4 +1,4 @@
-"""Where a walk can break into a run: nodes of another stride in which the same legs stand."""
+"""Where one stride can break into another: the same legs stand in the nodes of both."""
 
 from __future__ import annotations
 
@@ -18,3 +18,10 @@ RUN_ON: Mapping[str, str] = {
 
 In single stance the other foot lands next, whether VLO is past or not.
 """
+
+STEP_OUT: Mapping[str, tuple[str, ...]] = {
+    "DS_ar^s": ("sf", "sb"),
+    "DS_br^ws": ("sf", "sb"),
+    "DS_br^sf": ("sf", "sb"),
+}
+"""By a node in which both feet stand: strides with a step, where the CoM cannot come to rest."""

@@ -70,6 +70,11 @@ class Stride:
     node_names: tuple[str, ...]
 
     @property
+    def start(self) -> str:
+        """The node that it starts in."""
+        return self.node_names[int(self.meta[0, 2])]
+
+    @property
     def completed(self) -> bool:
         """True where the stride reached its section."""
         return self.outcome is Outcome.SECTION
@@ -84,13 +89,14 @@ class Stride:
         row = np.clip(np.searchsorted(self.meta[:, 0], t, side="right") - 1, 0, len(self.meta) - 1)
         local = t - self.meta[row, 0]
         out = np.empty((t.size, 6))
+        powers = local[:, None] ** np.arange(self.cx.shape[1])
         for axis, c in enumerate((self.cx, self.cy)):
+            coefficients = c[row]
             for derivative in range(3):
-                coefficients = np.array(
-                    [np.polynomial.polynomial.polyder(r, derivative) for r in c]
-                )
-                power = local[:, None] ** np.arange(coefficients.shape[1])
-                out[:, 2 * derivative + axis] = np.sum(coefficients[row] * power, axis=1)
+                terms = coefficients.shape[1]
+                values = np.sum(coefficients * powers[:, :terms], axis=1)
+                out[:, 2 * derivative + axis] = values
+                coefficients = coefficients[:, 1:] * np.arange(1, terms)
         return out
 
     def nodes(self, times: ArrayLike) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,27 +26,26 @@ from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segme
 
 Array = NDArray[np.float64]
 
+_WALK, _CHANGE, _STOP, _CLOSE = "w", "ww", "ws", "sf"
 _STRIDES: dict[tuple[Section, Gait], str] = {
-    (VLO, "walk"): "w",
+    (VLO, "walk"): _WALK,
     (VLO, "run"): "wr",
     (APEX, "run"): "r",
     (APEX, "walk"): "rw",
     (REST, "stand"): "s",
     (REST, "walk"): "sw",
-    (VLO, "stand"): "ws",
+    (VLO, "stand"): _STOP,
 }
-_PAPER, _PUSH_OFF = "w", "wp"  # a walking step's kinds
-_CHANGE = "ww"
-_TRANSITIONS = ("wr", "rw", "sw", "ws", _CHANGE)
+_TRANSITIONS = ("wr", "rw", "sw", _STOP, _CLOSE, _CHANGE)
 _LEADS_TO: dict[str, tuple[Section, Gait]] = {
-    "w": (VLO, "walk"),
-    _PUSH_OFF: (VLO, "walk"),
+    _WALK: (VLO, "walk"),
     "wr": (APEX, "run"),
     "r": (APEX, "run"),
     "rw": (VLO, "walk"),
     "s": (REST, "stand"),
     "sw": (VLO, "walk"),
-    "ws": (REST, "stand"),
+    _STOP: (REST, "stand"),
+    _CLOSE: (REST, "stand"),
     _CHANGE: (VLO, "walk"),
 }
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
@@ -204,6 +203,11 @@ class _Progress:
     took: float | None = None
     over: bool = False
 
+    @property
+    def kind(self) -> str:
+        """Of the stride under way."""
+        return "" if self.last is None else self.last[0]
+
     def arrived(self, now: float) -> _Progress:
         """At a section: the stride that was under way is done."""
         if self.last is None:
@@ -251,11 +255,8 @@ class ScenarioRoute:
         scenario: the profile.
         apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
         paces: when a walk changes its speed by a stride of its own.
-        vlo_height: y wanted at VLO [m] by dx/dt there [m/s], in steps with push-off; None: the
-            scenario's, in steps as in the paper.
-
-    Attributes:
-        any_speed: its walk is made of steps with push-off.
+        vlo_height: y wanted at VLO [m] by dx/dt there [m/s]; None: the scenario's.
+        walks: kind of its walking steps, "wp" with push-off.
     """
 
     @checked
@@ -265,10 +266,10 @@ class ScenarioRoute:
         apex_height: Callable[[float], float] | None = None,
         paces: PaceOptions | None = None,
         vlo_height: Callable[[float], float] | None = None,
+        walks: Literal["w", "wp"] = "w",
     ) -> None:
         self.scenario = scenario
-        self.any_speed = vlo_height is not None
-        self._walking = _PUSH_OFF if self.any_speed else _PAPER
+        self.walks = walks
         self._vlo_height = vlo_height or (lambda speed: scenario.vlo[0])
         self.paces = paces or PaceOptions()
         self._apex_height = apex_height or (lambda speed: scenario.apex_height)
@@ -286,6 +287,11 @@ class ScenarioRoute:
     def endless(self) -> bool:
         """See :class:`Route`."""
         return False
+
+    @property
+    def pushes_off(self) -> bool:
+        """Whether its walking steps have a push-off."""
+        return self.walks != _WALK
 
     def reset(self) -> None:
         """Back to the beginning."""
@@ -315,8 +321,10 @@ class ScenarioRoute:
             return here, None
         s = self.scenario
         segment = s.segments[here.index]
-        kind = self._kind(section, segment.gait)
-        if kind in ("ws", self._walking):
+        kind = _STRIDES[section, segment.gait]
+        if section is REST and self._progress.kind == _STOP:
+            kind = _CLOSE  # the last step of a walk is a long one
+        if kind in (_STOP, _WALK):
             here, kind = self._reached(here, kind, float(z[0]), now)
         # A transition aims at where the profile begins, the others at where they will end.
         aims = kind not in _TRANSITIONS or (kind == _CHANGE and here.walking)
@@ -333,13 +341,13 @@ class ScenarioRoute:
         )
         if _LEADS_TO[kind][0] is REST:
             target = (0.0, s.stand_height, 0.0)
-        goal = StrideGoal(kind, np.array(target), speed, here.index, self._then(kind, here.index))
+        then = self._then(kind, here.index)
+        goal = StrideGoal(self._named(kind), np.array(target), speed, here.index, then)
         return replace(here, last=(kind, now)), goal
 
-    def _kind(self, section: Section, gait: Gait) -> str:
-        """The stride of a segment's gait from a section."""
-        kind = _STRIDES[section, gait]
-        return self._walking if kind == _PAPER else kind
+    def _named(self, kind: str) -> str:
+        """The kind of stride that a kind of the tables is made as."""
+        return self.walks if kind == _WALK else kind
 
     def _reached(
         self, here: _Progress, kind: str, speed: float, now: float
@@ -360,9 +368,11 @@ class ScenarioRoute:
         """The next kind of stride after those of ``kind`` in segment ``index``."""
         section, gait = _LEADS_TO[kind]
         if kind in _TRANSITIONS:
-            return self._kind(section, gait)
+            return self._named(_STRIDES[section, gait])
         later = (segment.gait for segment in self.scenario.segments[index:])
-        return next((self._kind(section, other) for other in later if other != gait), None)
+        return next(
+            (self._named(_STRIDES[section, other]) for other in later if other != gait), None
+        )
 
     def _segment(self, here: _Progress, speed: float, now: float) -> _Progress:
         """Enter the segment that holds at ``now``."""

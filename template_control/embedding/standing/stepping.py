@@ -1,0 +1,207 @@
+"""A step from a stand to a stand: over one leg, whose foot stays, to where the other lands.
+
+It closes the feet after a walk, and catches a stand that is pushed too hard. A step back is the
+mirror image of one forward: all is planned forward, and turned round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.references.timed import TERMS, Quintic, chained, timed_stride
+from template_control.embedding.standing.curves import BetweenFeet, Found
+from template_control.embedding.standing.passes import Pass, Passes
+from template_control.embedding.standing.planners import Curves, StandingGait
+from template_control.embedding.standing.vaults import Vaults
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
+from template_control.slip.dynamics.stride import Stride
+
+Array = NDArray[np.float64]
+
+_SOON = 1e-3  # [s]
+
+
+class Away(NamedTuple):
+    """A curve to a liftoff, and the pass from there.
+
+    Attributes:
+        found: the curve.
+        over: the pass.
+        liftoff: (2, 3) x and y at liftoff, each position, velocity and acceleration.
+        price: of all [m].
+    """
+
+    found: Found
+    over: Pass
+    liftoff: Array
+    price: float
+
+
+class StepPlanner(Curves):
+    """Makes one step from a stand, and stands again.
+
+    Args:
+        vaults: passes over a leg.
+        stride: which of the automaton's it makes; the leg that lifts off first tells its direction.
+        passes: of another such planner, to share; None: its own.
+        automaton: of the strides.
+    """
+
+    def __init__(
+        self,
+        vaults: Vaults,
+        stride: str,
+        passes: Passes | None = None,
+        automaton: Automaton = AUTOMATON,
+    ) -> None:
+        super().__init__(vaults, automaton)
+        first = automaton.start(stride)
+        ahead = first.edge(Event.REAR_LIFTOFF) is not None
+        self._way = 1.0 if ahead else -1.0
+        lifts = Event.REAR_LIFTOFF if ahead else Event.FRONT_LIFTOFF
+        self._single = automaton.successor(first.name, lifts)
+        self._ways = {
+            first.name: self._lift,
+            self._single: self._swing,
+            automaton.successor(self._single, Event.TOUCHDOWN): self._rest,
+        }
+        self.passes = passes or Passes(vaults, self._single)
+        gait = StandingGait.of(self.parameters, self.options)
+        self.gait = replace(gait, stride=stride, step_duration=self.options.step)
+
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`: what is chosen depends on the feet, so ``curve`` does."""
+        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :class:`~.planner.CurvePlanner`."""
+        return self._ways[node](node, start, toes, decision)
+
+    def _lift(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """Both feet stand: to the liftoff from which the step ends best."""
+        ahead = self._turned(start)
+        feet = self._between(toes if self._way > 0.0 else (-toes[1], -toes[0]))
+        away = self._best_away(feet, ahead)
+        u = self._controls(away.over.landing.angle, away.over.stiffness)
+        first = timed_stride(self.automaton, node, self._back(away.found.pieces), toes)
+        state = self._turned(away.liftoff)[:, :2].T.ravel()
+        stands = first.toes if self._way > 0.0 else np.array(toes)
+        second, _ = self._landed(state, u, stands)
+        middle = feet.place(self.options.place) - self.options.margin
+        fits = away.found.excess <= self.options.launch and self.passes.capture(ahead) >= middle
+        return replace(decision, controls=u, feasible=fits), chained(first, second)
+
+    def _best_away(self, feet: BetweenFeet, start: Array) -> Away:
+        """The curve to a liftoff, forward, after which the step ends best."""
+        o, ways = self.options, []
+        for over in self.passes.known:
+            far = feet.spacing + over.landing.toe
+            in_time = over.landing.time - over.times >= far / o.nimble
+            in_time[0] = True  # whatever it is, it has to do
+            ends = over.states[in_time].copy()
+            ends[:, 0, 0] += feet.toes[1]
+            for loads in (True, False):
+                found, i = feet.to_liftoff(start, ends, loads)
+                ways.append(Away(found, over, ends[i], found.cost + over.landing.price))
+                if self._fits(found):
+                    break
+        if not any(self._fits(away.found) for away in ways):
+            ways += self._at_once(feet, start)
+        return min(ways, key=lambda away: away.price)
+
+    def _at_once(self, feet: BetweenFeet, start: Array) -> list[Away]:
+        """The liftoff that is made now: the CoM may be past the foot that stays."""
+        stiffness = self.passes.carrying(start, feet.toes[1])
+        best = self.passes.best(start, stiffness, feet.toes[::-1])
+        if best is None:
+            return []
+        on = np.zeros((2, TERMS))
+        on[:, :2] = start[:, :2]
+        soon = Quintic(on, _SOON)
+        price = self.passes.hurried(best, feet.toes[0])
+        over = Pass(stiffness, np.zeros(0), np.zeros(0), best)
+        return [Away(Found((soon,), 0.0, 0.0), over, soon.end(), price)]
+
+    def _swing(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """One foot stands: to the landing after which the CoM comes to rest best."""
+        ahead = self._turned(start)
+        stiffness = float(decision.controls[Slot.K_SC])
+        foot = (self._way * toes[0], self._way * toes[1])
+        best = self.passes.best(ahead, stiffness, foot)
+        u = decision.controls
+        if best is not None:
+            u = self._controls(best.angle, stiffness)
+        stride, landed = self._landed(start[:, :2].T.ravel(), u, np.array(toes))
+        return replace(decision, controls=u, feasible=landed), stride
+
+    def _rest(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """The foot has landed: to rest."""
+        found = self._resting(self._turned(start), (self._way * toes[0], self._way * toes[1]))
+        pieces = self._back(self._stilled(found, self.options.beat))
+        stride = timed_stride(self.automaton, node, pieces, toes)
+        return replace(decision, feasible=self._fits(found)), stride
+
+    def _resting(self, start: Array, toes: tuple[float, float]) -> Found:
+        return self._between(toes).to_rest(start, True)
+
+    # -- both ways --------------------------------------------------------------------
+
+    def _turned(self, state: Array) -> Array:
+        """(2, 3) x and y with their derivatives, seen in the direction of the step."""
+        return state * np.array([[self._way], [1.0]])
+
+    def _back(self, pieces: tuple[Quintic, ...]) -> list[Quintic]:
+        """The pieces of a curve, planned forward, in the world."""
+        return [Quintic(self._turned(piece.coefficients), piece.duration) for piece in pieces]
+
+    def _controls(self, angle: float, stiffness: float) -> Array:
+        """Controls of a step with a touchdown angle as seen in its direction."""
+        u = np.zeros(NUM_SLOTS)
+        u[Slot.TOUCHDOWN_ANGLE] = angle if self._way > 0.0 else np.pi - angle
+        u[Slot.K_SC] = stiffness
+        return u
+
+    def _landed(self, state: Array, u: Array, toes: Array) -> tuple[Stride, bool]:
+        """The stride from single stance to rest, and whether the foot lands."""
+        stride = self.vaults.arriving(self._single, state, u, toes)
+        events = [event for event in stride.events if event.event is Event.TOUCHDOWN]
+        if not events:
+            return stride, False
+        landing = events[0]
+        rows = int(np.searchsorted(stride.meta[:, 0], landing.time - 1e-12))
+        foot = float(landing.state[0] + self.parameters.rest_length * np.cos(u[0]))
+        both = (float(toes[0]), foot)
+        cut = replace(
+            stride,
+            outcome=Outcome.SECTION,
+            node=landing.target,
+            state=landing.state,
+            toes=np.array(both),
+            duration=landing.time,
+            events=(landing,),
+            cx=stride.cx[:rows],
+            cy=stride.cy[:rows],
+            meta=stride.meta[:rows],
+        )
+        end = stride.sample(np.nextafter(landing.time, 0.0))[0].reshape(3, 2).T
+        found = self._resting(self._turned(end), (self._way * both[0], self._way * both[1]))
+        pieces = self._back(self._stilled(found, self.options.beat))
+        rest = timed_stride(self.automaton, landing.target, pieces, both)
+        return chained(cut, rest), True
