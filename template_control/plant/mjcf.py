@@ -6,6 +6,7 @@ joints of one body act one after another, as a chain does.
 
 from __future__ import annotations
 
+from math import cos, sin
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -14,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.ground import BOX
+from template_control.plant.terrain.pieces import pieces
 from template_control.plant.trunk_box import trunk_corners
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF, UNLIMITED
@@ -38,7 +39,7 @@ def mjcf(robot: PlanarBiped, world: PlantOptions, contact_time: float) -> str:
 
     Args:
         robot: the model.
-        world: friction, time step, mass error, step of the ground.
+        world: friction, time step, mass error, ground.
         contact_time: time constant with which a contact gives way [s].
     """
     root = Element("mujoco", model="plant")
@@ -67,20 +68,28 @@ def _text(values: ArrayLike) -> str:
 
 
 def _add_ground(parent: Element, world: PlantOptions, contact_time: float) -> None:
-    """A plane at the lower level, and a long box up to the higher one."""
+    """A plane, and the pieces of ground that stand out of it."""
     how = {
-        "friction": _text((world.friction, 0.0, 0.0)),
         "priority": "1",  # the ground's friction and give count, not the robot's
         "condim": "3",
         "solref": _text((contact_time, 1.0)),
         "contype": "1",
         "conaffinity": "0",
     }
-    step = world.ground_step
-    low = 0.0 if step is None else step.low
-    _add(parent, "geom", type="plane", size="0 0 1", pos=_text((0.0, 0.0, low)), **how)
-    if step is not None:
-        _add(parent, "geom", type="box", size=_text(BOX), pos=_text(step.box_centre), **how)
+    height, stand_out = pieces(world.ground)
+    slides = _text((world.friction, 0.0, 0.0))
+    place = _text((0.0, 0.0, height))
+    _add(parent, "geom", type="plane", size="0 0 1", pos=place, friction=slides, **how)
+    for piece in stand_out:
+        own = world.friction if piece.friction is None else piece.friction
+        box = {
+            "type": "box",
+            "size": _text(piece.half_sides),
+            "pos": _text(piece.centre),
+            "quat": _text((cos(0.5 * piece.pitch), 0.0, sin(0.5 * piece.pitch), 0.0)),
+            "friction": _text((own, 0.0, 0.0)),
+        }
+        _add(parent, "geom", **box, **how)
 
 
 def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
