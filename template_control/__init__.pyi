@@ -24,6 +24,7 @@ from .plant.bullet import PlantOptions as PlantOptions
 from .plant.ground import GroundStep as GroundStep
 from .plant.ideal import IdealOptions as IdealOptions
 from .plant.mujoco import MujocoOptions as MujocoOptions
+from .plant.terrain.terrain import Terrain as Terrain
 from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
 from .robot.free.free_biped import FreeBiped as FreeBiped

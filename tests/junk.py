@@ -109,7 +109,7 @@ def targets(folder):
     held = {"height": 0.98, "stiffness": 16.5e3}
     options = (
         tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.MujocoOptions, tc.PlantOptions,
-        tc.SensorOptions,
+        tc.SensorOptions, tc.Terrain,
         tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
         embedding.LoadOptions,
         embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,

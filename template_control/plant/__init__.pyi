@@ -7,3 +7,6 @@ from .mujoco import MujocoOptions as MujocoOptions
 from .mujoco import MujocoPlant as MujocoPlant
 from .plant import Plant as Plant
 from .plant import open_plant as open_plant
+from .terrain.spec import read_terrain as read_terrain
+from .terrain.spec import terrain_from as terrain_from
+from .terrain.terrain import Terrain as Terrain

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree import ElementTree
@@ -14,9 +15,11 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
-from template_control.errors import RobotError
-from template_control.plant.ground import BOX, GroundStep
+from template_control.errors import ParameterError, RobotError
+from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import silenced
+from template_control.plant.terrain.pieces import pieces
+from template_control.plant.terrain.terrain import Terrain
 from template_control.robot.biped import Biped
 from template_control.robot.requirements import BASE_DOF
 from template_control.robot.urdf import link_masses
@@ -60,22 +63,25 @@ def load_body(robot: Biped, client: int, held: bool = True) -> int:
     return int(body)
 
 
-def _ground_bodies(step: GroundStep | None, client: int) -> tuple[int, ...]:
-    """The ground: a plane at the lower level, and a long box up to the higher one."""
+def _ground_bodies(terrain: Terrain, client: int) -> dict[int, float | None]:
+    """The ground's bodies, and the friction of each; None: that of the options."""
     p = pybullet
 
-    def body(shape: int, position: tuple[float, float, float]) -> int:
-        made = p.createMultiBody(0, shape, basePosition=position, physicsClientId=client)
+    def body(shape: int, position: tuple[float, float, float], pitch: float = 0.0) -> int:
+        turn = p.getQuaternionFromEuler((0.0, pitch, 0.0))
+        made = p.createMultiBody(
+            0, shape, basePosition=position, baseOrientation=turn, physicsClientId=client
+        )
         return int(made)
 
+    height, stand_out = pieces(terrain)
     plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client)
-    if step is None:
-        return (body(plane, (0.0, 0.0, 0.0)),)
-    box = p.createCollisionShape(p.GEOM_BOX, halfExtents=BOX, physicsClientId=client)
-    return (
-        body(plane, (0.0, 0.0, step.low)),
-        body(box, step.box_centre),
-    )
+    found: dict[int, float | None] = {body(plane, (0.0, 0.0, height)): None}
+    for piece in stand_out:
+        sides = piece.half_sides
+        box = p.createCollisionShape(p.GEOM_BOX, halfExtents=sides, physicsClientId=client)
+        found[body(box, piece.centre, piece.pitch)] = piece.friction
+    return found
 
 
 @dataclass(frozen=True)
@@ -88,9 +94,11 @@ class PlantOptions(Checked):
         mass_scale: factor of every link's mass and inertia; the controller does not know it.
         ground_step: a step of the ground, which the controller does not know; None for flat
             ground.
+        terrain: any other ground, which the controller does not know; None for flat ground, or
+            that with the ``ground_step``.
 
     Raises:
-        ParameterError: if a number is not positive and finite.
+        ParameterError: if a number is not positive and finite, or the ground is told twice.
     """
 
     kind: ClassVar[str] = "pybullet"
@@ -99,18 +107,33 @@ class PlantOptions(Checked):
     time_step: Positive = 1e-3
     mass_scale: Positive = 1.0
     ground_step: GroundStep | None = None
+    terrain: Terrain | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.ground_step is not None and self.terrain is not None:
+            raise ParameterError(
+                f"{type(self).__name__} has a ground_step and a terrain: leave one out"
+            )
+
+    @cached_property
+    def ground(self) -> Terrain:
+        """The ground, however it was told."""
+        if self.ground_step is not None:
+            return self.ground_step.terrain
+        return self.terrain or Terrain.flat()
 
     def ground_height(self, x: float) -> float:
         """Height of the ground at ``x`` [m]."""
-        return self.ground_step.height_at(x) if self.ground_step is not None else 0.0
+        return self.ground.height_at(x)
 
 
 class BulletPlant:
-    """A PyBullet world in DIRECT mode with ground at height 0, maybe a step, and one robot.
+    """A PyBullet world in DIRECT mode with its ground and one robot.
 
     Args:
         robot: whose URDF to load and whose joint order to speak.
-        options: friction, physics step, mass error, step of the ground.
+        options: friction, physics step, mass error, ground.
 
     Raises:
         RobotError: if PyBullet does not read the URDF, or reads another mass.
@@ -128,7 +151,7 @@ class BulletPlant:
         p, c = pybullet, self.client
         p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
         p.setTimeStep(options.time_step, physicsClientId=c)
-        self._ground = _ground_bodies(options.ground_step, c)
+        self._ground = _ground_bodies(options.ground, c)
         try:
             self.body = self._load()
             info = self._info()
@@ -178,8 +201,9 @@ class BulletPlant:
         p, c, body = pybullet, self.client, self.body
         friction = self.options.friction
         # One property a call: a combined call silently drops some of them.
-        for ground in self._ground:
-            p.changeDynamics(ground, -1, lateralFriction=1.0, physicsClientId=c)
+        for ground, own in self._ground.items():
+            share = 1.0 if own is None else own / friction
+            p.changeDynamics(ground, -1, lateralFriction=share, physicsClientId=c)
             p.changeDynamics(ground, -1, restitution=0.0, physicsClientId=c)
         for link in range(-1, joints):
             for name, value in (
@@ -242,7 +266,7 @@ class BulletPlant:
             foot = self._feet.get(link)
             if foot is None:
                 continue
-            # Normal force and direction (a step's wall pushes sideways), two of friction.
+            # Normal force and direction (a wall pushes sideways), two of friction.
             for i, axis in enumerate(axes):
                 out[foot, i] += sign * (
                     contact[9] * contact[7][axis]

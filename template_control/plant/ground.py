@@ -1,4 +1,4 @@
-"""The ground a robot walks on: flat, or with one step it is not told of."""
+"""A single step of the ground that a robot is not told of."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import Annotated
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
+from template_control.plant.terrain.terrain import Terrain
 from template_control.slip.gaits.gait import WalkingGait
 
 _HIGHEST = 1.0  # [m]
 _FARTHEST = 1000.0  # [m]
-BOX = (1000.0, 1.0, 1.0)
-"""Half sides of the box that the higher side of a step is [m]."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +59,6 @@ class GroundStep(Checked):
         return cls(height, (step - 1 + share) * gait.step_length)
 
     @property
-    def low(self) -> float:
-        """Height of the lower side [m]."""
-        return min(self.height, 0.0)
-
-    @property
-    def box_centre(self) -> tuple[float, float, float]:
-        """Of a :data:`BOX` whose top is the higher side [m]."""
-        side = 1.0 if self.height > 0.0 else -1.0  # of the edge, where the ground is higher
-        return (self.x + side * BOX[0], 0.0, max(self.height, 0.0) - BOX[2])
-
-    def height_at(self, x: float) -> float:
-        """Height of the ground at ``x`` [m]."""
-        return self.height if x >= self.x else 0.0
+    def terrain(self) -> Terrain:
+        """The ground with this step in it."""
+        return Terrain.step(self.height, self.x)

@@ -10,6 +10,7 @@ template here is due to the robot.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +21,8 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError
 from template_control.plant.rigid_contact import pressing, solve
+from template_control.plant.terrain.rolling_feet import RollingFeet
+from template_control.plant.terrain.terrain import Terrain
 from template_control.plant.trunk_box import trunk_corners
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
@@ -41,6 +44,7 @@ class IdealOptions(Checked):
     Attributes:
         time_step: period of the torques [s]; one step of the integrator.
         mass_scale: factor of every link's mass and inertia; the controller does not know it.
+        terrain: the ground, which the controller does not know; None for flat ground.
 
     Raises:
         ParameterError: if a number is not positive and finite.
@@ -50,14 +54,20 @@ class IdealOptions(Checked):
 
     time_step: Positive = 1e-3
     mass_scale: Positive = 1.0
+    terrain: Terrain | None = None
+
+    @cached_property
+    def ground(self) -> Terrain:
+        """The ground."""
+        return self.terrain or Terrain.flat()
 
     def ground_height(self, x: float) -> float:
-        """Height of the ground at ``x`` [m]: flat."""
-        return 0.0
+        """Height of the ground at ``x`` [m]."""
+        return self.ground.height_at(x)
 
 
 class IdealPlant:
-    """Rigid flat ground at height 0 and one robot, driven by joint torques.
+    """Rigid ground and one robot, driven by joint torques.
 
     The integrator is the classical Runge-Kutta method of order four; touchdowns and releases
     are located within its steps by bisection. Its tiny constraint drift is taken out by
@@ -66,7 +76,7 @@ class IdealPlant:
 
     Args:
         robot: whose model and URDF to copy.
-        options: time step, mass error.
+        options: time step, mass error, ground.
 
     Attributes:
         contacts: indices of the feet on the ground.
@@ -92,7 +102,7 @@ class IdealPlant:
         self._q, self._v = np.zeros(robot.nv), np.zeros(robot.nv)
         self._drive = np.zeros(robot.nv)
         self._push = 0.0
-        self._anchor = np.zeros(2)
+        self._feet = RollingFeet(self.robot, options.ground)
         self._impulse = np.zeros((2, 2))
         self._trunk_corners = trunk_corners(self.robot)
 
@@ -114,7 +124,7 @@ class IdealPlant:
         self.contacts = ()
         self._impulse[:] = 0.0
         self.robot.update(self._q, self._v)
-        low = self.robot.foot_position[:, 1] < 1e-6
+        low = self._feet.gaps() < 1e-6
         self._land(low & (self.robot.foot_velocity[:, 1] <= 1e-9))
         self._impulse[:] = 0.0
         self.impacts.clear()
@@ -133,8 +143,11 @@ class IdealPlant:
     def trunk_touches_ground(self) -> bool:
         """True where the box around the trunk's collision shapes reaches the ground."""
         x, z = self._trunk_corners
-        height = self._q[1] - x * np.sin(self._q[2]) + z * np.cos(self._q[2])
-        return bool(np.any(height <= 0.0))
+        sine, cosine = np.sin(self._q[2]), np.cos(self._q[2])
+        height = self._q[1] - x * sine + z * cosine
+        place = self._q[0] + x * cosine + z * sine
+        ground = [self.ground_height(corner) for corner in place.tolist()]
+        return bool(np.any(height <= ground))
 
     def step(self, torque: Array, push: float = 0.0) -> None:
         """Advance one time step.
@@ -187,10 +200,10 @@ class IdealPlant:
         return right
 
     def _rates(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Acceleration (nv,) and contact forces (2, 2), all ``contacts`` held."""
+        """Acceleration (nv,) and forces (2, 2) along and out of the ground, ``contacts`` held."""
         r = self.robot
         r.update(q, v)
-        return solve(r.mass_matrix, self._right(q), r.foot_jacobian, r.foot_bias, self.contacts)
+        return solve(r.mass_matrix, self._right(q), *self._feet.rows(), self.contacts)
 
     def _flow(self, h: float) -> tuple[Array, Array, Array]:
         """State after ``h`` seconds with the present contacts, and their impulse (2, 2)."""
@@ -202,7 +215,7 @@ class IdealPlant:
         return (
             q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4),
             v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4),
-            h / 6.0 * (f1 + 2.0 * f2 + 2.0 * f3 + f4),
+            self._feet.in_world(h / 6.0 * (f1 + 2.0 * f2 + 2.0 * f3 + f4)),
         )
 
     def _to_event(self, h: float) -> float:
@@ -211,7 +224,7 @@ class IdealPlant:
         r.update(self._q, self._v)
         right = self._right(self._q)
         self.contacts, _, _, clean = pressing(
-            r.mass_matrix, right, r.foot_jacobian, r.foot_bias, self.contacts
+            r.mass_matrix, right, *self._feet.rows(), self.contacts
         )
         self.pulls += not clean
         end = self._flow(h)
@@ -226,18 +239,16 @@ class IdealPlant:
                     low = middle
             h = high
         self._commit(*end)
-        self._land(r.foot_position[:, 1] < -_DEPTH)
+        self._land(self._feet.gaps() < -_DEPTH)
         return h
 
     def _margin(self, end: tuple[Array, Array, Array]) -> float:
         """Negative where, at the ``end`` of a flow, a foot is in the ground or pulls at it."""
         q, v, _ = end
         _, force = self._rates(q, v)
-        weight = self.robot.mass * self.robot.gravity
+        weight, gaps = self.robot.mass * self.robot.gravity, self._feet.gaps()
         return min(
-            force[i, 1] / weight + _PULL
-            if i in self.contacts
-            else self.robot.foot_position[i, 1] + _DEPTH
+            force[i, 1] / weight + _PULL if i in self.contacts else float(gaps[i]) + _DEPTH
             for i in range(2)
         )
 
@@ -248,26 +259,22 @@ class IdealPlant:
             return
         r = self.robot
         for i in landing:
-            self._anchor[i] = r.foot_position[i, 0] - self._rolled(i, self._q)
+            self._feet.meet(i, self._q)
         touching = tuple(sorted((*self.contacts, *landing)))
         momentum, zero = r.mass_matrix @ self._v, np.zeros((2, 2))
-        held, v, impulse, clean = pressing(r.mass_matrix, momentum, r.foot_jacobian, zero, touching)
+        rows, _ = self._feet.rows()
+        held, v, impulse, clean = pressing(r.mass_matrix, momentum, rows, zero, touching)
         self.pulls += not clean
-        if all(r.foot_jacobian[i, 1] @ v < _REST for i in touching):
+        if all(rows[i, 1] @ v < _REST for i in touching):
             held = touching
-            v, impulse = solve(r.mass_matrix, momentum, r.foot_jacobian, zero, held)
+            v, impulse = solve(r.mass_matrix, momentum, rows, zero, held)
         self.contacts, self._v = held, v
+        impulse = self._feet.in_world(impulse)
         self._impulse += impulse
         self.impacts.append(impulse)
         self._commit(self._q, self._v, np.zeros((2, 2)))
 
     # -- constraints ------------------------------------------------------------------
-
-    def _rolled(self, foot: int, q: Array) -> float:
-        """Distance that the sphere of ``foot`` has rolled by its angle [m]."""
-        r, leg = self.robot, list(self.robot.legs[foot])
-        turned = r.joint_sign[leg] @ q[[BASE_DOF + joint for joint in leg]]
-        return r.foot_radius * float(q[2] + turned)
 
     def _commit(self, q: Array, v: Array, impulse: Array) -> None:
         """Take over (q, v), projected onto the contacts; the robot's update is at it."""
@@ -277,15 +284,15 @@ class IdealPlant:
         zero = np.zeros(r.nv)
         error = np.zeros((2, 2))
         for i in self.contacts:
-            error[i, 0] = r.foot_position[i, 0] - self._rolled(i, q) - self._anchor[i]
-            error[i, 1] = r.foot_position[i, 1]
+            error[i] = self._feet.errors(i, q)
         moved = np.abs(error).max() > _DRIFT
         if moved:
-            q = q + solve(r.mass_matrix, zero, r.foot_jacobian, error, self.contacts)[0]
+            q = q + solve(r.mass_matrix, zero, self._feet.rows()[0], error, self.contacts)[0]
             r.update(q, v)
-        slip = r.foot_velocity[list(self.contacts)]
+        rows, _ = self._feet.rows()
+        slip = rows[list(self.contacts)] @ v
         if slip.size and np.abs(slip).max() > _DRIFT:
             momentum = r.mass_matrix @ v
-            v, _ = solve(r.mass_matrix, momentum, r.foot_jacobian, np.zeros((2, 2)), self.contacts)
+            v, _ = solve(r.mass_matrix, momentum, rows, np.zeros((2, 2)), self.contacts)
             r.update(q, v)
         self._q, self._v = q, v

@@ -6,6 +6,7 @@ joints of one body act one after another, as a chain does.
 
 from __future__ import annotations
 
+from math import cos, sin
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -14,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.ground import BOX
+from template_control.plant.terrain.pieces import pieces
 from template_control.plant.trunk_box import trunk_corners
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
@@ -39,7 +40,7 @@ def mjcf(robot: PlanarBiped, world: PlantOptions, contact_time: float) -> str:
 
     Args:
         robot: the model.
-        world: friction, time step, mass error, step of the ground.
+        world: friction, time step, mass error, ground.
         contact_time: time constant with which a contact gives way [s].
     """
     root, ground = world_element(robot, world, contact_time)
@@ -54,7 +55,7 @@ def world_element(
 
     Args:
         robot: whose gravity acts.
-        world: friction, time step, step of the ground.
+        world: friction, time step, ground.
         contact_time: time constant with which a contact gives way [s].
     """
     root = Element("mujoco", model="plant")
@@ -90,20 +91,28 @@ def text(values: ArrayLike) -> str:
 
 
 def _add_ground(parent: Element, world: PlantOptions, contact_time: float) -> None:
-    """A plane at the lower level, and a long box up to the higher one."""
+    """A plane, and the pieces of ground that stand out of it."""
     how = {
-        "friction": text((world.friction, 0.0, 0.0)),
         "priority": "1",  # the ground's friction and give count, not the robot's
         "condim": "3",
         "solref": text((contact_time, 1.0)),
         "contype": "1",
         "conaffinity": "0",
     }
-    step = world.ground_step
-    low = 0.0 if step is None else step.low
-    add(parent, "geom", type="plane", size="0 0 1", pos=text((0.0, 0.0, low)), **how)
-    if step is not None:
-        add(parent, "geom", type="box", size=text(BOX), pos=text(step.box_centre), **how)
+    height, stand_out = pieces(world.ground)
+    slides = text((world.friction, 0.0, 0.0))
+    place = text((0.0, 0.0, height))
+    add(parent, "geom", type="plane", size="0 0 1", pos=place, friction=slides, **how)
+    for piece in stand_out:
+        own = world.friction if piece.friction is None else piece.friction
+        box = {
+            "type": "box",
+            "size": text(piece.half_sides),
+            "pos": text(piece.centre),
+            "quat": text((cos(0.5 * piece.pitch), 0.0, sin(0.5 * piece.pitch), 0.0)),
+            "friction": text((own, 0.0, 0.0)),
+        }
+        add(parent, "geom", **box, **how)
 
 
 def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:

@@ -61,11 +61,11 @@ def _mujoco() -> Any:
 
 
 class MujocoPlant:
-    """A MuJoCo world with ground at height 0, maybe a step, and one robot.
+    """A MuJoCo world with its ground and one robot.
 
     Args:
         robot: whose model to write as MJCF, and whose joint order to speak.
-        options: friction, time step, mass error, contacts, step of the ground.
+        options: friction, time step, mass error, contacts, ground.
 
     Raises:
         ParameterError: if MuJoCo is not installed.

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control import storage
+from template_control import settings, storage
 from template_control.checks.checked import checked
+from template_control.plant.ground import GroundStep
+from template_control.plant.terrain.terrain import Terrain
 from template_control.run.data_frame import to_dataframe
 from template_control.run.old_record import from_five_slots, from_walk
 
@@ -159,6 +161,14 @@ class Record:
     def com_error(self) -> Array:
         """(T, 2) template less robot at the robot's phase [m]."""
         return self.template_com - self.com
+
+    @property
+    def ground(self) -> Terrain:
+        """The ground the robot went on; level where the plant was one of the user's own."""
+        plant = self.metadata["options"]["plant"]
+        if plant.get("ground_step"):
+            return GroundStep(**plant["ground_step"]).terrain
+        return settings.from_table(Terrain, plant.get("terrain") or {})
 
     def __repr__(self) -> str:
         m = self.metadata

@@ -45,14 +45,9 @@ _LEGS = (LEFT, RIGHT)
 
 
 def _ground(axes: Axes, record: Record) -> None:
-    """A line along the ground, with its step where it is in sight."""
-    step = record.metadata["options"]["plant"].get("ground_step")
+    """A line along the ground that is in sight."""
     low, high = axes.get_xlim()
-    x, y = [low, high], [0.0, 0.0]
-    if step is not None:
-        edge = min(max(step["x"], low), high)
-        x, y = [low, edge, edge, high], [0.0, 0.0, step["height"], step["height"]]
-    axes.plot(x, y, color="0.3", linewidth=0.8)
+    axes.plot(*np.transpose(record.ground.line(low, high)), color="0.3", linewidth=0.8)
     axes.set_xlim(low, high)
 
 

@@ -12,6 +12,7 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
+from template_control.plant.terrain.spec import terrain_from
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.simulation import STEPS
 
@@ -42,6 +43,13 @@ def add_world_options(parser: argparse.ArgumentParser) -> None:
         "--friction",
         type=float,
         help="Coulomb friction between feet and ground, 0.7 if not given",
+    )
+    parser.add_argument(
+        "--terrain",
+        metavar="SPEC",
+        help="the ground, which the controller is not told of: step:height=0.03,x=2.5,"
+        " stairs:rise=0.02,run=0.6,count=5, slope:angle=4 (degrees), random:height=0.02,seed=3,"
+        " flat, or a file: a .toml with points, or x and height in two columns [m]",
     )
     parser.add_argument(
         "--mass-scale",
@@ -175,9 +183,13 @@ def _plant(options: argparse.Namespace, base: SimulationOptions) -> PlantOptions
         made = _PLANTS[options.plant]
         shared = {f.name for f in fields(made)} & {f.name for f in fields(plant)}
         plant = made(**{name: getattr(plant, name) for name in shared})
-    given = {"mass_scale": options.mass_scale}
+    given: dict[str, Any] = {"mass_scale": options.mass_scale}
+    if options.terrain is not None:
+        given["terrain"] = terrain_from(options.terrain)
     if isinstance(plant, PlantOptions):
         given["friction"] = options.friction
+        if options.terrain is not None:
+            plant = replace(plant, ground_step=None)  # the file's, which this one replaces
     return replace(plant, **_without_none(given))
 
 

@@ -48,10 +48,14 @@ class _Stage:
         axes: Axes = self.figure.subplots()
         self.axes, self.half = axes, 0.5 * _WIDTH * length
         axes.set_aspect("equal")
-        height = float(np.max(record.q[rows, 1])) + self.top
-        axes.set(xlabel="x [m]", ylabel="y [m]", ylim=(-0.12 * length, 1.06 * height))
-        axes.axhspan(-length, 0.0, color="0.9", linewidth=0)
-        axes.axhline(0.0, color="0.3", linewidth=0.8)
+        self.ground = record.ground
+        ends = record.com[rows, 0].min() - self.half, record.com[rows, 0].max() + self.half
+        line = np.transpose(self.ground.line(*map(float, ends)))
+        over = record.q[rows, 1] - [self.ground.height_at(x) for x in record.q[rows, 0].tolist()]
+        low, high = line[1].min() - 0.12 * length, 1.06 * (float(np.max(over)) + self.top)
+        axes.set(xlabel="x [m]", ylabel="y [m]", ylim=(low, line[1].max() + high))
+        axes.fill_between(line[0], line[1], low - length, color="0.9", linewidth=0)
+        axes.plot(*line, color="0.3", linewidth=0.8)
         stood = footholds(record)
         self.foothold_time = [np.array([f.time for f in stood if f.foot == i]) for i in (0, 1)]
         self.foothold_x = [np.array([f.x for f in stood if f.foot == i]) for i in (0, 1)]
@@ -97,7 +101,8 @@ class _Stage:
             self.legs[foot].set_data(*np.vstack((record.joint[row, leg], record.foot[row, foot])).T)
             seen = self.foothold_time[foot] <= record.time[row]
             places = self.foothold_x[foot][seen]
-            self.marks[foot].set_data(places, np.zeros(len(places)))
+            heights = [self.ground.height_at(x) for x in places.tolist()]
+            self.marks[foot].set_data(places, heights)
         for leg, line in enumerate(self.springs):
             if self.loaded[row, leg]:
                 line.set_data(*self._spring(record.template_com[row], self.toes[row, leg]))

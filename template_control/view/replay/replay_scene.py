@@ -25,6 +25,7 @@ from template_control.view.replay.playback import (
     spring,
     template_legs,
 )
+from template_control.view.replay.replay_ground import ground_shape, plates, smoothed
 from template_control.view.replay.robot_visuals import foot_sides, load_visuals, placements
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
@@ -175,13 +176,6 @@ def _ribbon(points: Array, width: float) -> mg.TriangularMeshGeometry:
     return mg.TriangularMeshGeometry(np.concatenate(vertices), np.array(faces))
 
 
-def _plates(centres: Array, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
-    """Vertices (4 N, 3) and faces (2 N, 3) of rectangles on the ground around (N, 3) centres."""
-    corners = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*size, 0.0]
-    faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(centres))[:, None, None]
-    return (centres[:, None] + corners).reshape(-1, 3), faces.reshape(-1, 3)
-
-
 def _surroundings(scene: _Scene, playback: Playback, length: float) -> None:
     record, rows = playback.record, playback.rows
     for end in ("top_color", "bottom_color"):
@@ -190,18 +184,19 @@ def _surroundings(scene: _Scene, playback: Playback, length: float) -> None:
         scene.set(path, "visible", False)
     x = record.com[rows, 0]
     low, high = float(x.min()) - 6.0 * length, float(x.max()) + 6.0 * length
-    thick = 0.02 * length
-    middle = np.eye(4)
-    middle[:3, 3] = 0.5 * (low + high), 0.0, -0.5 * thick
-    ground = mg.Box([high - low, 3.0 * length, thick])
-    scene.add("/meshcat/ground", ground, mg.MeshBasicMaterial(color=0xDDE1E6))
-    scene.place("/meshcat/ground", middle)
+    ground = record.ground
+    shape, place = ground_shape(np.array(ground.line(low, high)), length)
+    scene.add("/meshcat/ground", shape, mg.MeshBasicMaterial(color=0xDDE1E6, side="DoubleSide"))
+    scene.place("/meshcat/ground", place)
     # A line every rest length shows that the camera travels.
-    lines = np.arange(np.ceil(low / length), high / length)[:, None] * [length, 0.0, 0.0]
-    stripes = _plates(lines + np.array([0.0, 0.0, 0.001 * length]), (0.012 * length, 3.0 * length))
+    lines = np.arange(np.ceil(low / length), high / length) * length
+    heights = np.array([ground.height_at(place) for place in lines.tolist()])
+    centres = np.stack((lines, 0.0 * lines, heights + 0.001 * length), axis=-1)
+    stripes = plates(centres, (0.012 * length, 3.0 * length))
     material = mg.MeshBasicMaterial(color=0xB4BAC2)
     scene.add("/meshcat/ground_lines", mg.TriangularMeshGeometry(*stripes), material)
-    travel = np.stack((x, 0.0 * x, np.full(len(x), 0.72 * length)), axis=-1)
+    level = smoothed(ground, x, length)
+    travel = np.stack((x, 0.0 * x, level + 0.72 * length), axis=-1)
     scene.animate("/meshcat", "position", "vector3", -travel)
     # From afar with a narrow view: little perspective, so that lengths can be compared.
     eye = [0.7 * length, 0.45 * length, 4.0 * length]
@@ -289,8 +284,10 @@ def _footholds(scene: _Scene, playback: Playback, length: float, sides: Array) -
         stood = [f for f in footholds(record) if f.foot == foot and f.time <= record.time[rows[-1]]]
         if not stood:
             continue
-        centres = np.array([[f.x, sides[foot], 0.002 * length] for f in stood])
-        vertices, faces = _plates(centres, (0.05 * length, 0.1 * length))
+        ground = record.ground
+        over = 0.002 * length
+        centres = np.array([[f.x, sides[foot], ground.height_at(f.x) + over] for f in stood])
+        vertices, faces = plates(centres, (0.05 * length, 0.1 * length))
         frame = np.searchsorted(record.time[rows], [f.time for f in stood]).astype(float)
         mesh = _Gradual(vertices, faces, np.repeat(frame, 4))
         scene.reveal(f"/meshcat/footholds/{name}", mesh, color)

@@ -1,0 +1,98 @@
+"""Spheres that roll on a terrain: how far each foot is from it, and the rows of its contact.
+
+A foot that has landed rolls on the plane that touches the ground where it landed. On a straight
+piece of ground that is the ground itself, on an edge the plane at right angles to the line from
+the edge to the sphere's centre.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.plant.terrain.terrain import Terrain
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.requirements import BASE_DOF
+
+Array = NDArray[np.float64]
+
+
+class RollingFeet:
+    """The feet of a robot over a terrain, at the robot's last update.
+
+    Args:
+        robot: whose feet.
+        terrain: below them.
+    """
+
+    def __init__(self, robot: PlanarBiped, terrain: Terrain) -> None:
+        self._robot = robot
+        self._terrain = terrain
+        self._axes = np.tile(np.eye(2), (2, 1, 1))  # by foot: along its plane, and out of it
+        self._anchor = np.zeros((2, 2))  # where each foot holds, along both axes
+        self._turns = np.zeros((2, robot.nv))  # maps v to each foot's angular velocity
+        for foot, leg in enumerate(robot.legs):
+            joints = [BASE_DOF + joint for joint in leg]
+            self._turns[foot, BASE_DOF - 1] = 1.0
+            self._turns[foot, joints] = robot.joint_sign[list(leg)]
+
+    def gaps(self) -> Array:
+        """(2,) distance of each foot from the ground, negative where it is inside [m]."""
+        r = self._robot
+        if len(self._terrain.points) == 1:
+            return np.array(r.foot_position[:, 1])
+        radius = r.foot_radius
+        found = (self._terrain.closest(x, y + radius) for x, y in r.foot_position.tolist())
+        return np.array([closest.distance - radius for closest in found])
+
+    def meet(self, foot: int, q: Array) -> None:
+        """Let a foot hold where it is now.
+
+        Args:
+            foot: its index.
+            q: (nv,) the robot's configuration.
+        """
+        r = self._robot
+        centre = r.foot_position[foot] + np.array([0.0, r.foot_radius])
+        closest = self._terrain.closest(*centre.tolist())
+        x, y = closest.normal
+        self._axes[foot] = (y, -x), (x, y)
+        along, out = self._axes[foot] @ centre
+        self._anchor[foot] = along - self._rolled(foot, q), out - closest.distance
+
+    def rows(self) -> tuple[Array, Array]:
+        """Jacobians (2, 2, nv) of the material points that touch, along and out of the plane of
+        each foot, and their dJ/dt v (2, 2) [m/s^2].
+        """
+        r = self._robot
+        jacobian = np.empty_like(r.foot_jacobian)
+        for foot, ((_, _), (x, y)) in enumerate(self._axes.tolist()):
+            # From the sphere's lowest point, which the model tells, to the one that touches.
+            arm = r.foot_radius * np.array([1.0 - y, x])
+            point = r.foot_jacobian[foot] + np.outer(arm, self._turns[foot])
+            jacobian[foot] = self._axes[foot] @ point
+        return jacobian, np.einsum("fij,fj->fi", self._axes, r.foot_bias)
+
+    def errors(self, foot: int, q: Array) -> Array:
+        """(2,) how far a foot is from where it holds, along and out of its plane [m].
+
+        Args:
+            foot: its index.
+            q: (nv,) the robot's configuration.
+        """
+        r = self._robot
+        centre = r.foot_position[foot] + np.array([0.0, r.foot_radius])
+        along, out = self._axes[foot] @ centre
+        return np.array((along - self._rolled(foot, q), out - r.foot_radius)) - self._anchor[foot]
+
+    def in_world(self, force: Array) -> Array:
+        """(2, 2) x and y of what is given along and out of each foot's plane.
+
+        Args:
+            force: (2, 2) along and out of it.
+        """
+        return np.einsum("fi,fij->fj", force, self._axes)
+
+    def _rolled(self, foot: int, q: Array) -> float:
+        """Distance that a foot's sphere has rolled by its angle [m]."""
+        return float(self._robot.foot_radius * (self._turns[foot] @ q))

@@ -1,0 +1,247 @@
+"""The ground's height along x: a profile that the plants know, and nobody tells the controller."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import hypot, tan
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Count, Index, NotNegative, Positive, Range, Rising
+from template_control.errors import ParameterError
+
+_HIGHEST = 1000.0  # [m]
+_FARTHEST = 1000.0  # [m]
+_STEEPEST = float(np.radians(45.0))
+_LEVEL = 1e-9  # [m] the ground is at height 0 where a run begins
+
+Height = Annotated[float, Range(-_HIGHEST, _HIGHEST)]
+Place = Annotated[float, Range(-_FARTHEST, _FARTHEST)]
+Start = Annotated[float, Range(0.0, _FARTHEST, above=True)]
+Points = tuple[tuple[Place, Height], ...]
+
+
+class Closest(NamedTuple):
+    """The ground's surface seen from a point.
+
+    Attributes:
+        distance: to the surface, negative inside the ground [m].
+        normal: (x, y) of unit length, out of the ground: from the surface's closest point to the
+            point itself.
+    """
+
+    distance: float
+    normal: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Terrain(Checked):
+    """Ground that goes in straight lines from point to point.
+
+    Before the first point and beyond the last one it is level. Two points at the same x are a
+    wall. The constructor takes the points; :meth:`flat`, :meth:`step`, :meth:`stairs`,
+    :meth:`slope`, :meth:`random_steps` and :meth:`of_function` make the usual ones.
+
+    Attributes:
+        points: x and height of each, x never falling [m]. A run begins with the stance foot at
+            x = 0, where the ground must be at height 0.
+        friction: (x, coefficient): from x on the ground has that coefficient, up to the next x;
+            before the first x that of the plant's options holds [m]. The ideal plant has none.
+
+    Raises:
+        ParameterError: if there is no point, x falls, three points have one x, or the ground at
+            x = 0 is not at height 0.
+    """
+
+    points: Points = ((0.0, 0.0),)
+    friction: tuple[tuple[Place, Positive], ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.points:
+            raise ParameterError("Terrain.points is empty: give at least one")
+        xs = self._xs
+        for i, x in enumerate(xs[1:], 1):
+            if x < xs[i - 1]:
+                raise ParameterError(
+                    f"Terrain.points: x falls from {xs[i - 1]:g} to {x:g} m: put them in order"
+                )
+            if i > 1 and x == xs[i - 2]:
+                raise ParameterError(
+                    f"Terrain.points: three are at x = {x:g} m: give the wall's two ends alone"
+                )
+        places = [x for x, _ in self.friction]
+        if any(b <= a for a, b in pairwise(places)):
+            raise ParameterError("Terrain.friction: x does not rise: put its entries in order")
+        start = self.height_at(0.0)
+        if abs(start) > _LEVEL:
+            raise ParameterError(
+                f"Terrain: the ground at x = 0 is at height {start:g} m: take {start:g} from all"
+                " heights"
+            )
+
+    @cached_property
+    def _xs(self) -> list[float]:
+        return [x for x, _ in self.points]
+
+    def height_at(self, x: float) -> float:
+        """Height of the ground at ``x`` [m]; at a wall that beyond it."""
+        xs, points = self._xs, self.points
+        after = bisect_right(xs, x)
+        if after == 0:
+            return points[0][1]
+        if after == len(points):
+            return points[-1][1]
+        (a, low), (b, high) = points[after - 1 : after + 1]
+        return low + (high - low) * (x - a) / (b - a)
+
+    def closest(self, x: float, y: float) -> Closest:
+        """The surface seen from a point.
+
+        Args:
+            x, y: of the point [m].
+        """
+        above = y - self.height_at(x)
+        best, foot = abs(above), (x, y - above)
+        for (ax, ay), (bx, by) in self.segments(x - best, x + best):
+            length = (bx - ax) ** 2 + (by - ay) ** 2
+            share = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length
+            share = min(max(share, 0.0), 1.0)
+            place = (ax + share * (bx - ax), ay + share * (by - ay))
+            distance = hypot(x - place[0], y - place[1])
+            if distance < best:
+                best, foot = distance, place
+        side = 1.0 if above >= 0.0 else -1.0
+        if best <= _LEVEL:
+            return Closest(side * best, self._normal(x))
+        return Closest(side * best, (side * (x - foot[0]) / best, side * (y - foot[1]) / best))
+
+    def segments(
+        self, low: float, high: float
+    ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+        """The lines between neighbouring points that reach between two places.
+
+        Args:
+            low, high: x of the places [m].
+        """
+        xs = self._xs
+        first = max(bisect_left(xs, low) - 1, 0)
+        last = min(bisect_right(xs, high) + 1, len(xs))
+        part = self.points[first:last]
+        return list(pairwise(part))
+
+    def line(self, low: float, high: float) -> list[tuple[float, float]]:
+        """The ground from one place to another, as points with straight lines between them.
+
+        Args:
+            low, high: x of the places [m].
+        """
+        between = [point for point in self.points if low < point[0] < high]
+        return [(low, self.height_at(low)), *between, (high, self.height_at(high))]
+
+    def _normal(self, x: float) -> tuple[float, float]:
+        """Of the ground at ``x``, out of it."""
+        after = bisect_right(self._xs, x)
+        if after in (0, len(self.points)):
+            return 0.0, 1.0
+        (a, low), (b, high) = self.points[after - 1 : after + 1]
+        length = hypot(b - a, high - low)
+        return (low - high) / length, (b - a) / length
+
+    @classmethod
+    def flat(cls) -> Terrain:
+        """Level ground at height 0."""
+        return cls()
+
+    @classmethod
+    @checked
+    def step(cls, height: Height, x: Start) -> Terrain:
+        """One step.
+
+        Args:
+            height: up positive [m].
+            x: of its wall [m].
+        """
+        return cls(((x, 0.0), (x, height)))
+
+    @classmethod
+    @checked
+    def stairs(cls, rise: Height, run: Positive, count: Count, start: Start = 1.0) -> Terrain:
+        """Steps of one size.
+
+        Args:
+            rise: of each, up positive [m].
+            run: from one wall to the next [m].
+            count: of the walls.
+            start: x of the first wall [m].
+        """
+        walls = [(start + i * run, i * rise) for i in range(count)]
+        return cls(tuple(point for x, y in walls for point in ((x, y), (x, y + rise))))
+
+    @classmethod
+    @checked
+    def slope(
+        cls,
+        angle: Annotated[float, Range(-_STEEPEST, _STEEPEST)],
+        start: Start = 1.0,
+        length: Positive = 500.0,
+    ) -> Terrain:
+        """A slope between two level parts.
+
+        Args:
+            angle: up positive [rad].
+            start: x where it begins [m].
+            length: along x [m].
+        """
+        return cls(((start, 0.0), (start + length, length * tan(angle))))
+
+    @classmethod
+    @checked
+    def random_steps(
+        cls,
+        height: NotNegative,
+        length: Annotated[tuple[Positive, Positive], Rising()] = (0.3, 0.6),
+        seed: Index = 0,
+        start: Start = 0.3,
+        end: Start = 200.0,
+    ) -> Terrain:
+        """Treads whose heights and lengths are drawn evenly, each for itself.
+
+        Args:
+            height: treads are between this below 0 and this above it [m].
+            length: of the shortest and the longest tread [m].
+            seed: of the draws.
+            start: x of the first wall [m].
+            end: x beyond which no tread begins [m]; the ground there is at height 0.
+        """
+        if end <= start:
+            raise ParameterError(f"end is {end:g} m: give more than the start, {start:g} m")
+        draw = np.random.default_rng(seed)
+        points, x, before = [], start, 0.0
+        while x < end:
+            tread = float(draw.uniform(-height, height))
+            points += [(x, before), (x, tread)]
+            before = tread
+            x += float(draw.uniform(*length))
+        return cls((*points, (x, before), (x, 0.0)))
+
+    @classmethod
+    @checked
+    def of_function(
+        cls, height: Callable[[float], float], end: Start, spacing: Positive = 0.02
+    ) -> Terrain:
+        """Ground of any shape, in straight lines between its heights at regular places.
+
+        Args:
+            height: height at x, both [m]; 0 at x = 0.
+            end: the last place; the ground beyond it is level [m].
+            spacing: from one place to the next [m].
+        """
+        places = np.linspace(0.0, end, max(int(np.ceil(end / spacing)), 1) + 1)
+        return cls(tuple((float(x), float(height(float(x)))) for x in places))
