@@ -125,9 +125,9 @@ class Spy:
         self.measured, self.true, self.torque = [], [], []
         tick, read, step = EmbeddingController.tick, BulletPlant.read, BulletPlant.step
 
-        def ticked(controller, q, v, contact, dt):
+        def ticked(controller, q, v, contact, dt, force):
             self.measured.append(np.concatenate((q, v)))
-            return tick(controller, q, v, contact, dt)
+            return tick(controller, q, v, contact, dt, force)
 
         def was_read(plant, q, v):
             read(plant, q, v)

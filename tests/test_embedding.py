@@ -135,7 +135,7 @@ def test_touchdown_is_the_placed_leg_s():
     running = AUTOMATON.start("r").edge(Event.TOUCHDOWN)
     for leg, edge, other in ((0, running, walking), (1, walking, running)):
         contact = np.array([leg == 0, leg == 1])
-        sensed = Sensed(contact=contact)
+        sensed = Sensed(contact=contact, toes=np.array([0.3, 0.3]))
         assert guards.fired(edge, sensed, np.inf)
         assert not guards.fired(other, sensed, np.inf)
 

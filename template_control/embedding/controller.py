@@ -30,6 +30,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
 from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.leg_forces import leg_forces
+from template_control.embedding.references.stumble import Stumble
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.station import stations
@@ -108,6 +109,7 @@ class EmbeddingController:
         self._fresh = True
         self._rear_shift = 0.0
         self._sensed = Sensed(swing_time=self.feet.swing_time, acceleration=self.reference[4:])
+        self._stumble = Stumble(o.stumble, robot.mass * robot.gravity)
         self._guards = RobotGuards(self.parameters, o.guards)
         self._stations = stations(automaton, robot.nv, o.phases, o.swing)
         curved = {name for name, station in self._stations.items() if station.control.curved}
@@ -174,7 +176,14 @@ class EmbeddingController:
         self._sense(np.zeros(2, dtype=bool))
         self._decide(section)
 
-    def tick(self, q: Array, v: Array, contact: NDArray[np.bool_], dt: float) -> Solution:
+    def tick(
+        self,
+        q: Array,
+        v: Array,
+        contact: NDArray[np.bool_],
+        dt: float,
+        force: Array | None = None,
+    ) -> Solution:
         """Torques for the next ``dt`` seconds.
 
         Args:
@@ -182,11 +191,16 @@ class EmbeddingController:
             v: (nv,) measured velocity.
             contact: (2,) whether each foot touches the ground.
             dt: control period [s].
+            force: (2, d) the ground's force on each foot, forward first and up last [N], by which
+                a foot in the air tells a wall; None: it tells none.
 
         Raises:
             ParameterError: if the state is not finite.
         """
         self.robot.update(q, v)
+        if force is not None:
+            self._stumble.feel(force[:, [0, -1]], self.robot.foot_velocity[:, 1], dt)
+            contact = contact & ~self._stumble.slipping
         self.feet.swing_time += dt
         self._sense(contact)
         self._advance()
@@ -277,7 +291,8 @@ class EmbeddingController:
         s, foot = self._sensed, self.feet.of[leg]
         self.feet.landed = foot
         ground = float(self.robot.foot_position[foot, 1])
-        height = s.state[1] + self.ground - ground
+        higher = ground - self.ground
+        height = s.state[1] - higher
         if leg is not Leg.REAR:
             back = s.state[0] - s.toes[Leg.REAR]
             moved = np.sqrt(max(back**2 + s.state[1] ** 2 - height**2, 0.0))
@@ -287,7 +302,7 @@ class EmbeddingController:
         if self.station.control.lands:
             self.planning.land(self.node, s, self.time)
         else:
-            self.planning.follow(self.node, s, self.time)
+            self.planning.land_off(self.node, s, self.time, higher)
         self._on_new_path()
 
     def _decide(self, section: Section) -> None:
@@ -350,11 +365,13 @@ class EmbeddingController:
         for leg in station.swings:
             foot = self.feet.of[leg]
             swing = self.feet.swing[foot]
-            if planning.reaching and leg == station.awaited:
+            landing = planning.landing(foot)
+            foothold, due = landing.x, landing.time - self.phase_time
+            if self._stumble.blocked[foot]:
+                swing.meet_wall(self.robot.foot_position[foot], due, dt)
+            elif planning.reaching and leg == station.awaited:
                 swing.drop(dt)
             else:
-                landing = planning.landing(foot)
-                foothold, due = landing.x, landing.time - self.phase_time
                 if not isfinite(foothold):
                     # The template cannot complete the stride; the gait's own foothold is the
                     # best guess.

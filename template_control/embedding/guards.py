@@ -22,7 +22,7 @@ from template_control.slip.automaton.hybrid import Edge
 from template_control.slip.automaton.vocabulary import Event, Leg, Reset
 from template_control.slip.dynamics.guards import guard
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.similarity import tuned
+from template_control.slip.similarity import TIME, tuned
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,8 @@ class GuardOptions(Checked):
     Attributes:
         shortest_swing: shortest time in the air, over sqrt(l0 / g). An earlier contact is the
             foot that scuffs at liftoff.
+        surprise: a foot that is not in front of the CoM lands this long before its touchdown is
+            due at the earliest [s]. An earlier contact is one that scuffs.
         overstretch: share of l0. A rear leg that is longer than l0 by it is let go, whatever the
             path says.
         liftoff_angle: direction beta from the rear foot to the CoM [rad, from forward
@@ -50,6 +52,7 @@ class GuardOptions(Checked):
     """
 
     shortest_swing: NotNegative = tuned(0.3)
+    surprise: NotNegative = tuned(0.05, TIME)
     overstretch: NotNegative = tuned(0.03)
     liftoff_angle: Annotated[float, Range(0.0, np.pi, above=True, below=True)] | None = tuned(None)
 
@@ -89,8 +92,11 @@ class RobotGuards:
         return float(guard(int(event), sensed.state, sensed.toes, self.parameters.rest_length, 0.0))
 
     def _touchdown(self, edge: Edge, sensed: Sensed, due: float) -> bool:
-        foot = sensed.feet[PLACED[edge.reset]]
-        return bool(sensed.contact[foot]) and bool(sensed.swing_time[foot] > self._shortest_time)
+        leg = PLACED[edge.reset]
+        foot = sensed.feet[leg]
+        if not sensed.contact[foot] or sensed.swing_time[foot] <= self._shortest_time:
+            return False
+        return bool(sensed.toes[leg] > sensed.state[0]) or due <= self.options.surprise
 
     def _rear_liftoff(self, edge: Edge, sensed: Sensed, due: float) -> bool:
         stretch = self._value(edge.event, sensed)

@@ -14,6 +14,7 @@ from template_control.embedding.learners.momentum_trim import TrimOptions
 from template_control.embedding.phases import PHASES, PhaseControl
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.references.leg_forces import UnloadOptions
+from template_control.embedding.references.stumble import StumbleOptions
 from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
@@ -32,6 +33,7 @@ class EmbeddingOptions(QpOptions):
         phases: tasks, clock, feet and learners of each phase.
         guards: when a touchdown or a liftoff is believed.
         swing: shape of the swing.
+        stumble: when a foot in the air has met a wall.
         unload: how a foot is unloaded before it lifts off.
         replan: when a stride is planned anew.
         load: tuning of the load estimate.
@@ -46,6 +48,7 @@ class EmbeddingOptions(QpOptions):
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(PHASES))
     guards: GuardOptions = field(default_factory=GuardOptions)
     swing: SwingOptions = field(default_factory=SwingOptions)
+    stumble: StumbleOptions = field(default_factory=StumbleOptions)
     unload: UnloadOptions = field(default_factory=UnloadOptions)
     replan: ReplanOptions = field(default_factory=ReplanOptions)
     load: LoadOptions = field(default_factory=LoadOptions)

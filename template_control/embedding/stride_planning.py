@@ -21,6 +21,7 @@ from template_control.embedding.planning.planned_path import PlannedPath
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.planning.route_planners import RoutePlanners
+from template_control.embedding.planning.unexpected_ground import choose_legs
 from template_control.embedding.references.template_path import join
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
@@ -202,6 +203,24 @@ class StridePlanning(PlannedPath):
                 angle = flown_angle(sensed, self.parameters)
                 decision = planner.decide(z, report.goal.target, (angle, angle))
                 self.reports[-1] = replace(report, decision=decision)
+        self.follow(node, sensed, now)
+
+    def land_off(self, node: Node, sensed: Sensed, now: float, height: float) -> None:
+        """A foot has landed where the ground may be higher or lower than it was thought.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            now: time [s].
+            height: of the ground over the other foot's [m].
+        """
+        o, report = self.options.ground, self.reports[-1]
+        if abs(height) > o.height and node.name not in self.curved:
+            free = free_controls(self.automaton, node)
+            nominal, ahead = self.planner.gait.controls, self._rest.ahead(node, sensed)
+            target = report.target[: len(report.goal.target)]
+            decision = choose_legs(ahead, report.decision, target, free, nominal, o)
+            self.reports[-1] = replace(report, decision=decision)
         self.follow(node, sensed, now)
 
     def _choose_again(self, planner: LandingPlanner, node: Node, sensed: Sensed) -> None:

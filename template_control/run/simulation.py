@@ -206,7 +206,7 @@ def _loop(
         start = time.perf_counter()
         try:
             touching = forces[:, -1] > threshold
-            solution = controller.tick(*senses.measure(q, v, touching), touching, dt)
+            solution = controller.tick(*senses.measure(q, v, touching), touching, dt, forces)
         except ParameterError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start

@@ -74,8 +74,18 @@ class FreeController(EmbeddingController):
         self.sideways.reset(planner.gait)
         super().start(rear, swung)
 
-    def tick(self, q: Array, v: Array, contact: NDArray[np.bool_], dt: float) -> Solution:
-        """As :meth:`~template_control.embedding.controller.EmbeddingController.tick`."""
+    def tick(
+        self,
+        q: Array,
+        v: Array,
+        contact: NDArray[np.bool_],
+        dt: float,
+        force: Array | None = None,
+    ) -> Solution:
+        """As :meth:`~template_control.embedding.controller.EmbeddingController.tick`.
+
+        Feet that also swing sideways tell no walls: ``force`` is not looked at.
+        """
         self._state, self._contact = (q, v), contact
         return super().tick(q, v, contact, dt)
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Range, Share
+from template_control.embedding.planning.unexpected_ground import UnexpectedGroundOptions
 from template_control.embedding.references.template_path import PathOptions
 from template_control.slip.similarity import RATE_SQUARED, SPEED, TIME, tuned
 
@@ -26,6 +27,7 @@ class ReplanOptions(Checked):
         calmer: shares of dy/dt, tried in turn, of the states that a path starts from where the
             template cannot go on from the robot's: its leg cannot pull, the robot's can.
         highest: height over l0 above which no such path starts.
+        ground: how the legs are chosen where a foot lands higher or lower than it was to.
         path: how the robot's place on the path is looked for.
     """
 
@@ -37,4 +39,5 @@ class ReplanOptions(Checked):
     foresight: NotNegative = tuned(1.0, TIME)
     calmer: tuple[Share, ...] = tuned((0.5, 0.0))
     highest: Positive = tuned(0.99)
+    ground: UnexpectedGroundOptions = field(default_factory=UnexpectedGroundOptions)
     path: PathOptions = field(default_factory=PathOptions)

@@ -3,14 +3,15 @@
 At each tick the path is the quintic from the present reference (position, velocity,
 acceleration) to the foothold in the time the template still needs to get there, so a
 foothold or a touchdown time that moves leaves no step in the reference. The foot rises to
-its clearance in the first half of the swing and comes down in the second, with a small
-downward speed at the end, so that it meets the ground for certain.
+its clearance early, keeps it while it travels, and comes down late, with a small downward
+speed at the end, so that it meets the ground for certain. Ground that nobody told of is then
+met from above. A foot that meets a wall all the same goes up along it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,17 +39,24 @@ class SwingOptions(Checked):
             accelerations would grow beyond bounds.
         early: the foot is above its foothold this long before touchdown [s], so that it
             comes down at rest relative to the ground.
+        late: a foot that meets a wall less than this before its touchdown [s] is set down before
+            it; earlier it goes up and over.
+        lift_speed: upwards, of a foot that has met a wall [m/s].
+        margin: height over the place where it met the wall last that it then keeps [m].
         drop_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
         leg_share: the foot is kept within this share of the leg's length from the hip; a knee
             that goes straight hits its stop with tens of kilonewtons.
     """
 
-    clearance: NotNegative = tuned(0.05, LENGTH)
-    rise: Share = tuned(0.5)
-    descent: NotNegative | None = tuned(None, TIME)
+    clearance: NotNegative = tuned(0.06, LENGTH)
+    rise: Share = tuned(0.3)
+    descent: NotNegative | None = tuned(0.08, TIME)
     landing_speed: NotNegative = tuned(0.2, SPEED)
     horizon: Positive = tuned(0.02, TIME)
-    early: NotNegative = tuned(0.01, TIME)
+    early: NotNegative = tuned(0.02, TIME)
+    late: NotNegative = tuned(0.06, TIME)
+    lift_speed: Positive = tuned(1.0, SPEED)
+    margin: NotNegative = tuned(0.02, LENGTH)
     drop_acceleration: Positive = tuned(10.0, ACCELERATION)
     leg_share: Share = tuned(0.98)
 
@@ -95,6 +103,7 @@ class SwingFoot:
         self.options = options
         self.x, self.y = np.zeros((2, 3)) if reference is None else reference
         self._elapsed = 0.0
+        self._over = -inf
 
     def start(self, position: Array, velocity: Array, elapsed: float = 0.0) -> None:
         """Begin a swing where the foot is now.
@@ -107,6 +116,7 @@ class SwingFoot:
         self.x[:] = position[0], velocity[0], 0.0
         self.y[:] = position[1], velocity[1], 0.0
         self._elapsed = elapsed
+        self._over = -inf
 
     def advance(self, foothold: float, time_to_go: float, dt: float, ground: float) -> None:
         """Move the reference by ``dt`` towards its foothold.
@@ -118,17 +128,36 @@ class SwingFoot:
             ground: height of the foothold [m].
         """
         o = self.options
+        top = max(ground + o.clearance, self._over)
         if time_to_go <= o.horizon or not isfinite(foothold):
             self._coast(dt)
         else:
             quintic_step(self.x, foothold, 0.0, max(time_to_go - o.early, o.horizon), dt)
             rising = o.rise * time_to_go - (1.0 - o.rise) * self._elapsed
             if rising > o.horizon:
-                quintic_step(self.y, ground + o.clearance, 0.0, rising, dt)
+                quintic_step(self.y, top, 0.0, rising, dt)
             elif o.descent is not None and time_to_go > o.descent:
-                self._hold(ground + o.clearance, dt)
+                self._hold(top, dt)
             else:
                 quintic_step(self.y, ground, -o.landing_speed, time_to_go, dt)
+        self._elapsed += dt
+
+    def meet_wall(self, position: Array, time_to_go: float, dt: float) -> None:
+        """Go up along a wall that the foot has met, and stay above it from then on; or down.
+
+        Args:
+            position: (2,) of the foot [m].
+            time_to_go: time until the foot is due [s].
+            dt: control period [s].
+        """
+        o = self.options
+        self.x[:] = position[0], 0.0, 0.0
+        if time_to_go < o.late:
+            self.drop(dt)
+            return
+        self.y[0] = max(self.y[0], position[1]) + o.lift_speed * dt
+        self.y[1], self.y[2] = o.lift_speed, 0.0
+        self._over = self.y[0] + o.margin
         self._elapsed += dt
 
     def drop(self, dt: float) -> None:

@@ -1,0 +1,73 @@
+"""What a foot in the air has met: ground to stand on, a wall, or an edge that it slips off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive
+from template_control.slip.similarity import SPEED, TIME, tuned
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StumbleOptions(Checked):
+    """When a foot in the air has met a wall or an edge.
+
+    Attributes:
+        steepness: a force whose horizontal part is more than this many times its vertical one
+            comes from a wall: from ground to stand on it is the friction coefficient's at most.
+        force: share of the weight that a wall's force has at least.
+        linger: the wall counts for this long after its last force [s].
+        sinking: a foot that still comes down faster than this has grazed an edge [m/s].
+        graze: a contact that lasts longer than this is none that grazes [s].
+    """
+
+    steepness: Positive = tuned(1.0)
+    force: NotNegative = tuned(0.02)
+    linger: NotNegative = tuned(0.015, TIME)
+    sinking: NotNegative = tuned(0.1, SPEED)
+    graze: NotNegative = tuned(0.004, TIME)
+
+
+class Stumble:
+    """Remembers what each foot has met.
+
+    Args:
+        options: when that is.
+        weight: of the robot [N].
+
+    Attributes:
+        slipping: (2,) whether what each foot feels is no ground to stand on.
+    """
+
+    def __init__(self, options: StumbleOptions, weight: float) -> None:
+        self._options = options
+        self._least = options.force * weight
+        self._left = np.zeros(2)
+        self._touching = np.zeros(2)
+        self.slipping = np.zeros(2, dtype=bool)
+
+    @property
+    def blocked(self) -> NDArray[np.bool_]:
+        """(2,) whether a wall is in front of each foot."""
+        return self._left > 0.0
+
+    def feel(self, force: Array, rising: Array, dt: float) -> None:
+        """Look at what acts on the feet, and how they move.
+
+        Args:
+            force: (2, 2) x and y of the ground's force on each foot [N].
+            rising: (2,) their upward speeds [m/s].
+            dt: since the last look [s].
+        """
+        o, across, up = self._options, np.abs(force[:, 0]), force[:, 1]
+        wall = (across > self._least) & (across > o.steepness * up)
+        self._left -= dt
+        self._left[wall & (force[:, 0] < 0.0)] = o.linger
+        self._touching = np.where(up > 0.0, self._touching + dt, 0.0)
+        self.slipping = wall | ((rising < -o.sinking) & (self._touching < o.graze))

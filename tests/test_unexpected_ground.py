@@ -1,0 +1,96 @@
+"""A foot that meets something: what it feels, what counts as a touchdown, which legs then push."""
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.embedding import GuardOptions, StumbleOptions
+from template_control.embedding.guards import RobotGuards
+from template_control.embedding.planners.planner import Decision
+from template_control.embedding.planning.unexpected_ground import (
+    UnexpectedGroundOptions,
+    choose_legs,
+)
+from template_control.embedding.references.stumble import Stumble
+from template_control.embedding.sensing import Sensed
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
+from template_control.slip.dynamics.stride import StrideSimulator
+from template_control.slip.maps.section import VLO
+
+WEIGHT = 785.0
+
+
+STILL = np.zeros(2)
+
+
+def test_a_wall_is_told_from_ground_by_the_direction_of_its_force():
+    stumble = Stumble(StumbleOptions(), WEIGHT)
+    stumble.feel(np.array([[-60.0, 100.0], [-100.0, 60.0]]), STILL, 1e-3)
+    np.testing.assert_array_equal(stumble.slipping, [False, True])
+    np.testing.assert_array_equal(stumble.blocked, [False, True])
+    stumble.feel(np.array([[100.0, 0.0], [-10.0, 0.0]]), STILL, 1e-3)
+    np.testing.assert_array_equal(stumble.slipping, [True, False])
+    assert not stumble.blocked[0], "a wall behind the foot is not in its way"
+
+
+def test_a_wall_counts_for_a_while_after_its_last_force():
+    stumble = Stumble(StumbleOptions(linger=0.01), WEIGHT)
+    stumble.feel(np.array([[-100.0, 0.0], [0.0, 0.0]]), STILL, 1e-3)
+    after = 0
+    while stumble.blocked[0]:
+        stumble.feel(np.zeros((2, 2)), STILL, 1e-3)
+        after += 1
+    assert after == pytest.approx(10, abs=1)
+
+
+def test_a_foot_that_goes_on_sinking_has_grazed_an_edge():
+    stumble = Stumble(StumbleOptions(graze=0.004), WEIGHT)
+    carried, sinking = np.full((2, 2), (0.0, 100.0)), np.array([-0.5, -0.05])
+    stumble.feel(carried, sinking, 1e-3)
+    np.testing.assert_array_equal(stumble.slipping, [True, False])
+    for _ in range(4):  # on soft ground
+        stumble.feel(carried, sinking, 1e-3)
+    np.testing.assert_array_equal(stumble.slipping, [False, False])
+
+
+@pytest.mark.parametrize(
+    ("place", "due", "expected"),
+    [(0.2, np.inf, True), (0.2, 0.1, True), (-0.1, 0.2, False), (-0.1, 0.03, True)],
+)
+def test_an_early_contact_counts_in_front_of_the_com(place, due, expected):
+    guards = RobotGuards(tc.SlipParameters(), GuardOptions())
+    edge = AUTOMATON.start("w").edge(Event.TOUCHDOWN)
+    sensed = Sensed(contact=np.array([False, True]), toes=np.array([-0.3, place]))
+    assert guards.fired(edge, sensed, due) is expected
+
+
+def test_legs_push_longer_after_a_step_up(default_gait):
+    """The template steps on ground 3 cm higher, with its leg that much shorter."""
+    gait = default_gait
+    simulator = StrideSimulator(gait.parameters, AUTOMATON)
+    stride = simulator.run("SS_av^w", VLO.state(gait.vlo), gait.controls)
+    touchdown = next(e.time for e in stride.events if e.event is Event.TOUCHDOWN)
+    row = np.flatnonzero(np.isclose(stride.meta[:, 0], touchdown))[0]
+    toes = tuple(stride.meta[row, 3:5])
+    state = np.array([c[row, n] for n in (0, 1) for c in (stride.cx, stride.cy)])
+    state[1] -= 0.03
+
+    def ahead(u):
+        rest = simulator.run("DS_sc^w", state, u, toes)
+        return VLO.of(rest.state), rest.outcome
+
+    def surprise(end):
+        return np.abs((end - gait.vlo) / UnexpectedGroundOptions().tolerance).max()
+
+    decision = Decision(gait.controls, gait.vlo, True, True, True)
+    free = [Slot.K_SC, Slot.K_SD]
+    chosen = choose_legs(ahead, decision, gait.vlo, free, gait.controls, UnexpectedGroundOptions())
+    before, _ = ahead(gait.controls)
+    after, outcome = ahead(chosen.controls)
+    assert outcome is Outcome.SECTION
+    assert surprise(after) < 0.7 * surprise(before)
+    np.testing.assert_allclose(chosen.predicted, after)
+    assert not chosen.nominal, "nothing is learnt from it"
+    k = chosen.controls[free] / gait.controls[free]
+    assert np.all((k >= 0.5) & (k <= 2.0))
