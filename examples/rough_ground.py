@@ -15,6 +15,7 @@ import numpy as np
 
 import template_control as tc
 from template_control.robustness.wilson import wilson_interval
+from template_control.slip import WalkingGait
 
 SEED = 1
 FIRST, LAST = 3.0, 6.0  # the gait's footholds between which a step comes
@@ -38,7 +39,7 @@ ROWS = {
 }
 
 
-def grounds(what: str, trials: int, gait: tc.WalkingGait) -> Iterator[tc.Terrain]:
+def grounds(what: str, trials: int, gait: WalkingGait) -> Iterator[tc.Terrain]:
     """The grounds of a row: lengths are those of five-link, scaled to the gait's template."""
     length = gait.parameters.rest_length
     if what.startswith("steps"):

@@ -94,3 +94,16 @@ def test_legs_push_longer_after_a_step_up(default_gait):
     assert not chosen.nominal, "nothing is learnt from it"
     k = chosen.controls[free] / gait.controls[free]
     assert np.all((k >= 0.5) & (k <= 2.0))
+
+
+@pytest.mark.slow(seconds=20)
+@pytest.mark.parametrize("place", [3.01, 3.91, 3.995])
+def test_a_step_up_right_before_a_foothold_is_climbed(default_gait, place):
+    """The foot came down in front of the wall, or lifted off right behind it."""
+    gait = default_gait
+    plant = tc.PlantOptions(terrain=tc.Terrain.step(0.03, place * gait.step_length))
+    options = tc.SimulationOptions(steps=12, plant=plant)
+    record = tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(gait), options)
+    assert not record.fell
+    assert record.foot[-1, :, 1].min() > 0.029
+    assert record.section_state[-1, 0] > 0.9 * gait.state[0]

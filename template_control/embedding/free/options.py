@@ -11,10 +11,10 @@ from template_control.embedding.free.phases import FREE_PHASES
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PhaseControl
 from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.lateral.options import LateralOptions
 from template_control.slip.similarity import LENGTH, tuned
-
 
 # The foot has to move aside too, and is not asked to be high for longer.
 _SWING = SwingOptions(clearance=0.05, rise=0.5, descent=None, early=0.01)
