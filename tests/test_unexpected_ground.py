@@ -93,7 +93,7 @@ def test_legs_push_longer_after_a_step_up(default_gait):
     np.testing.assert_allclose(chosen.predicted, after)
     assert not chosen.nominal, "nothing is learnt from it"
     k = chosen.controls[free] / gait.controls[free]
-    assert np.all((k >= 0.5) & (k <= 1.5))
+    assert np.all((k >= 0.5) & (k <= 2.0))
 
 
 @pytest.mark.slow(seconds=20)

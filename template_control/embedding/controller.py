@@ -191,15 +191,15 @@ class EmbeddingController:
             v: (nv,) measured velocity.
             contact: (2,) whether each foot touches the ground.
             dt: control period [s].
-            force: (2, 2) x and y of the ground's force on each foot [N], by which a foot in the
-                air tells a wall; None: it tells none.
+            force: (2, d) the ground's force on each foot, forward first and up last [N], by which
+                a foot in the air tells a wall; None: it tells none.
 
         Raises:
             ParameterError: if the state is not finite.
         """
         self.robot.update(q, v)
         if force is not None:
-            self._stumble.feel(force, self.robot.foot_velocity[:, 1], dt)
+            self._stumble.feel(force[:, [0, -1]], self.robot.foot_velocity[:, 1], dt)
             contact = contact & ~self._stumble.slipping
         self.feet.swing_time += dt
         self._sense(contact)

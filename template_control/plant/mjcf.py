@@ -55,7 +55,7 @@ def world_element(
 
     Args:
         robot: whose gravity acts.
-        world: friction, time step, step of the ground.
+        world: friction, time step, ground.
         contact_time: time constant with which a contact gives way [s].
     """
     root = Element("mujoco", model="plant")

@@ -84,7 +84,7 @@ class FreeController(EmbeddingController):
     ) -> Solution:
         """As :meth:`~template_control.embedding.controller.EmbeddingController.tick`.
 
-        Walls are not told by the ``force``: they may stand in any direction.
+        Feet that also swing sideways tell no walls: ``force`` is not looked at.
         """
         self._state, self._contact = (q, v), contact
         return super().tick(q, v, contact, dt)

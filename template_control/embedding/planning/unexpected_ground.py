@@ -37,7 +37,7 @@ class UnexpectedGroundOptions(Checked):
     height: NotNegative = tuned(0.008, LENGTH)
     tolerance: tuple[Positive, Positive, Positive] = tuned((0.1, 0.02, 0.1), SPEED, LENGTH, SPEED)
     change: Positive = tuned(0.5)
-    bounds: Interval = tuned((0.5, 1.5))
+    bounds: Interval = tuned((0.5, 2.0))
     rounds: Index = tuned(5)
 
 
