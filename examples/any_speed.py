@@ -1,7 +1,7 @@
 """Walk at a speed that changes at any time: random profiles, or one from a file.
 
     python examples/any_speed.py [--trials 4] [--first 0] [--duration 60] [--robot five-link]
-    python examples/any_speed.py --ramp 0.3
+    python examples/any_speed.py --ramp 0.3 [--stay 5]
     python examples/any_speed.py --profile FILE [--save run.npz]
 
 A random profile goes at 0.1 to 0.5 m/s^2 from one speed to the next, all within 0.3 to 1.4 m/s for
@@ -20,8 +20,6 @@ from template_control.robustness import wilson_interval
 from template_control.run.summary import summarise
 from template_control.slip import Scale
 
-STAY = 12.0  # [s] at the end of a ramp: the robot may be slower than the ramp
-
 
 def random_profile(seed: int, duration: float, unit: float) -> tc.SpeedProfile:
     """A profile drawn with its seed; ``unit`` is that of speeds."""
@@ -35,10 +33,10 @@ def random_profile(seed: int, duration: float, unit: float) -> tc.SpeedProfile:
     return tc.SpeedProfile(tuple(times), tuple(unit * v for v in speeds))
 
 
-def ramp(acceleration: float, unit: float) -> tc.SpeedProfile:
-    """0.4 to 1.4 m/s and back."""
+def ramp(acceleration: float, stay: float, unit: float) -> tc.SpeedProfile:
+    """0.4 to 1.4 m/s and back, ``stay`` seconds at either end."""
     rise = 1.0 / acceleration
-    times = np.cumsum([0.0, 2.0, rise, STAY, rise, STAY])
+    times = np.cumsum([0.0, 2.0, rise, stay, rise, stay])
     return tc.SpeedProfile(tuple(times), tuple(unit * v for v in (0.4, 0.4, 1.4, 1.4, 0.4, 0.4)))
 
 
@@ -70,6 +68,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first trial")
     parser.add_argument("--duration", type=float, default=60.0, help="of a random profile [s]")
     parser.add_argument("--ramp", type=float, help="acceleration [m/s^2]")
+    parser.add_argument("--stay", type=float, default=5.0, help="at the end of a ramp [s]")
     parser.add_argument("--profile", type=Path, help="TOML with times and speeds")
     parser.add_argument("--robot", default="five-link")
     parser.add_argument("--save", type=Path, help="file of the last run's record")
@@ -80,7 +79,7 @@ def main() -> None:
         profile = tc.SpeedProfile(tuple(data["times"]), tuple(data["speeds"]))
         record = walk(str(chosen.profile), chosen.robot, profile, profile.times[-1])
     elif chosen.ramp is not None:
-        profile = ramp(chosen.ramp, unit)
+        profile = ramp(chosen.ramp, chosen.stay, unit)
         record = walk(f"{chosen.ramp:g} m/s^2", chosen.robot, profile, profile.times[-1])
     else:
         falls = 0
