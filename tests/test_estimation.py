@@ -130,7 +130,9 @@ def test_wrong_noise_is_named():
 
 
 def test_the_run_file_knows_the_estimator(tmp_path):
-    config = RunConfig(simulation=SimulationOptions(sensors=ImuOptions(seed=7)))
+    config = RunConfig(
+        planner=tc.LqrOptions(), simulation=SimulationOptions(sensors=ImuOptions(seed=7))
+    )
     assert RunConfig.load(config.save(tmp_path / "run.toml")) == config
 
 

@@ -23,7 +23,7 @@ logging.getLogger("template_control.run").warning("not seen")
 @pytest.fixture
 def weak_walk(robot, default_gait, caplog):
     """Messages of a walk whose motors are too weak."""
-    options = tc.SimulationOptions(steps=10, embedding=tc.EmbeddingOptions(torque_scale=0.1))
+    options = tc.SimulationOptions(steps=10, embedding=tc.EmbeddingOptions(torque_scale=0.07))
     with caplog.at_level(logging.DEBUG, "template_control"):
         record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
     assert record.fell
@@ -50,7 +50,7 @@ def test_failures_of_the_qp_in_a_row_are_told_once(weak_walk):
 
 
 def test_every_section_is_told(robot, default_gait, caplog):
-    options = tc.SimulationOptions(steps=4, pushes=(tc.Push(-40.0, step=1),))
+    options = tc.SimulationOptions(steps=4, pushes=(tc.Push(-60.0, step=1),))
     with caplog.at_level(logging.DEBUG, "template_control"):
         record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
     told = [m.getMessage() for m in caplog.records if m.levelno == logging.DEBUG]
