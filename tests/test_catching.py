@@ -103,6 +103,19 @@ def test_a_scenario_goes_on_after_the_catch():
     assert route.next(APEX, SLOW, 9.0) is None
 
 
+def test_a_catch_tells_no_duration_of_a_step():
+    segments = (Segment("walk", 0.9, steps=1), Segment("walk", acceleration=0.1, duration=9.0))
+    route = CatchingRoute(ScenarioRoute(Scenario(segments=segments, start=(0.9, 0.98, 0.0))))
+    route.next(VLO, WALK.vlo, 0.0)
+    walk = route.next(VLO, WALK.vlo, 0.5)
+    run = route.instead(walk, 2.0, 1.0)
+    assert (walk.segment, run.segment) == (1, 1)
+    route.take(run)
+    assert asked(route, (APEX, FAST), (APEX, SLOW)) == ["r", "rw"]
+    later = route.next(VLO, WALK.vlo, 4.5)
+    assert later.wanted_speed == pytest.approx(0.9 + 0.1 * 5.0, abs=0.06), "one step ahead"
+
+
 @pytest.mark.parametrize(("walks", "runs"), RUN_ON.items())
 def test_the_same_legs_stand_where_a_walk_breaks_into_a_run(walks, runs):
     before, after = AUTOMATON.node(walks), AUTOMATON.node(runs)
@@ -203,6 +216,26 @@ def test_a_robot_that_is_pushed_too_hard_runs_and_walks_on(name, phase):
     speed = record.section_state[:, 0]
     assert speed.max() > 1.9
     assert speed[-1] == pytest.approx(1.1, abs=0.06)
+
+
+@pytest.mark.slow(seconds=6)
+def test_a_walk_of_a_scenario_runs_and_walks_on():
+    segments = (Segment("walk", 1.1, steps=7),)
+    scenario = Scenario(segments=segments, start=(1.1, 0.978, 0.0), map_kind=tc.MapKind.EXACT)
+    robot = tc.load_robot("five-link")
+    pushes = (tc.Push(60.0, step=2, phase=0.3),)
+    record = tc.simulate(robot, scenario, tc.SimulationOptions(pushes=pushes))
+    assert record.metadata["arrived"]
+    found = kinds(record)
+    runs = found.count("r")
+    assert runs >= 3
+    assert found == ["w"] * 2 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * 4, "caught, it is a step"
+    fallen = tc.simulate(
+        robot,
+        scenario,
+        tc.SimulationOptions(pushes=pushes, embedding=tc.EmbeddingOptions(catches=False)),
+    )
+    assert set(kinds(fallen)) == {"w"}
 
 
 @pytest.mark.slow(seconds=10)

@@ -8,6 +8,7 @@ from space_slip import energy, step
 from template_control.embedding import LqrPlanner
 from template_control.slip import (
     Heading,
+    LateralLearningOptions,
     LateralLearnt,
     LateralOptions,
     LateralWish,
@@ -30,6 +31,8 @@ P = SlipParameters()
 WALK = gait_at(P, np.radians(68.0), 1.05)
 LATERAL = lateral_gait(WALK)
 OPTIONS = LateralOptions()
+# In a turn in space the steps of the inner leg are not those of the outer one.
+LEARNING = LateralLearningOptions(one_sided=1.0)
 TOE = np.zeros(2)
 
 
@@ -142,7 +145,7 @@ class Walker:
         found = truth.end[[1, 4]] - (truth.toe[1], 0.0)
         if learns:
             surprise = found - placed[-1].state(truth.toe[1])
-            self.learnt = self.learnt.after_step(side, surprise, OPTIONS.learning)
+            self.learnt = self.learnt.after_step(side, surprise, LEARNING)
         self.planner.observe(decision, truth.end[[3, 2, 5]])
         self.widths.append(-side * truth.toe[1])
         self.sections.append(side.other * found)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from template_control.checks.ranges import Range, Rising, Shape
 from template_control.errors import ParameterError, TemplateControlError
@@ -79,6 +79,8 @@ def _plan(hint: Any) -> Callable[[Any], Any]:
         return partial(_one_of, hints=args)
     if origin in (list, Sequence):
         hint, origin = types.GenericAlias(tuple, (args[0], ...)), tuple
+    if origin is np.ndarray:
+        return partial(_array, kind=_kind(hint))
     if origin in _COMPOUND:
         return partial(_COMPOUND[origin], hint=hint)
     if isinstance(hint, type):
@@ -160,7 +162,7 @@ _SIMPLE: dict[Any, Callable[[Any], Any]] = {
     str: _text,
     Path: _path,
     type(None): _none,
-    ArrayLike: lambda value: _array(value, NDArray[np.float64]),
+    ArrayLike: lambda value: _array(value, np.float64),
 }
 
 
@@ -228,11 +230,13 @@ def _mapping(value: Any, hint: Any) -> Any:
     return value if same else found
 
 
-def _array(value: Any, hint: Any) -> Any:
+def _kind(hint: Any) -> Any:
+    """What an annotated array is of."""
     wanted = get_args(get_args(hint)[1])
-    kind = wanted[0] if wanted else np.float64
-    if not isinstance(kind, type):
-        kind = np.float64
+    return wanted[0] if wanted and isinstance(wanted[0], type) else np.float64
+
+
+def _array(value: Any, kind: Any) -> Any:
     try:
         found = np.asarray(value)
         numbers = found.dtype.kind in "biufc"
@@ -261,7 +265,6 @@ _COMPOUND: dict[Any, Callable[..., Any]] = {
     tuple: _tuple,
     Mapping: _mapping,
     dict: _mapping,
-    np.ndarray: _array,
     Callable: _called,
     Iterable: _iterable,
 }

@@ -66,6 +66,8 @@ class Shape(NamedTuple):
     def holds(self, shape: tuple[int, ...]) -> bool:
         """Whether an array's shape is this one."""
         sizes = self.sizes
+        if shape == sizes:
+            return True
         if sizes[:1] == (...,):
             sizes, shape = sizes[1:], shape[max(len(shape) - len(sizes) + 1, 0) :]
         return len(shape) == len(sizes) and all(

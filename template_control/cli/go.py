@@ -15,6 +15,7 @@ from template_control.cli.options.config import add_config, prepared
 from template_control.cli.options.output import add_output_options
 from template_control.cli.options.robot import add_robot_options
 from template_control.cli.options.world import (
+    add_catch_option,
     add_disturbance_options,
     add_length_options,
     add_world_options,
@@ -56,6 +57,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_robot_options(parser)
     add_world_options(parser)
     add_disturbance_options(parser)
+    add_catch_option(parser)
     add_length_options(parser)
     add_output_options(parser, "runs/go")
 

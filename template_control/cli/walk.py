@@ -14,6 +14,7 @@ from template_control.cli.options.gait import (
 from template_control.cli.options.output import add_output_options
 from template_control.cli.options.robot import add_robot_options
 from template_control.cli.options.world import (
+    add_catch_option,
     add_course_options,
     add_disturbance_options,
     add_length_options,
@@ -44,14 +45,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_planner_options(parser)
     add_world_options(parser)
     add_disturbance_options(parser)
-    parser.add_argument(
-        "--no-catch",
-        dest="catches",
-        action="store_const",
-        const=False,
-        help="let a walk that is pushed too hard fall; without this it breaks into a run, slows"
-        " down and walks on",
-    )
+    add_catch_option(parser)
     add_length_options(parser)
     add_output_options(parser, "runs/walk")
 

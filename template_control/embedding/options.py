@@ -36,7 +36,7 @@ class EmbeddingOptions(QpOptions):
         replan: when a stride is planned anew.
         load: tuning of the load estimate.
         trim: tuning of the momentum trim.
-        catches: whether a walk that is kept breaks into a run where it cannot go on.
+        catches: whether a walk breaks into a run where it cannot go on, kept or of a scenario.
         lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
     """
 

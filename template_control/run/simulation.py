@@ -34,8 +34,8 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import VLO
-from template_control.slip.scenario.catching import CatchingRoute
-from template_control.slip.scenario.route import Route, SteadyRoute
+from template_control.slip.scenario.catching import CATCHING_STRIDES, CatchingRoute
+from template_control.slip.scenario.route import Route, ScenarioRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -79,8 +79,8 @@ def simulate(
     Args:
         robot: model of the controller, and whose URDF the plant loads.
         route: which stride comes next and towards which state; or a scenario, which is put on
-            the robot's template; or a planner, whose gait the robot keeps. A walk then breaks
-            into a run where it cannot go on, and walks again
+            the robot's template; or a planner, whose gait the robot keeps. A walk of a scenario
+            or of a planner breaks into a run where it cannot go on, and walks again
             (:class:`~template_control.slip.scenario.catching.CatchingRoute`).
         options: how the run goes.
         progress: called with the number of completed steps after each.
@@ -99,14 +99,11 @@ def simulate(
     o, kind = options or SimulationOptions(), _kind(robot)
     if isinstance(route, Scenario):
         route = robot_route(robot, route)
-    if isinstance(route, Planner):
-        controller = _keeping(kind, route, o.embedding, automaton)
-    else:
-        chosen = planners or default_planners(route)
-        controller = kind.controller(chosen, o.embedding, route, automaton)
+    controller = _controller(kind, route, planners, o.embedding, automaton)
     recorder = kind.recorder(controller, o.record_every)
     last = _last_step(controller, o)
-    with in_use(robot, controller.planning.route, *controller.planning.planners.values()):
+    parts = (route, controller.planning.route, *controller.planning.planners.values())
+    with in_use(robot, *parts):
         q, v = kind.start(controller, o)
         senses = kind.senses(controller, o)
         _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
@@ -147,15 +144,25 @@ def _kind(robot: Biped) -> Kind:
     raise ParameterError(f"{robot!r} is of no kind that can be run: give a planar or a free biped")
 
 
-def _keeping(
-    kind: Kind, planner: Planner, options: EmbeddingOptions, automaton: Automaton
+def _controller(
+    kind: Kind,
+    route: Route | Planner,
+    planners: Planners | None,
+    options: EmbeddingOptions,
+    automaton: Automaton,
 ) -> EmbeddingController:
-    """A controller that keeps the planner's gait; a walk that cannot go on breaks into a run."""
-    steady = SteadyRoute.of(planner.gait, automaton)
-    if not options.catches or automaton is not AUTOMATON or steady.section is not VLO:
-        return kind.controller(planner, options, steady, automaton)
-    caught = CatchingRoute(steady)
-    return kind.controller(default_planners(caught, planner), options, caught, automaton)
+    """Follows a route or keeps a planner's gait; a walk that cannot go on breaks into a run."""
+    catches = options.catches and automaton is AUTOMATON
+    if isinstance(route, Planner):
+        steady = SteadyRoute.of(route.gait, automaton)
+        if not catches or steady.section is not VLO:
+            return kind.controller(route, options, steady, automaton)
+        caught = CatchingRoute(steady)
+        return kind.controller(default_planners(caught, route), options, caught, automaton)
+    chosen = planners or default_planners(route)
+    if catches and isinstance(route, ScenarioRoute) and chosen.keys() >= CATCHING_STRIDES:
+        route = CatchingRoute(route)
+    return kind.controller(chosen, options, route, automaton)
 
 
 def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:

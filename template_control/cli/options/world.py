@@ -109,6 +109,18 @@ def add_course_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_catch_option(parser: argparse.ArgumentParser) -> None:
+    """Add ``--no-catch``."""
+    parser.add_argument(
+        "--no-catch",
+        dest="catches",
+        action="store_const",
+        const=False,
+        help="let a walk that is pushed too hard fall; without this it breaks into a run, slows"
+        " down and walks on",
+    )
+
+
 def add_length_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--steps`` and ``--record-every``."""
     parser.add_argument(

@@ -28,7 +28,7 @@ from template_control.slip.similarity import REFERENCE
 
 # A slow stride lasts 1.3 sqrt(l0 / g); a run that is behind its profile must be able to catch up.
 _STRIDE = 1.9
-_CATCHING = RunningOptions(pace=0.12)  # a run that catches a walk is to be over soon
+_CATCHING = RunningOptions(pace=0.12)  # a run that only catches a walk is to be over soon
 _GENTLE = 0.05  # of g: up to this acceleration moderate controls keep up
 
 
@@ -36,7 +36,9 @@ def _keeping_up(scenario: Scenario) -> RunningOptions:
     """Options with which a run keeps up with the accelerations of a scenario."""
     p, options = scenario.parameters, RunningOptions()
     runs = [abs(s.acceleration) for s in scenario.segments if s.gait == "run"]
-    fastest = max(runs, default=0.0) / p.gravity
+    if not runs:
+        return _CATCHING
+    fastest = max(runs) / p.gravity
     if fastest > _GENTLE:
         return AGILE
     # A change of speed over a stride, for the reference template as all options are.
@@ -47,9 +49,15 @@ def _keeping_up(scenario: Scenario) -> RunningOptions:
 @checked
 def first_speed(route: Route) -> float:
     """dx/dt that the gait has with which a route begins, after a stand where it has one [m/s]."""
-    if isinstance(route, ScenarioRoute):
-        return route.scenario.walking_speed
+    followed = _followed(route)
+    if isinstance(followed, ScenarioRoute):
+        return followed.scenario.walking_speed
     return float(route.start[0])
+
+
+def _followed(route: Route) -> Route:
+    """The route itself, without the run that catches its walks."""
+    return route.followed if isinstance(route, CatchingRoute) else route
 
 
 @checked
@@ -73,7 +81,7 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
 
     if route.section == APEX:
         return {"r": RunningPlanner(runs(speed))}
-    followed = route.followed if isinstance(route, CatchingRoute) else route
+    followed = _followed(route)
     scenario = followed.scenario if isinstance(followed, ScenarioRoute) else None
     standing: Planners = {}
     if scenario is not None and scenario.stands:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -77,9 +78,14 @@ class FromSection:
         """See :class:`StrideEnd`."""
         return self.step.step(self.z, u)
 
+    @cached_property
+    def columns(self) -> NDArray[np.int64]:
+        """Places of the free controls among the map's arguments."""
+        return np.array(self.slots) + PADDED
+
     def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
         """See :class:`StrideEnd`."""
-        m, columns = self.step.dimensions[1], np.array(self.slots) + PADDED
+        m, columns = self.step.dimensions[1], self.columns
         result, jacobian, outcome = self.step.derivatives(self.z, u, columns)
         return result[:m], jacobian[:m], outcome
 

@@ -26,6 +26,7 @@ from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
 Array = NDArray[np.float64]
 
 _SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]
+_SAME = 1e-9  # rounding [m/s, m]
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,10 @@ class RunningPlanner:
         self.offset: Array = np.zeros(PADDED)
         self._family = RunningFamily(gait)
         self._map = ReturnMap(gait.parameters, gait.stride)
-        self._grid = 0.5 * self.options.pace
+        o = self.options
+        self._grid = 0.5 * o.pace
+        # As arrays at once: a plan has little time.
+        self._reach, self._tolerance = np.array([o.pace, o.climb]), np.array(o.tolerance)
         # Compile now what a stride would otherwise wait for.
         self.decide(gait.apex)
 
@@ -99,23 +103,17 @@ class RunningPlanner:
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
     ) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a running step from apex to apex."""
-        o = self.options
         if target is not None and target[0] != self.gait.apex[0]:
             self.gait = self._family.at(float(target[0]))
         wanted = self.gait.apex if target is None else target
         near = self._near(z, wanted)
-        aim = np.array(
-            [
-                np.clip(wanted[0], z[0] - o.pace, z[0] + o.pace),
-                np.clip(wanted[1], z[1] - o.climb, z[1] + o.climb),
-            ]
-        )
+        aim = np.minimum(np.maximum(wanted, z - self._reach), z + self._reach)
         prior = self._prior(z, near, angles)
         stride = FromSection(self._map, z, prior.slots)
-        u, end = solve_stride(stride, aim - self.offset[:2], prior, np.array(o.tolerance))
+        u, end = solve_stride(stride, aim - self.offset[:2], prior, self._tolerance)
         completed = end is not None
         predicted = APEX.padded(z if end is None else end) + self.offset
-        at_target = bool(np.all(np.abs(wanted - aim) < 1e-9))
+        at_target = bool(abs(wanted[0] - aim[0]) < _SAME and abs(wanted[1] - aim[1]) < _SAME)
         return Decision(u, predicted, completed, completed, completed and at_target)
 
     def _near(self, z: Array, wanted: Array) -> RunningGait:
@@ -128,14 +126,17 @@ class RunningPlanner:
         """Controls of the near gait, and how far from them the stride's may be."""
         o, p = self.options, self.gait.parameters
         base = near.controls[_SLOTS]
-        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
-        allowed = base[0] + np.array(o.angle_range)
-        low, high = np.clip(np.clip(np.minimum(allowed, top), *angles), -np.inf, top)
+        alpha, before, after = base.tolist()
+        top = float(np.arcsin(min(z[1] / p.rest_length, 1.0))) - o.top_margin
+        low, high = (
+            min(max(min(alpha + turn, top), angles[0]), angles[1], top) for turn in o.angle_range
+        )
         softest, stiffest = o.stiffness_range
-        lower = np.array([low, softest * base[1], softest * base[2]])
-        upper = np.array([high, stiffest * base[1], stiffest * base[2]])
-        change = np.array(o.change) * [1.0, base[1], base[2]]
-        start = np.clip(base, lower, upper)
+        lower = np.array([low, softest * before, softest * after])
+        upper = np.array([high, stiffest * before, stiffest * after])
+        turn, sooner, later = o.change
+        change = np.array([turn, sooner * before, later * after])
+        start = np.minimum(np.maximum(base, lower), upper)
         return Prior(near.controls, _SLOTS, start, change, lower, upper, o.rounds)
 
     def observe(self, decision: Decision, z: Array) -> None:

@@ -44,7 +44,7 @@ class PlannedPath:
     def _look_ahead(self, passed: int) -> None:
         """So many of the path's events are over: note when each comes next."""
         self._passed = passed
-        self.dues = [self.path.due(event, passed) for event in Event]
+        self.dues = self.path.dues(passed)
 
     def landing(self, foot: int) -> Landing:
         """Where and when on the path a foot next touches down."""

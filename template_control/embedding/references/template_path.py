@@ -19,7 +19,7 @@ from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.embedding.phases import Clock
-from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Reset
+from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.dynamics.taylor import ORDER
 from template_control.slip.maps.section import VLO
@@ -105,6 +105,13 @@ class TemplatePath:
             passed: number of the path's events that are over already.
         """
         return next((time for time, found in self.events[passed:] if found is event), np.inf)
+
+    def dues(self, passed: int) -> list[float]:
+        """As :meth:`due`, of every :class:`Event` by its number."""
+        found = [np.inf] * NUM_EVENTS
+        for time, event in reversed(self.events[passed:]):
+            found[event] = time
+        return found
 
     def after(self, event: Event, passed: int) -> int:
         """How many of the path's events are over once the next ``event`` is.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +20,10 @@ from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
+_EVENTS = tuple(Event)  # by number
 
-@dataclass(frozen=True)
-class FiredEvent:
+
+class FiredEvent(NamedTuple):
     """A guard that fired.
 
     Attributes:
@@ -150,7 +152,7 @@ def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
     array = np.array(values, dtype=float)
     if array.shape != (size,):
         raise ParameterError(f"{name} has shape {array.shape}: give {size} numbers")
-    if not np.all(np.isfinite(array)):
+    if not np.isfinite(array).all():
         raise ParameterError(f"{name} is {array.tolist()}: give finite numbers")
     return array
 
@@ -219,24 +221,22 @@ class StrideSimulator:
             state=x,
             toes=c,
             duration=duration,
-            events=tuple(self._fired(row) for row in w.events[:events]),
+            events=self._fired(w.events[:events]),
             cx=w.cx[:segments].copy(),
             cy=w.cy[:segments].copy(),
             meta=w.meta[:segments].copy(),
             node_names=names,
         )
 
-    def _fired(self, row: Array) -> FiredEvent:
-        """An event from the kernel's row (8,): time, event, nodes left and entered, state."""
-        event, source, target = Event(int(row[1])), int(row[2]), int(row[3])
-        return FiredEvent(
-            time=float(row[0]),
-            event=event,
-            source=self._names[source],
-            target=self._names[target] if target >= 0 else "",
-            state=row[4:8].copy(),
-            reset=self._resets[source][event],
-        )
+    def _fired(self, rows: Array) -> tuple[FiredEvent, ...]:
+        """Events from the kernel's rows (n, 8): time, event, nodes left and entered, state."""
+        fired, names = [], self._names
+        for row, state in zip(rows.tolist(), rows[:, 4:8].copy(), strict=True):
+            event, source, target = _EVENTS[int(row[1])], int(row[2]), int(row[3])
+            entered = names[target] if target >= 0 else ""
+            reset = self._resets[source][event]
+            fired.append(FiredEvent(row[0], event, names[source], entered, state, reset))
+        return tuple(fired)
 
 
 @checked

@@ -42,10 +42,11 @@ class LateralLearnt:
             options: scaled to the template.
         """
         limit, bound = np.array(options.surprise_bound), np.array(options.offset_bound)
-        lesson = options.gain * np.clip(surprise, -limit, limit)
+        lesson = 0.5 * options.gain * np.clip(surprise, -limit, limit)
         offset = self.offset.copy()
-        offset[stance.row] = np.clip(offset[stance.row] + lesson, -bound, bound)
-        return replace(self, offset=offset)
+        offset[stance.row] += (1.0 + options.one_sided) * lesson
+        offset[stance.other.row] -= (1.0 - options.one_sided) * lesson
+        return replace(self, offset=np.clip(offset, -bound, bound))
 
     def after_stance(
         self, lasted: float, planned: float, options: LateralLearningOptions

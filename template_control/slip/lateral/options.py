@@ -22,6 +22,8 @@ class LateralLearningOptions(Checked):
 
     Attributes:
         gain: share of a step's surprise that enters the offset of y and dy/dt.
+        one_sided: how far a step from one side teaches that side alone. At 0 the other side learns
+            the mirror image: a drift aside, which is the walk's own and no offset, is not learnt.
         offset_bound: largest offsets of y and dy/dt [m, m/s].
         surprise_bound: a larger surprise counts as this much: a push is no offset [m, m/s].
         stretch_gain: share of a stance's surprise that enters the stretch.
@@ -29,6 +31,7 @@ class LateralLearningOptions(Checked):
     """
 
     gain: Share = tuned(0.2)
+    one_sided: Share = tuned(0.0)
     offset_bound: tuple[NotNegative, NotNegative] = tuned((0.04, 0.15), LENGTH, SPEED)
     surprise_bound: tuple[NotNegative, NotNegative] = tuned((0.02, 0.08), LENGTH, SPEED)
     stretch_gain: Share = tuned(0.2)

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 _WALKS = ("w", "wp")
 _BREAKS, _RUNS, _SLOWS = "wr", "r", "rw"
 
+CATCHING_STRIDES = frozenset((_BREAKS, _RUNS, _SLOWS))
+"""The strides of a run that catches a walk; each needs a planner."""
+
 
 @dataclass(frozen=True)
 class CatchOptions(Checked):
@@ -108,7 +111,7 @@ class CatchingRoute:
         on = self._caught and goal.stride == _BREAKS
         if speed < slowest or not (walks or on):
             return None
-        return self._run(_BREAKS, min(speed, fastest), _RUNS)
+        return self._run(goal, _BREAKS, min(speed, fastest), _RUNS)
 
     def take(self, goal: StrideGoal) -> None:
         """See :meth:`BreakingRoute.take`."""
@@ -119,11 +122,11 @@ class CatchingRoute:
         if not self._caught or section is not APEX or self._walk is None:
             return None
         if z[0] > self.options.walkable:
-            return self._run(_RUNS, self.options.slow, _SLOWS)
+            return self._run(self._walk, _RUNS, self.options.slow, _SLOWS)
         return replace(self._walk, stride=_SLOWS, then=self._walk.stride)
 
-    def _run(self, stride: str, speed: float, then: str) -> StrideGoal:
+    def _run(self, walk: StrideGoal, stride: str, speed: float, then: str) -> StrideGoal:
         p = self.parameters
         relative = speed / float(np.sqrt(p.gravity * p.rest_length))
         target = np.array([speed, suited_height(relative) * p.rest_length])
-        return StrideGoal(stride, target, speed, then=then)
+        return StrideGoal(stride, target, speed, walk.segment, then)

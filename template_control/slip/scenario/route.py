@@ -48,6 +48,7 @@ _LEADS_TO: dict[str, tuple[Section, Gait]] = {
     _CHANGE: (VLO, "walk"),
 }
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
+_LONGEST = 2.0  # of that guess: what took longer was no stride alone, but one that a run caught
 
 
 @dataclass(frozen=True)
@@ -308,7 +309,8 @@ class ScenarioRoute:
             here, kind = self._reached(here, kind, float(z[0]), now)
         # A transition aims at where the profile begins, the others at where they will end.
         aims = kind not in _TRANSITIONS or (kind == _CHANGE and here.walking)
-        ahead = here.duration.get(kind, self._guess) if aims else 0.0
+        took = min(here.duration.get(kind, self._guess), _LONGEST * self._guess)
+        ahead = took if aims else 0.0
         speed = here.wanted(segment, now + ahead)
         if segment.gait == STAND:
             speed = self.paces.slowed * self._unit if kind == _CHANGE else 0.0
