@@ -88,12 +88,6 @@ def _free() -> tuple[EmbeddingController, Any, Any]:
     return controller, q, v
 
 
-def _plant(robot: Biped, options: PlantOptions) -> BulletPlant:
-    if isinstance(robot, FreeBiped):
-        return FreeBulletPlant(robot, options)
-    return BulletPlant(robot, options)
-
-
 def measure(steps: int, gait: str = "walk", speed: float = 3.0) -> Times:
     """Seconds of every tick by part.
 

@@ -44,24 +44,27 @@ def footholds(record: FreeRecord, foot: int) -> tuple[Array, Array]:
     return record.space_foot[middle, foot, :2], record.time[middle]
 
 
-def from_above(record: FreeRecord) -> Figure:
-    """The CoM's path from above, with the footholds; the axes have one scale.
+def from_above(record: FreeRecord, seconds: float = 4.0) -> Figure:
+    """The CoM's path from above with the footholds: of the run, and of its end.
 
     Args:
         record: the run.
+        seconds: how much of its end the lower panel shows [s].
     """
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
-    axes = figure.subplots()
-    x, y = record.space_com[:, 0], record.space_com[:, 1]
-    axes.plot(x, y, color=COM, linewidth=0.8, label="CoM")
-    for foot, (name, color) in enumerate(_FEET):
-        places, _ = footholds(record, foot)
-        axes.plot(*places.T, ".", color=color, markersize=4.0, label=name)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y, to the left [m]")
-    axes.set_title(f"{as_text(record.metadata['robot'])}: path from above")
-    axes.legend(loc="best")
+    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    whole, end = figure.subplots(2, 1, height_ratios=(3, 2))
+    for axes, w in ((whole, slice(None)), (end, window(record, seconds))):
+        path, since = record.space_com[w], record.time[w][0]
+        axes.plot(path[:, 0], path[:, 1], color=COM, linewidth=0.8, label="CoM")
+        for foot, (name, color) in enumerate(_FEET):
+            places, times = footholds(record, foot)
+            shown = places[times >= since]
+            axes.plot(shown[:, 0], shown[:, 1], ".", color=color, markersize=4.0, label=name)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_ylabel("y, to the left [m]")
+    whole.set_title(f"{as_text(record.metadata['robot'])}: path from above")
+    whole.legend(loc="best")
+    end.set_xlabel("x [m]")
     return figure
 
 

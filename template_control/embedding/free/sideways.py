@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -89,11 +87,7 @@ class Sideways:
         """
         if self._landed is not None:
             surprise = com - (foot, 0.0) - self._landed.state(foot)
-            learnt = self.learnt.after_step(stance.other, surprise, self.options.learning)
-            # What one side teaches holds for the other, mirrored. Each for itself would learn a
-            # drift aside that is no offset, but the walk's own: it then grows.
-            mirrored = 0.5 * (learnt.offset[0] - learnt.offset[1])
-            self.learnt = replace(learnt, offset=np.array([mirrored, -mirrored]))
+            self.learnt = self.learnt.after_step(stance.other, surprise, self.options.learning)
 
     def expect(self, due: float) -> None:
         """Take note of when the touchdown is due, at a section.
