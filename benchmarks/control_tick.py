@@ -44,6 +44,13 @@ _WARM_UP = 3  # steps, while the compiled kernels load
 Times = dict[str, np.ndarray[Any, Any]]
 
 
+def _plant(robot: Biped, options: PlantOptions) -> BulletPlant | FreeBulletPlant:
+    if isinstance(robot, FreeBiped):
+        return FreeBulletPlant(robot, options)
+    assert isinstance(robot, PlanarBiped)
+    return BulletPlant(robot, options)
+
+
 def _timed(function: Callable[..., Any], into: list[float]) -> Callable[..., Any]:
     def call(*arguments: Any) -> Any:
         start = time.thread_time()
