@@ -54,7 +54,7 @@ class Row:
     """A line of the table.
 
     Attributes:
-        way: "run", "walk" or one of ``WAYS``.
+        way: "run", "walk", one of ``WAYS``, or "at" and the mean speed of a walk [m/s].
         robot: name of a shipped one.
         trials: what disturbs the robot: impulse [N s] and phase of the stride; height [m] and
             place, a share of the way between two footholds, of a step of the ground; or mass,
@@ -85,6 +85,10 @@ ROWS = {
     "catch, runner, 80": Row("walk", "runner", pushes(80.0)),
     "catch, five-link, 60": Row("walk", "five-link", pushes(60.0)),
     "catch, five-link, 80": Row("walk", "five-link", pushes(80.0)),
+    **{
+        f"walk at {v}": Row(f"at {v}", "five-link", pushes(15.0, -15.0))
+        for v in (0.4, 0.6, 0.8, 1.0, 1.2, 1.4)
+    },
     "steps, five-link": Row("run", "five-link", EDGES),
     "steps, runner": Row("run", "runner", EDGES),
     "mass, five-link": Row("run", "five-link", MASSES),
@@ -100,6 +104,10 @@ def trial(robot: str, way: str, disturbance: dict[str, float]) -> dict[str, Any]
     if way == "walk":
         route = tc.LqrPlanner(tc.default_gait(model))
         step, last = WALKED, CATCH
+    elif way.startswith("at "):
+        gait = tc.gait_for_speed(tc.template_for(model), float(way.removeprefix("at ")))
+        route = tc.LqrPlanner(gait)
+        step, last = WALKED, WALKED + 1 + AFTER
     elif way == "run":
         step, last = BEFORE, BEFORE + 1 + AFTER
     else:
