@@ -11,7 +11,6 @@ from . import sweep as sweep
 from . import view as view
 from . import whole_body as whole_body
 from .embedding.controller import EmbeddingController as EmbeddingController
-from .embedding.free.options import FreeOptions as FreeOptions
 from .embedding.options import EmbeddingOptions as EmbeddingOptions
 from .embedding.planners.lqr import LqrOptions as LqrOptions
 from .embedding.planners.lqr import LqrPlanner as LqrPlanner
@@ -29,12 +28,10 @@ from .plant.mujoco import MujocoOptions as MujocoOptions
 from .plant.terrain.terrain import Terrain as Terrain
 from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
-from .robot.free.free_biped import FreeBiped as FreeBiped
 from .robot.library import load_free_robot as load_free_robot
 from .robot.library import load_robot as load_robot
 from .robot.planar_biped import PlanarBiped as PlanarBiped
 from .run.config import RunConfig as RunConfig
-from .run.kinds.free_record import FreeRecord as FreeRecord
 from .run.options import Course as Course
 from .run.options import Push as Push
 from .run.options import SimulationOptions as SimulationOptions

@@ -58,7 +58,7 @@ def test_the_planar_part_is_the_view_of_the_space(straight):
 def test_a_record_is_read_as_it_was_written(straight, tmp_path):
     record, _ = straight
     again = load_record(record.save(tmp_path / "run.npz"))
-    assert isinstance(again, tc.FreeRecord)
+    assert isinstance(again, tc.run.FreeRecord)
     for name in ("q", "space_com", "attitude", "sway", "side_reference"):
         np.testing.assert_array_equal(getattr(again, name), getattr(record, name))
     table = columns(again)

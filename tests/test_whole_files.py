@@ -140,7 +140,7 @@ def test_a_walk_on_a_full_disk_keeps_the_last_one_and_prints_its_table(tmp_path,
 @pytest.mark.parametrize(
     ("words", "table", "size"),
     [
-        (["automaton", "--output", "{}/automaton.png"], "successor", 40_000),
+        (["automaton", "--output", "{}/automaton.png"], "successor", 80_000),
         pytest.param(["slip", "{}", "--output", "{}"], "duration", 5_000, marks=pytest.mark.slow),
         (["gaits", "--limits", "825", "826", "--output", "{}"], "stability", 10_000),
         pytest.param(

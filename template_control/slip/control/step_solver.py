@@ -160,6 +160,9 @@ class StepProblem:
             if best.residual <= self.acceptable:
                 break
         assert best is not None
+        if self.tolerance < best.residual <= self.acceptable:
+            # Near, but its evaluations were used up, or it came to rest at a bound.
+            best = min(best, self._descend(z, best.controls), key=lambda found: found.residual)
         return best
 
     def costs(self, z: Array, target: Array, grid: Array) -> Array:
