@@ -8,6 +8,7 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
+from template_control.cli.options.world import simulation_choice
 from template_control.errors import ParameterError
 from template_control.robot.library import load_free_robot
 from template_control.run.data_frame import columns
@@ -78,6 +79,33 @@ def test_bolt_turns():
     a, b = record.space_com[-400, :2], record.space_com[-1, :2]
     direction = np.arctan2(*(b - a)[::-1])
     assert direction == pytest.approx(record.heading[-1], abs=0.15)
+
+
+def test_a_course_turns_at_its_times():
+    course = tc.Course(turning_rate=0.3, turns=((2.0, -0.2), (5.0, 0.0)))
+    assert [course.rate(t) for t in (0.0, 1.9, 2.0, 4.9, 5.0)] == [0.3, 0.3, -0.2, -0.2, 0.0]
+    with pytest.raises(ParameterError, match="rising"):
+        tc.Course(turns=((2.0, 0.1), (1.0, 0.2)))
+
+
+def test_the_command_line_tells_a_course(refused, understood):
+    line = "template-control walk --robot bolt --free --turn 0.3 --turn -0.2@2 --turn 0@5"
+    wanted = simulation_choice(understood(line), tc.SimulationOptions(), ends=False).course
+    assert wanted == tc.Course(turning_rate=0.3, turns=((2.0, -0.2), (5.0, 0.0)))
+    told = refused(["walk", "--robot", "bolt", "--free", "--turn", "left", "--steps", "1"])
+    assert "RATE@TIME" in told
+
+
+@pytest.mark.slow(seconds=20)
+def test_bolt_changes_its_speed_on_command():
+    robot = load_free_robot("bolt")
+    command = tc.SpeedProfile(times=(0.0, 1.0, 4.0), speeds=(0.5, 0.5, 0.65))
+    route = tc.SpeedRoute(tc.template_for(robot), command)
+    record = tc.simulate(robot, route, tc.SimulationOptions(steps=20))
+    assert not record.fell, record.metadata["fall_reason"]
+    gait = tc.gait_for_speed(tc.template_for(robot), 0.65)
+    assert record.section_state[-3:, 0].mean() == pytest.approx(gait.vlo[0], rel=0.05)
+    assert np.abs(record.attitude[:, :2]).max() < 0.02
 
 
 @pytest.mark.slow(seconds=8)

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from heading import Heading
 from space_slip import acceleration as space_acceleration
 from space_slip import energy, step
 
 from template_control.embedding import LqrPlanner
 from template_control.slip import (
-    Heading,
     LateralLearningOptions,
     LateralLearnt,
     LateralOptions,

@@ -78,18 +78,37 @@ def check_pushes(pushes: tuple[Push, ...], steps: int) -> None:
             )
 
 
+TurningRate = Annotated[float, Range(-2.0, 2.0)]
+
+
 @dataclass(frozen=True)
 class Course(Checked):
     """Where a free robot goes, and how wide it steps.
 
     Attributes:
         turning_rate: of the heading, to the left positive [rad/s].
+        turns: times [s] and the turning rate [rad/s] from each of them on; the times rise.
         step_width: distance aside between left and right footholds [m]; None: the one of the
             embedding's options, by the robot's size.
     """
 
-    turning_rate: Annotated[float, Range(-2.0, 2.0)] = 0.0
+    turning_rate: TurningRate = 0.0
     step_width: Positive | None = None
+    turns: tuple[tuple[NotNegative, TurningRate], ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        times = [time for time, _ in self.turns]
+        if sorted(set(times)) != times:
+            raise ParameterError(f"Course.turns has the times {times}: give rising ones")
+
+    def rate(self, time: float) -> float:
+        """Turning rate at a time [rad/s].
+
+        Args:
+            time: from the run's start [s].
+        """
+        return next((rate for at, rate in reversed(self.turns) if time >= at), self.turning_rate)
 
 
 @dataclass(frozen=True)

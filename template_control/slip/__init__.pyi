@@ -55,7 +55,6 @@ from .lateral.cycle import LateralWish as LateralWish
 from .lateral.cycle import lateral_cycle as lateral_cycle
 from .lateral.gait import LateralGait as LateralGait
 from .lateral.gait import lateral_gait as lateral_gait
-from .lateral.heading import Heading as Heading
 from .lateral.learnt import LateralLearnt as LateralLearnt
 from .lateral.options import LateralLearningOptions as LateralLearningOptions
 from .lateral.options import LateralOptions as LateralOptions

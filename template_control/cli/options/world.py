@@ -13,7 +13,7 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.terrain.spec import terrain_from
-from template_control.run.options import Push, SimulationOptions
+from template_control.run.options import Course, Push, SimulationOptions
 from template_control.run.simulation import STEPS
 
 _PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions, IdealOptions)}
@@ -105,9 +105,10 @@ def add_course_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--turn`` and ``--step-width``, which go with ``--free``."""
     parser.add_argument(
         "--turn",
-        type=float,
-        metavar="RAD/S",
-        help="turning rate of a free robot's heading, to the left positive",
+        action="append",
+        metavar="RATE[@TIME]",
+        help="turning rate of a free robot's heading in rad/s, to the left positive; with a time in"
+        " s, from then on. May be given several times",
     )
     parser.add_argument(
         "--step-width",
@@ -164,9 +165,7 @@ def simulation_choice(
     if getattr(options, "free", None) and not isinstance(tuning, FreeOptions):
         tuning = FreeOptions()
     given["embedding"] = replace(tuning, **_without_none(embedding))
-    course = {"turning_rate": "turn", "step_width": "step_width"}
-    wanted = {name: getattr(options, option, None) for name, option in course.items()}
-    given["course"] = replace(base.course, **_without_none(wanted))
+    given["course"] = _course(options, base.course)
     if options.push is not None:
         given["pushes"] = tuple(map(_push, options.push))
     given["delay"] = options.delay
@@ -191,6 +190,23 @@ def _plant(options: argparse.Namespace, base: SimulationOptions) -> PlantOptions
         if options.terrain is not None:
             plant = replace(plant, ground_step=None)  # the file's, which this one replaces
     return replace(plant, **_without_none(given))
+
+
+def _course(options: argparse.Namespace, base: Course) -> Course:
+    wanted: dict[str, Any] = {"step_width": getattr(options, "step_width", None)}
+    turns = [_turn(text) for text in getattr(options, "turn", None) or ()]
+    if turns:
+        wanted["turning_rate"] = next((rate for time, rate in turns if time is None), 0.0)
+        wanted["turns"] = tuple((time, rate) for time, rate in turns if time is not None)
+    return replace(base, **_without_none(wanted))
+
+
+def _turn(text: str) -> tuple[float | None, float]:
+    rate, at, time = text.partition("@")
+    try:
+        return (float(time) if at else None), float(rate)
+    except ValueError:
+        raise ParameterError(f"--turn {text}: give RATE or RATE@TIME, such as -0.2@10") from None
 
 
 def _without_none(values: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,8 @@ their third direction.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from math import cos, isfinite, sin
 
 import numpy as np
@@ -67,6 +69,7 @@ class FreeController(EmbeddingController):
         self.sideways = Sideways(self.parameters, unscaled.lateral, wish)
         self._state = (robot.neutral(), np.zeros(robot.nv))
         self._contact = np.zeros(2, dtype=bool)
+        self.turning: Callable[[float], float] = lambda time: 0.0
 
     def start(self, rear: int = 0, swung: tuple[float, float] | None = None) -> None:
         """As :meth:`~template_control.embedding.controller.EmbeddingController.start`."""
@@ -100,6 +103,8 @@ class FreeController(EmbeddingController):
             if sideways.wish.turn:
                 self._turn(sideways.wish.turn, self.robot.space.foot[stance, :2].copy())
         super()._decide(section)
+        turn = self.turning(self.time) * self.planner.gait.step_duration
+        sideways.wish = replace(sideways.wish, turn=turn)
         sideways.walk(self.planner.gait)
         sideways.aim(SIDES[stance])
         sideways.expect(self.planning.due(Event.TOUCHDOWN))

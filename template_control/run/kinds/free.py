@@ -83,8 +83,9 @@ class Free(Kind):
         sideways, course = controller.sideways, o.course
         sideways.wish = LateralWish(
             course.step_width or sideways.wish.width,
-            turn=course.turning_rate * planner.gait.step_duration,
+            turn=course.rate(0.0) * planner.gait.step_duration,
         )
+        controller.turning = course.rate
         sideways.reset(planner.gait)
         away, drift = sideways.cycle.states[SIDES[_REAR].row]
         width = sideways.wish.width

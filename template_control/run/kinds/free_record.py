@@ -31,7 +31,7 @@ _LAYOUT = storage.Layout(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FreeRecord(Record):
     """A run of a robot that nothing holds.
 
