@@ -15,7 +15,8 @@ from template_control.cli.main import main
 from template_control.cli.trials import campaign as command
 from template_control.errors import ParameterError
 from template_control.robustness import Campaign, Conditions, Draw, Mix, Trial, first_wrong
-from template_control.run.config import RobotChoice, RunConfig
+from template_control.run.choices.robot import RobotChoice
+from template_control.run.config import RunConfig
 from template_control.run.record import Record
 from template_control.view.trials.campaign_figure import campaign_figure
 

@@ -15,7 +15,10 @@ import template_control as tc
 from template_control import settings
 from template_control.cli.main import main
 from template_control.cli.options.config import prepared
-from template_control.run.config import GaitChoice, OwnPlanner, RobotChoice, RunConfig
+from template_control.run.choices.gait import GaitChoice
+from template_control.run.choices.planner import OwnPlanner
+from template_control.run.choices.robot import RobotChoice
+from template_control.run.config import RunConfig
 from template_control.run.record import Record
 from template_control.slip import Slot
 

@@ -15,7 +15,8 @@ from template_control.cli.options.world import (
 )
 from template_control.cli.walk import report
 from template_control.embedding.planners.running import RunningOptions
-from template_control.run.config import GaitChoice, RunConfig
+from template_control.run.choices.gait import GaitChoice
+from template_control.run.config import RunConfig
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

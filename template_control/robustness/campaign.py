@@ -24,7 +24,9 @@ from template_control.robustness.first_wrong import first_wrong
 from template_control.robustness.ladder import off_gait
 from template_control.robustness.mix import Draw, Mix
 from template_control.robustness.wilson import wilson_interval
-from template_control.run.config import GaitChoice, Ready, RobotChoice, RunConfig
+from template_control.run.choices.gait import GaitChoice
+from template_control.run.choices.robot import RobotChoice
+from template_control.run.config import Ready, RunConfig
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.sensing import SensorOptions
 from template_control.slip.similarity import Scale

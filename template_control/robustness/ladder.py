@@ -26,7 +26,9 @@ from template_control.robustness.disturbances import (
     Situation,
 )
 from template_control.robustness.fingerprint import fingerprint
-from template_control.run.config import GaitChoice, RobotChoice, RunConfig
+from template_control.run.choices.gait import GaitChoice
+from template_control.run.choices.robot import RobotChoice
+from template_control.run.config import RunConfig
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate

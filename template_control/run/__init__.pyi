@@ -1,6 +1,6 @@
-from .config import GaitChoice as GaitChoice
-from .config import OwnPlanner as OwnPlanner
-from .config import RobotChoice as RobotChoice
+from .choices.gait import GaitChoice as GaitChoice
+from .choices.planner import OwnPlanner as OwnPlanner
+from .choices.robot import RobotChoice as RobotChoice
 from .config import RunConfig as RunConfig
 from .data_frame import columns as columns
 from .kinds.any_record import load_record as load_record

@@ -11,7 +11,8 @@ from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.errors import ParameterError
-from template_control.run.config import GaitChoice, OwnPlanner, PlannerChoice
+from template_control.run.choices.gait import GaitChoice
+from template_control.run.choices.planner import OwnPlanner, PlannerChoice
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.scenario import Scenario, load_scenario
 

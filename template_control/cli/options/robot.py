@@ -9,7 +9,7 @@ from typing import Any
 
 from template_control.errors import ParameterError
 from template_control.robot.library import ROBOTS
-from template_control.run.config import RobotChoice
+from template_control.run.choices.robot import RobotChoice
 
 _DEFAULT = RobotChoice().model
 

@@ -26,7 +26,8 @@ from template_control.robustness.campaign import (
     save_falls,
 )
 from template_control.robustness.mix import Mix
-from template_control.run.config import GaitChoice, RobotChoice
+from template_control.run.choices.gait import GaitChoice
+from template_control.run.choices.robot import RobotChoice
 from template_control.storage import Files, writable, write_text
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console

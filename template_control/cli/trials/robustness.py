@@ -21,7 +21,7 @@ from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.library import load_robot
 from template_control.robustness.disturbances import AFTER, DISTURBANCES
 from template_control.robustness.ladder import SETTLED, Finding, Robustness, measure
-from template_control.run.config import GaitChoice
+from template_control.run.choices.gait import GaitChoice
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writable
 from template_control.sweep.executor import workers

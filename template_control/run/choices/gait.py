@@ -1,0 +1,89 @@
+"""Which gait a robot keeps, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from template_control.checks.checked import Checked
+from template_control.embedding.robot_template import (
+    default_gait,
+    paper_gait,
+    robot_gait_for_speed,
+    template_for,
+)
+from template_control.errors import ParameterError
+from template_control.robot.biped import Biped
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.mean_speed import gait_for_speed
+from template_control.slip.gaits.running_gait import RunningGait, running_gait
+from template_control.slip.similarity import REFERENCE
+
+_GAIT_NUMBERS = {
+    "walk": ("speed", "touchdown_angle"),
+    "paper": (),
+    "run": ("speed", "apex_height"),
+}
+_RUN = 3.0 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length))
+
+
+@dataclass(frozen=True)
+class GaitChoice(Checked):
+    """Which gait of the robot's template.
+
+    Attributes:
+        name: "walk", the robot's own; "paper", the equilibrium of Section IV-D; or "run".
+        speed: of a walk the mean forward speed, instead of its own; of a run dx/dt at apex
+            [m/s]; None: 3 m/s for l0 = 1 m.
+        touchdown_angle: of a walk, from the ground to the leg, instead of its own [deg].
+        apex_height: of a run [m]; None: one that suits its speed.
+
+    Raises:
+        ParameterError: if a gait is given what it does not have.
+    """
+
+    name: Literal["walk", "paper", "run"] = "walk"
+    speed: float | None = None
+    touchdown_angle: float | None = None
+    apex_height: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("speed", "touchdown_angle", "apex_height"):
+            if getattr(self, name) is not None and name not in _GAIT_NUMBERS[self.name]:
+                words = name.replace("_", " ")
+                raise ParameterError(f"{words} does not go with gait {self.name}: leave one out")
+
+    def of(self, robot: Biped, torque_scale: float = 1.0) -> WalkingGait | RunningGait:
+        """The gait on a robot's template.
+
+        Args:
+            robot: its last update is overwritten.
+            torque_scale: share of the URDF's torque limits that may be used.
+
+        Raises:
+            GaitError: if the template has no such gait, or it is too slow or fast for the robot.
+        """
+        if self.name == "run":
+            return running_gait(template_for(robot), self.run_speed(robot), self.apex_height)
+        if self.name == "paper":
+            return paper_gait(template_for(robot))
+        angle = None if self.touchdown_angle is None else float(np.radians(self.touchdown_angle))
+        if self.speed is not None and angle is None:
+            return robot_gait_for_speed(robot, self.speed, torque_scale)
+        if self.speed is not None:
+            return gait_for_speed(template_for(robot), self.speed, touchdown_angle=angle)
+        return default_gait(robot, angle)
+
+    def run_speed(self, robot: Biped) -> float:
+        """Of a run, dx/dt at apex [m/s].
+
+        Args:
+            robot: its last update is overwritten.
+        """
+        if self.speed is not None:
+            return self.speed
+        template = template_for(robot)
+        return _RUN * float(np.sqrt(template.gravity * template.rest_length))
