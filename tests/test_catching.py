@@ -11,6 +11,7 @@ from template_control.cli.main import main
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import BreakingPlanner, Free
 from template_control.embedding.planning.replan_options import ReplanOptions
+from template_control.embedding.robot_route import robot_route
 from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.stride_planning import StridePlanning
@@ -223,8 +224,9 @@ def test_a_walk_of_a_scenario_runs_and_walks_on():
     segments = (Segment("walk", 1.1, steps=7),)
     scenario = Scenario(segments=segments, start=(1.1, 0.978, 0.0), map_kind=tc.MapKind.EXACT)
     robot = tc.load_robot("five-link")
+    route = robot_route(robot, scenario, push_off=False)  # steps with push-off know no run
     pushes = (tc.Push(60.0, step=2, phase=0.3),)
-    record = tc.simulate(robot, scenario, tc.SimulationOptions(pushes=pushes))
+    record = tc.simulate(robot, route, tc.SimulationOptions(pushes=pushes))
     assert record.metadata["arrived"]
     found = kinds(record)
     runs = found.count("r")
@@ -232,7 +234,7 @@ def test_a_walk_of_a_scenario_runs_and_walks_on():
     assert found == ["w"] * 2 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * 4, "caught, it is a step"
     fallen = tc.simulate(
         robot,
-        scenario,
+        route,
         tc.SimulationOptions(pushes=pushes, embedding=tc.EmbeddingOptions(catches=False)),
     )
     assert set(kinds(fallen)) == {"w"}

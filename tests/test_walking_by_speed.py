@@ -163,7 +163,7 @@ def test_robots_walk_where_they_could_not(name, speed):
     record = tc.simulate(robot, LqrPlanner(gait), tc.SimulationOptions(steps=30, record_every=5))
     assert (record.steps, record.fell) == (30, False)
     last = record.section_state[-10:].mean(axis=0) - gait.vlo
-    assert np.all(np.abs(last) < [0.01, 0.003, 0.02])
+    assert np.all(np.abs(last) < [0.02, 0.003, 0.04])
 
 
 def test_a_robot_s_range_is_its_own_and_the_rest_is_refused(capsys, tmp_path):

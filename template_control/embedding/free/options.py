@@ -11,13 +11,9 @@ from template_control.embedding.free.phases import FREE_PHASES
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PhaseControl
 from template_control.embedding.planners.lqr import LqrOptions
-from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.lateral.options import LateralOptions
 from template_control.slip.similarity import LENGTH, tuned
-
-# The foot has to move aside too, and is not asked to be high for longer.
-_SWING = SwingOptions(clearance=0.05, rise=0.5, descent=None, early=0.01)
 
 
 @dataclass(frozen=True)
@@ -28,7 +24,6 @@ class FreeOptions(EmbeddingOptions):
 
     Attributes:
         phases: tasks, clock, feet and learners of each phase.
-        swing: shape of the swing.
         catches: a free robot has no run to break into.
         lateral: how the feet are placed sideways.
         step_width: distance aside between left and right footholds [m]. Wider, and the
@@ -39,7 +34,6 @@ class FreeOptions(EmbeddingOptions):
 
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(FREE_PHASES))
     catches: bool = tuned(False)
-    swing: SwingOptions = field(default_factory=lambda: _SWING)
     lateral: LateralOptions = field(default_factory=LateralOptions)
     step_width: Positive = tuned(0.22, LENGTH)
 

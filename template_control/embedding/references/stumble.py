@@ -23,14 +23,15 @@ class StumbleOptions(Checked):
             comes from a wall: from ground to stand on it is the friction coefficient's at most.
         force: share of the weight that a wall's force has at least.
         linger: the wall counts for this long after its last force [s].
-        sinking: a foot that still comes down faster than this has grazed an edge [m/s].
+        sinking: a foot that still comes down faster than this has grazed an edge [m/s]. A swing
+            ends with 0.2 m/s (``SwingOptions.landing_speed``).
         graze: a contact that lasts longer than this is none that grazes [s].
     """
 
     steepness: Positive = tuned(1.0)
     force: NotNegative = tuned(0.02)
     linger: NotNegative = tuned(0.015, TIME)
-    sinking: NotNegative = tuned(0.1, SPEED)
+    sinking: NotNegative = tuned(0.3, SPEED)
     graze: NotNegative = tuned(0.004, TIME)
 
 
