@@ -234,7 +234,7 @@ def test_a_walk_of_a_scenario_runs_and_walks_on():
     assert found == ["w"] * 2 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * 4, "caught, it is a step"
     fallen = tc.simulate(
         robot,
-        route,
+        robot_route(robot, scenario, push_off=False),
         tc.SimulationOptions(pushes=pushes, embedding=tc.EmbeddingOptions(catches=False)),
     )
     assert set(kinds(fallen)) == {"w"}

@@ -180,4 +180,4 @@ def test_nothing_that_cannot_be_written_down_loses_a_run(robot, default_gait):
     record = tc.simulate(
         robot, tc.LqrPlanner(default_gait), tc.SimulationOptions(steps=1, embedding=options)
     )
-    assert record.metadata["options"]["embedding"]["swing"]["clearance"] == 0.06
+    assert record.metadata["options"]["embedding"]["swing"]["clearance"] == 0.05

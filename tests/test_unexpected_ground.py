@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding import GuardOptions, StumbleOptions
+from template_control.embedding import HIGH_SWING, GuardOptions, StumbleOptions
 from template_control.embedding.guards import RobotGuards
 from template_control.embedding.planners.planner import Decision
 from template_control.embedding.planning.unexpected_ground import (
@@ -102,7 +102,9 @@ def test_a_step_up_right_before_a_foothold_is_climbed(default_gait, place):
     """The foot came down in front of the wall, or lifted off right behind it."""
     gait = default_gait
     plant = tc.PlantOptions(terrain=tc.Terrain.step(0.03, place * gait.step_length))
-    options = tc.SimulationOptions(steps=12, plant=plant)
+    options = tc.SimulationOptions(
+        steps=12, plant=plant, embedding=tc.EmbeddingOptions(swing=HIGH_SWING)
+    )
     record = tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(gait), options)
     assert not record.fell
     assert record.foot[-1, :, 1].min() > 0.029

@@ -37,6 +37,7 @@ from .references.apex_pose import ApexStart as ApexStart
 from .references.apex_pose import apex_pose as apex_pose
 from .references.leg_forces import UnloadOptions as UnloadOptions
 from .references.stumble import StumbleOptions as StumbleOptions
+from .references.swing_foot import HIGH_SWING as HIGH_SWING
 from .references.swing_foot import SwingOptions as SwingOptions
 from .references.template_path import PathOptions as PathOptions
 from .robot_route import robot_route as robot_route
