@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions, quintic_step
+from template_control.embedding.references.swing_foot import (
+    HIGH_SWING,
+    SwingFoot,
+    SwingOptions,
+    quintic_step,
+)
 
 
 def test_quintic_arrives():
@@ -63,7 +68,7 @@ def test_swing_falls_to_ground_that_comes_late():
 
 
 def test_a_foot_is_high_while_it_travels():
-    options = SwingOptions()
+    options = HIGH_SWING
     swing = SwingFoot(options)
     swing.start(np.array([-0.6, 0.0]), np.zeros(2))
     places, heights = [], []
