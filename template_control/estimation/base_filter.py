@@ -112,16 +112,12 @@ class BaseFilter:
         robot = self.robot
         robot.update(q, np.zeros_like(q))
         for foot in np.flatnonzero(contact):
-            rolled = robot.foot_radius * self._foot_angle(q, int(foot))
+            rolled = robot.foot_radius * float(robot.foot_turning[foot] @ q)
             place = robot.foot_position[foot] - np.array([rolled, 0.0])
             slope = np.zeros((2, _SIZE))
             slope[:, :3] = robot.foot_jacobian[foot, :, :3]
             self._take(int(foot), place, slope)
         self._stands[:] = contact
-
-    def _foot_angle(self, q: Array, foot: int) -> float:
-        leg = list(self.robot.legs[foot])
-        return float(q[_PITCH] + self.robot.joint_sign[leg] @ q[3:][leg])
 
     def _take(self, foot: int, place: Array, slope: Array) -> None:
         here = slice(5 + 2 * foot, 7 + 2 * foot)

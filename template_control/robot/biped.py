@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from template_control.errors import ParameterError
+
 Array = NDArray[np.float64]
+
+_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 class Biped(ABC):
@@ -20,6 +25,7 @@ class Biped(ABC):
 
     Attributes (constant):
         base_dof: unactuated degrees of freedom, the first ones.
+        base_joints: Pinocchio's joints that they belong to.
         directions: rows of a contact: 2 in the plane, 3 in space. The last one is up.
         name: the URDF's robot name.
         path: the URDF file.
@@ -58,6 +64,7 @@ class Biped(ABC):
     """
 
     base_dof: int
+    base_joints: int
     directions: int
     name: str
     path: Path
@@ -95,9 +102,59 @@ class Biped(ABC):
     joint_velocity: Array
     fastest: float
 
+    def __init__(
+        self,
+        path: Path,
+        urdf: str,
+        model: pin.Model,
+        feet: tuple[str, str],
+        foot_radius: float,
+        walk: tuple[float, float] | None = None,
+    ) -> None:
+        self.path, self.urdf, self.model, self.name = path, urdf, model, model.name
+        self.feet, self.foot_radius, self.walk = feet, foot_radius, walk
+        self.nq, self.nv = model.nq, model.nv
+        self.mass = float(pin.computeTotalMass(model))
+        self.gravity = float(-model.gravity.linear[2])
+        first = 1 + self.base_joints
+        self.joint_names = tuple(model.names)[first:]
+        self.torque_limit = np.array(model.effortLimit[self.base_dof :])
+        self.velocity_limit = np.array(model.velocityLimit[self.base_dof :])
+        self._foot_ids = tuple(model.getFrameId(foot) for foot in feet)
+        self._leg_joints = leg_joints(model, feet, self.base_joints)
+        self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
+        self._data = data = model.createData()
+        # Pinocchio keeps these arrays in place, so the views stay good.
+        self.mass_matrix, self.nonlinear_effects = data.M, data.nle
+        self._joint_places = [data.oMi[j].translation for j in range(first, model.njoints)]
+
     def __repr__(self) -> str:
         joints = ", ".join(self.joint_names)
         return f"<{type(self).__name__} {self.name}: {self.mass:.4g} kg, joints {joints}>"
+
+    def _compute(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Let Pinocchio compute all at (q, v).
+
+        Returns:
+            Of each foot's frame the (6,) classical acceleration dJ/dt v, linear then angular, in
+            the world's axes [m/s^2, rad/s^2].
+        """
+        model, data = self.model, self._data
+        pin.computeAllTerms(model, data, q, v)
+        pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
+        left, right = self._foot_ids
+        pin.updateFramePlacement(model, data, left)
+        pin.updateFramePlacement(model, data, right)
+        return (
+            pin.getFrameClassicalAcceleration(model, data, left, _WORLD_ALIGNED).vector,
+            pin.getFrameClassicalAcceleration(model, data, right, _WORLD_ALIGNED).vector,
+        )
+
+    def _check_finite(self, finite: bool, q: Array, v: Array) -> None:
+        if not finite:
+            raise ParameterError(
+                f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
+            )
 
     @abstractmethod
     def update(self, q: Array, v: Array) -> None:
@@ -161,3 +218,30 @@ def sagittal_length(placement: pin.SE3) -> float:
     """
     translation = placement.translation
     return float(np.hypot(translation[0], translation[2]))
+
+
+def leg_joints(model: pin.Model, feet: Sequence[str], base_joints: int) -> list[list[int]]:
+    """Pinocchio's joints that move each foot and not the base, from the hip on.
+
+    Args:
+        model: of the robot.
+        feet: names of the two foot frames.
+        base_joints: the first joints, which move the base.
+    """
+    parents = (model.frames[model.getFrameId(foot)].parentJoint for foot in feet)
+    return [[j for j in model.supports[parent] if j > base_joints] for parent in parents]
+
+
+def carrying(model: pin.Model, frames: Sequence[int]) -> Array:
+    """Which velocities move each foot: (2, nv), 1 where one does, else 0.
+
+    Args:
+        model: of the robot.
+        frames: of the two feet.
+    """
+    carries = np.zeros((len(frames), model.nv))
+    for row, frame in zip(carries, frames, strict=True):
+        for joint in model.supports[model.frames[frame].parentJoint]:
+            first = model.idx_vs[joint]
+            row[first : first + model.nvs[joint]] = 1.0
+    return carries

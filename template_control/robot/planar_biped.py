@@ -16,12 +16,19 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.errors import ParameterError, RobotError
-from template_control.robot.biped import Biped, sagittal_length
+from template_control.errors import RobotError
+from template_control.robot.biped import Biped, leg_joints, sagittal_length
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planar_terms import PlanarTerms, gather, sources
 from template_control.robot.planarise import planarise
-from template_control.robot.requirements import BASE_DOF, check_hips, check_planar, foot_radius_of
+from template_control.robot.requirements import (
+    BASE_DOF,
+    check_feet,
+    check_hips,
+    check_legs_apart,
+    check_planar,
+    foot_radius_of,
+)
 from template_control.robot.urdf import (
     build_model,
     check_bodies,
@@ -33,7 +40,6 @@ from template_control.robot.urdf import (
 Array = NDArray[np.float64]
 
 _PITCH = 2  # place of the trunk's pitch in q
-_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 class PlanarBiped(Biped):
@@ -52,9 +58,11 @@ class PlanarBiped(Biped):
 
     Attributes:
         joint_sign: (nv - 3,) 1 where a joint turns about +y, -1 where it does about -y.
+        foot_turning: (2, nv) maps v to each foot's angular velocity, forward positive; and q to
+            its angle.
     """
 
-    base_dof = BASE_DOF
+    base_dof = base_joints = BASE_DOF
     directions = 2
 
     def __init__(
@@ -66,41 +74,20 @@ class PlanarBiped(Biped):
         foot_radius: float,
         walk: tuple[float, float] | None = None,
     ) -> None:
-        self.path = path
-        self.urdf = urdf
-        self.model = model
-        self.name: str = model.name
-        self.feet = feet
-        self.foot_radius = foot_radius
-        self.walk = walk
-        self.nq, self.nv = model.nq, model.nv
-        self.mass = float(pin.computeTotalMass(model))
-        self.gravity = float(-model.gravity.linear[2])
-        self.joint_names: tuple[str, ...] = tuple(model.names)[1 + BASE_DOF :]
-        self.torque_limit: Array = np.array(model.effortLimit[BASE_DOF:])
-        self.velocity_limit: Array = np.array(model.velocityLimit[BASE_DOF:])
-        self._foot_ids = tuple(model.getFrameId(f) for f in feet)
-        self.legs: tuple[tuple[int, ...], ...] = tuple(
-            tuple(j - BASE_DOF - 1 for j in model.supports[parent] if j > BASE_DOF)
-            for parent in (model.frames[f].parentJoint for f in self._foot_ids)
-        )
+        super().__init__(path, urdf, model, feet, foot_radius, walk)
         self.leg_length = min(
-            sum(sagittal_length(model.jointPlacements[j + 1 + BASE_DOF]) for j in leg[1:])
+            sum(sagittal_length(model.jointPlacements[j]) for j in leg[1:])
             + sagittal_length(model.frames[foot].placement)
-            for leg, foot in zip(self.legs, self._foot_ids, strict=True)
+            for leg, foot in zip(self._leg_joints, self._foot_ids, strict=True)
         )
         axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
         self.joint_sign: Array = np.array(axes[BASE_DOF:])
         self.trunk_com = float(model.inertias[BASE_DOF].lever[2])
-        self._data = model.createData()
-        data = self._data
-        # Pinocchio keeps these arrays in place, so the views stay good.
-        self.mass_matrix: Array = data.M
-        self.nonlinear_effects: Array = data.nle
-        self._joint_places = [
-            data.oMi[joint].translation for joint in range(1 + BASE_DOF, self.nv + 1)
-        ]
-        self._sources = sources(model, data, self._foot_ids, foot_radius)
+        self.foot_turning: Array = np.zeros((2, self.nv))
+        self.foot_turning[:, _PITCH] = 1.0
+        for row, leg in zip(self.foot_turning, self.legs, strict=True):
+            row[[BASE_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
+        self._sources = sources(model, self._data, self._foot_ids, foot_radius)
         terms = PlanarTerms.zeros(self.nv)
         self._terms = tuple(terms)
         self.com, self.com_velocity, self.com_bias = terms[:3]
@@ -166,16 +153,13 @@ class PlanarBiped(Biped):
                     " too, or leave it out"
                 )
         check_bodies(path, tree, model, BASE_DOF)
-        if len(feet) != 2:
-            raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
-        for foot in feet:
-            if not model.existFrame(foot):
-                links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
-                raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
-        hinges = [model.supports[model.frames[model.getFrameId(f)].parentJoint] for f in feet]
-        if set(hinges[0]) & set(hinges[1]) != set(range(BASE_DOF + 1)):
-            raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")
-        check_hips(path, model, [hinge[BASE_DOF + 1] for hinge in hinges])
+        check_feet(path, model, feet)
+        legs = leg_joints(model, feet, cls.base_joints)
+        check_legs_apart(path, feet, legs)
+        for foot, leg in zip(feet, legs, strict=True):
+            if not leg:
+                raise RobotError(f"{path}: foot {foot!r} hangs on no leg: name the link at its end")
+        check_hips(path, model, [leg[0] for leg in legs])
         radius = foot_radius_of(path, urdf, model, feet)
         return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
 
@@ -189,23 +173,10 @@ class PlanarBiped(Biped):
         Raises:
             ParameterError: if a value is NaN or infinite.
         """
-        model, data = self.model, self._data
-        pin.computeAllTerms(model, data, q, v)
-        pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
-        left, right = self._foot_ids
-        pin.updateFramePlacement(model, data, left)
-        pin.updateFramePlacement(model, data, right)
-        drift = (
-            pin.getFrameClassicalAcceleration(model, data, left, _WORLD_ALIGNED).vector,
-            pin.getFrameClassicalAcceleration(model, data, right, _WORLD_ALIGNED).vector,
-        )
         finite, self.angular_momentum, self.angular_momentum_bias, self.fastest = gather(
-            self._sources, q, v, drift, self._terms
+            self._sources, q, v, self._compute(q, v), self._terms
         )
-        if not finite:
-            raise ParameterError(
-                f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
-            )
+        self._check_finite(finite, q, v)
         np.matmul(self.foot_jacobian, v, out=self.foot_velocity)
 
     def neutral(self) -> Array:

@@ -14,6 +14,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
+from template_control.robot.biped import carrying
 from template_control.robot.requirements import BASE_DOF
 
 Array = NDArray[np.float64]
@@ -69,15 +70,11 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float)
         frames: of the two feet.
         radius: of the foot spheres [m].
     """
-    parents = [model.frames[frame].parentJoint for frame in frames]
-    carries = np.zeros((len(frames), model.nv))
-    for row, parent in zip(carries, parents, strict=True):
-        row[[joint - 1 for joint in model.supports[parent] if joint > 0]] = 1.0
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.nle, data.g)
     jacobians = (data.Jcom, data.Ag, data.J)
     feet = tuple(data.oMf[frame].translation for frame in frames)
     limit = np.array(model.velocityLimit[BASE_DOF:])
-    return (*whole, *jacobians), feet, (carries, np.array([radius]), limit)
+    return (*whole, *jacobians), feet, (carrying(model, frames), np.array([radius]), limit)
 
 
 @compiled

@@ -121,3 +121,37 @@ def foot_radius_of(path: Path, urdf: str, model: pin.Model, feet: Sequence[str])
     if len(radii) != 1:
         raise RobotError(f"{path}: the feet have different radii {sorted(radii)}")
     return radii.pop()
+
+
+def check_feet(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
+    """Check that two feet are named, and are there.
+
+    Args:
+        path: of the URDF, for the message.
+        model: of the robot.
+        feet: names of the foot links.
+
+    Raises:
+        RobotError: naming the foot that is not.
+    """
+    if len(feet) != 2:
+        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
+    for foot in feet:
+        if not model.existFrame(foot):
+            links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
+            raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
+
+
+def check_legs_apart(path: Path, feet: Sequence[str], legs: Sequence[Sequence[int]]) -> None:
+    """Check that each foot has a leg of its own.
+
+    Args:
+        path: of the URDF, for the message.
+        feet: names of the two foot links.
+        legs: joints of each.
+
+    Raises:
+        RobotError: if they share a joint.
+    """
+    if set(legs[0]) & set(legs[1]):
+        raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")

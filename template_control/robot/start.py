@@ -117,14 +117,10 @@ def _configuration(robot: PlanarBiped, pose: Pose, longest: float) -> Array:
         rows = np.zeros((_OUTPUTS, robot.nv))
         rows[0:2] = robot.com_jacobian
         rows[2, 2] = 1.0
-        r = robot.foot_radius
         for i, foot in enumerate((stance, swing)):
             rows[3 + 2 * i : 5 + 2 * i] = robot.foot_jacobian[foot]
             # The lowest point's path, not that of the material point which touches there.
-            rows[3 + 2 * i, 2] += r
-            rows[3 + 2 * i, [BASE_DOF + j for j in robot.legs[foot]]] += (
-                r * robot.joint_sign[[*robot.legs[foot]]]
-            )
+            rows[3 + 2 * i] += robot.foot_radius * robot.foot_turning[foot]
         return rows
 
     for _ in range(50):

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from template_control.plant.terrain.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.requirements import BASE_DOF
 
 Array = NDArray[np.float64]
 
@@ -30,11 +29,6 @@ class RollingFeet:
         self._terrain = terrain
         self._axes = np.tile(np.eye(2), (2, 1, 1))  # by foot: along its plane, and out of it
         self._anchor = np.zeros((2, 2))  # where each foot holds, along both axes
-        self._turns = np.zeros((2, robot.nv))  # maps v to each foot's angular velocity
-        for foot, leg in enumerate(robot.legs):
-            joints = [BASE_DOF + joint for joint in leg]
-            self._turns[foot, BASE_DOF - 1] = 1.0
-            self._turns[foot, joints] = robot.joint_sign[list(leg)]
 
     def gaps(self) -> Array:
         """(2,) distance of each foot from the ground, negative where it is inside [m]."""
@@ -52,13 +46,10 @@ class RollingFeet:
             foot: its index.
             q: (nv,) the robot's configuration.
         """
-        r = self._robot
-        centre = r.foot_position[foot] + np.array([0.0, r.foot_radius])
-        closest = self._terrain.closest(*centre.tolist())
+        closest = self._terrain.closest(*self._centre(foot).tolist())
         x, y = closest.normal
         self._axes[foot] = (y, -x), (x, y)
-        along, out = self._axes[foot] @ centre
-        self._anchor[foot] = along - self._rolled(foot, q), out - closest.distance
+        self._anchor[foot] = self._held(foot, q) - (0.0, closest.distance)
 
     def rows(self) -> tuple[Array, Array]:
         """Jacobians (2, 2, nv) of the material points that touch, along and out of the plane of
@@ -69,7 +60,7 @@ class RollingFeet:
         for foot, ((_, _), (x, y)) in enumerate(self._axes.tolist()):
             # From the sphere's lowest point, which the model tells, to the one that touches.
             arm = r.foot_radius * np.array([1.0 - y, x])
-            point = r.foot_jacobian[foot] + np.outer(arm, self._turns[foot])
+            point = r.foot_jacobian[foot] + np.outer(arm, r.foot_turning[foot])
             jacobian[foot] = self._axes[foot] @ point
         return jacobian, np.einsum("fij,fj->fi", self._axes, r.foot_bias)
 
@@ -80,10 +71,7 @@ class RollingFeet:
             foot: its index.
             q: (nv,) the robot's configuration.
         """
-        r = self._robot
-        centre = r.foot_position[foot] + np.array([0.0, r.foot_radius])
-        along, out = self._axes[foot] @ centre
-        return np.array((along - self._rolled(foot, q), out - r.foot_radius)) - self._anchor[foot]
+        return self._held(foot, q) - (0.0, self._robot.foot_radius) - self._anchor[foot]
 
     def in_world(self, force: Array) -> Array:
         """(2, 2) x and y of what is given along and out of each foot's plane.
@@ -93,6 +81,15 @@ class RollingFeet:
         """
         return np.einsum("fi,fij->fj", force, self._axes)
 
-    def _rolled(self, foot: int, q: Array) -> float:
-        """Distance that a foot's sphere has rolled by its angle [m]."""
-        return float(self._robot.foot_radius * (self._turns[foot] @ q))
+    def _centre(self, foot: int) -> Array:
+        r = self._robot
+        return np.asarray(r.foot_position[foot] + (0.0, r.foot_radius))
+
+    def _held(self, foot: int, q: Array) -> Array:
+        """(2,) where a sphere's centre is along its plane, less what it has rolled, and out of it.
+
+        Arguments as for :meth:`errors`.
+        """
+        r = self._robot
+        rolled = r.foot_radius * float(r.foot_turning[foot] @ q)
+        return np.asarray(self._axes[foot] @ self._centre(foot) - (rolled, 0.0))

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
-from template_control.errors import ParameterError
 from template_control.robot.biped import Biped, sagittal_length
 from template_control.robot.free.free_terms import BASE_DOF, FreeTerms, gather, sources
 from template_control.robot.free.requirements import check_free, set_limits
@@ -40,7 +39,6 @@ from template_control.robot.urdf import (
 
 Array = NDArray[np.float64]
 
-_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _POSITION = BASE_DOF + 1  # places in q before the joints
 _ROOT = 1  # Pinocchio's index of the free flyer
 
@@ -80,6 +78,7 @@ class FreeBiped(Biped):
     """
 
     base_dof = BASE_DOF
+    base_joints = _ROOT
     directions = 3
 
     def __init__(
@@ -91,37 +90,15 @@ class FreeBiped(Biped):
         foot_radius: float,
         walk: tuple[float, float] | None = None,
     ) -> None:
-        self.path = path
-        self.urdf = urdf
-        self.model = model
-        self.name = model.name
-        self.feet = feet
-        self.foot_radius = foot_radius
-        self.walk = walk
-        self.nq, self.nv = model.nq, model.nv
-        self.mass = float(pin.computeTotalMass(model))
-        self.gravity = float(-model.gravity.linear[2])
-        self.joint_names = tuple(model.names)[_ROOT + 1 :]
-        self.torque_limit = np.array(model.effortLimit[BASE_DOF:])
-        self.velocity_limit = np.array(model.velocityLimit[BASE_DOF:])
-        self._foot_ids = tuple(model.getFrameId(f) for f in feet)
-        joints = [
-            [j for j in model.supports[model.frames[f].parentJoint] if j > _ROOT]
-            for f in self._foot_ids
-        ]
-        self.legs = tuple(tuple(j - _ROOT - 1 for j in leg) for leg in joints)
+        super().__init__(path, urdf, model, feet, foot_radius, walk)
         self.leg_length = min(
             sagittal_length(model.jointPlacements[leg[-1]])
             + sagittal_length(model.frames[foot].placement)
-            for leg, foot in zip(joints, self._foot_ids, strict=True)
+            for leg, foot in zip(self._leg_joints, self._foot_ids, strict=True)
         )
-        self._data = model.createData()
         data = self._data
-        # Pinocchio keeps these arrays in place, so the views stay good.
-        self.mass_matrix, self.nonlinear_effects = data.M, data.nle
         self.rotation: Array = data.oMi[_ROOT].rotation
-        self._joint_places = [data.oMi[j].translation for j in range(_ROOT + 1, model.njoints)]
-        self._hips = [data.oMi[leg[-2]].translation for leg in joints]
+        self._hips = [data.oMi[leg[-2]].translation for leg in self._leg_joints]
         self._sources = sources(model, data, self._foot_ids, foot_radius)
         self.space = FreeTerms.zeros(self.nv)
         self._terms = tuple(self.space)
@@ -194,21 +171,10 @@ class FreeBiped(Biped):
 
     def update(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.robot.biped.Biped.update`."""
-        model, data = self.model, self._data
-        pin.computeAllTerms(model, data, q, v)
-        pin.centerOfMass(model, data)  # without q: data.a is dJ/dt v then
-        left, right = self._foot_ids
-        pin.updateFramePlacement(model, data, left)
-        pin.updateFramePlacement(model, data, right)
-        drift = (
-            pin.getFrameClassicalAcceleration(model, data, left, _WORLD_ALIGNED).vector,
-            pin.getFrameClassicalAcceleration(model, data, right, _WORLD_ALIGNED).vector,
+        finite, self.fastest = gather(
+            self._sources, q, v, self._compute(q, v), self._frame, self._terms
         )
-        finite, self.fastest = gather(self._sources, q, v, drift, self._frame, self._terms)
-        if not finite:
-            raise ParameterError(
-                f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
-            )
+        self._check_finite(finite, q, v)
         s = self.space
         self.angular_momentum, self.angular_momentum_bias = s.momentum[1], s.momentum_bias[1]
         np.matmul(s.foot_jacobian, v, out=self.contact_velocity)

@@ -13,6 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
+from template_control.robot.biped import carrying
 
 Array = NDArray[np.float64]
 
@@ -76,16 +77,11 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float)
         frames: of the two feet.
         radius: of the foot spheres [m].
     """
-    carries = np.zeros((len(frames), model.nv))
-    for row, frame in zip(carries, frames, strict=True):
-        for joint in model.supports[model.frames[frame].parentJoint]:
-            first = model.idx_vs[joint]
-            row[first : first + model.nvs[joint]] = 1.0
     vectors = (data.com[0], data.vcom[0], data.hg.vector, data.nle, data.g)
     matrices = (data.Jcom, data.Ag, data.J, data.oMi[1].rotation)
     feet = tuple(data.oMf[frame].translation for frame in frames)
     limit = np.array(model.velocityLimit[BASE_DOF:])
-    constants = (carries, np.array([radius, pin.computeTotalMass(model)]), limit)
+    constants = (carrying(model, frames), np.array([radius, pin.computeTotalMass(model)]), limit)
     return vectors, matrices, feet, constants
 
 

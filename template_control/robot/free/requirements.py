@@ -10,8 +10,9 @@ import numpy as np
 import pinocchio as pin
 
 from template_control.errors import RobotError
+from template_control.robot.biped import leg_joints
 from template_control.robot.free.free_terms import BASE_DOF
-from template_control.robot.requirements import UNLIMITED
+from template_control.robot.requirements import UNLIMITED, check_feet, check_legs_apart
 
 _LATERAL = 2  # hip and knee, the last joints of a leg
 _LEAST, _MOST = 3, 4  # joints of a leg
@@ -46,23 +47,14 @@ def check_free(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
     Raises:
         RobotError: naming the foot or the joint that is otherwise.
     """
-    if len(feet) != 2:
-        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
-    for foot in feet:
-        if not model.existFrame(foot):
-            links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
-            raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
+    check_feet(path, model, feet)
     for joint, name in list(zip(model.joints, model.names, strict=True))[2:]:
         if joint.nq != 1 or joint.nv != 1:
             raise RobotError(
                 f"{path}: joint {name!r} is {joint.shortname()}, and must be revolute with limits"
             )
-    legs = [
-        [j for j in model.supports[model.frames[model.getFrameId(foot)].parentJoint] if j > 1]
-        for foot in feet
-    ]
-    if set(legs[0]) & set(legs[1]):
-        raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")
+    legs = leg_joints(model, feet, 1)
+    check_legs_apart(path, feet, legs)
     axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[3:]
     for leg, foot in zip(legs, feet, strict=True):
         if not _LEAST <= len(leg) <= _MOST:
