@@ -56,7 +56,7 @@ class FreeBulletPlant(BulletPlant):
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.plant.plant.Plant.reset`."""
         p, c = pybullet, self.client
-        self._contacts = None
+        super().reset(q[_POSITION:], v[BASE_DOF:])
         trunk = _pose(q[:3], q[3:_POSITION])
         place = trunk * self._inertial
         quaternion = pin.Quaternion(place.rotation).coeffs().tolist()
@@ -66,13 +66,10 @@ class FreeBulletPlant(BulletPlant):
         linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:BASE_DOF]
         linear = linear + np.cross(angular, place.translation - trunk.translation)
         p.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=c)
-        for joint, position, velocity in zip(
-            self._actuated, q[_POSITION:], v[BASE_DOF:], strict=True
-        ):
-            p.resetJointState(self.body, joint, position, velocity, physicsClientId=c)
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.plant.plant.Plant.read`."""
+        super().read(q[_POSITION:], v[BASE_DOF:])
         p, c = pybullet, self.client
         position, quaternion = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
         linear, angular = p.getBaseVelocity(self.body, physicsClientId=c)
@@ -85,9 +82,6 @@ class FreeBulletPlant(BulletPlant):
         # Of the two quaternions of a rotation the one nearer to the last.
         near = float(coefficients @ q[3:_POSITION]) >= 0.0
         q[3:_POSITION] = coefficients if near else -coefficients
-        states = p.getJointStates(self.body, self._actuated, physicsClientId=c)
-        for i, state in enumerate(states):
-            q[_POSITION + i], v[BASE_DOF + i] = state[0], state[1]
 
 
 def _pose(position: Any, quaternion: Any) -> pin.SE3:
