@@ -13,9 +13,6 @@ from template_control.plant.bullet import PlantOptions
 
 Ends = tuple[float, float]
 
-_STILL = {"friction": PlantOptions().friction}
-"""Numbers that are not 0 where nothing disturbs."""
-
 
 @dataclass(frozen=True)
 class Draw(Checked):
@@ -35,7 +32,7 @@ class Draw(Checked):
 
     speed: float = 0.0
     height: float = 0.0
-    friction: float = _STILL["friction"]
+    friction: float = PlantOptions().friction
     mass: float = 0.0
     push: float = 0.0
     push_at: float = 0.0
@@ -118,10 +115,10 @@ class Mix(Checked):
         Raises:
             ParameterError: if a range then holds what cannot be, such as a friction below 0.
         """
-        ends = {
-            name: tuple(still + factor * (end - still) for end in getattr(self, name))
-            for name, still in ((name, _STILL.get(name, 0.0)) for name in _DRAWN)
-        }
+        ends = {}
+        for name in _DRAWN:
+            still = getattr(_STILL, name)
+            ends[name] = tuple(still + factor * (end - still) for end in getattr(self, name))
         return Mix(**ends, within=self.within, after=self.after)
 
     def severity(self, draw: Draw) -> float:
@@ -135,7 +132,7 @@ class Mix(Checked):
         """
         shares = []
         for name in _DRAWN:
-            (low, high), still = getattr(self, name), _STILL.get(name, 0.0)
+            (low, high), still = getattr(self, name), getattr(_STILL, name)
             away = getattr(draw, name) - still
             reach = (high if away > 0.0 else low) - still
             if low < high:
@@ -144,3 +141,4 @@ class Mix(Checked):
 
 
 _DRAWN = ("speed", "height", "friction", "mass", "push", "ground_step", "noise", "delay")
+_STILL = Draw()  # nothing disturbs

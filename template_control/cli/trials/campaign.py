@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 from rich.table import Table
 
 from template_control import settings
 from template_control.cli.options.ranges import check_ranges
 from template_control.cli.options.robot import add_robot_options, robot_choice
-from template_control.cli.report.output import INTERRUPTED
-from template_control.cli.trials.workers import add_workers, worker_count
+from template_control.cli.trials.common import (
+    add_gait,
+    add_printed,
+    add_workers,
+    draw,
+    kept,
+    worker_count,
+)
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robustness.campaign import (
     ASTRAY,
@@ -31,7 +35,6 @@ from template_control.run.choices.robot import RobotChoice
 from template_control.storage import Files, writable, write_text
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
-from template_control.view.figure_file import save_figure
 from template_control.view.trials.campaign_figure import campaign_figure
 
 _MIX = Mix()
@@ -51,10 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot_options(parser)
-    parser.add_argument("--gait", choices=("walk", "run"), default="walk", help="what it keeps")
-    parser.add_argument(
-        "--speed", type=float, metavar="M/S", help="of the gait, as walk or run take it"
-    )
+    add_gait(parser, "of the gait, as walk or run take it")
     parser.add_argument(
         "--plant", choices=("pybullet", "mujoco"), default="pybullet", help="physics engine"
     )
@@ -81,13 +81,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="folder for results, figure and falls; by default runs/campaign/ROBOT, with the"
         " gait's name if it is a run, and the engine's if it is not PyBullet",
     )
-    printed = parser.add_mutually_exclusive_group()
-    printed.add_argument(
-        "--json", action="store_true", help="print JSON, and nothing else, on stdout"
-    )
-    printed.add_argument(
-        "--markdown", action="store_true", help="print the table as Markdown on stdout"
-    )
+    add_printed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -112,16 +106,11 @@ def run(options: argparse.Namespace) -> int:
         with workers(count) as pool, stdout_to_stderr():
             found = run_campaign(conditions, options.trials, folder, pool)
     except KeyboardInterrupt:
-        print(
-            f"template-control: interrupted; finished trials are in {folder}, the same command"
-            " goes on from there",
-            file=sys.stderr,
-        )
-        return INTERRUPTED
+        return kept(folder)
     files = Files()
     files.write(lambda: _save_mix(conditions.mix, folder))
     falls = files.write(lambda: save_falls(found, folder)) or {}
-    figure = files.write(lambda: _draw(found, folder))
+    figure = files.write(lambda: draw(lambda: campaign_figure(found), folder / "campaign.png"))
     if options.json:
         print(json.dumps({**data(found, falls), "figure": None if figure is None else str(figure)}))
     elif options.markdown:
@@ -144,11 +133,6 @@ def _name(robot: str, conditions: Conditions) -> str:
 def _save_mix(mix: Mix, folder: Path) -> Path:
     head = "# template-control campaign --mix FILE draws from these ranges.\n"
     return write_text(folder / "mix.toml", head + settings.text(settings.to_table(mix)))
-
-
-def _draw(found: Campaign, folder: Path) -> Path:
-    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
-        return save_figure(campaign_figure(found), folder / "campaign.png")
 
 
 def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 from rich.table import Table
 
 from template_control.cli.options.gait import SPEEDS
 from template_control.cli.options.ranges import check_ranges
 from template_control.cli.options.robot import add_robot
-from template_control.cli.report.output import INTERRUPTED
-from template_control.cli.trials.workers import add_workers, worker_count
+from template_control.cli.trials.common import (
+    add_gait,
+    add_printed,
+    add_workers,
+    draw,
+    kept,
+    worker_count,
+)
 from template_control.errors import ParameterError
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.library import load_robot
@@ -26,7 +30,6 @@ from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writable
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
-from template_control.view.figure_file import save_figure
 from template_control.view.trials.robustness_figure import robustness_figure
 
 _NAMES = tuple(d.name for d in DISTURBANCES)
@@ -53,13 +56,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot(parser)
-    parser.add_argument("--gait", choices=("walk", "run"), default="walk", help="what it keeps")
-    parser.add_argument(
-        "--speed",
-        type=float,
-        metavar="M/S",
-        help="of a run at apex; 3 m/s for l0 = 1 m if not given",
-    )
+    add_gait(parser, "of a run at apex; 3 m/s for l0 = 1 m if not given")
     parser.add_argument(
         "--disturbance",
         action="append",
@@ -77,13 +74,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="folder for the trials and the figure; by default runs/robustness/ROBOT, of a run"
         " runs/robustness/ROBOT-run",
     )
-    printed = parser.add_mutually_exclusive_group()
-    printed.add_argument(
-        "--json", action="store_true", help="print JSON, and nothing else, on stdout"
-    )
-    printed.add_argument(
-        "--markdown", action="store_true", help="print the table as Markdown on stdout"
-    )
+    add_printed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -102,14 +93,9 @@ def run(options: argparse.Namespace) -> int:
                 options.robot, options.disturbance, folder, pool, options.quick, speed=speed
             )
     except KeyboardInterrupt:
-        print(
-            f"template-control: interrupted; finished trials are in {folder}, the same command"
-            " goes on from there",
-            file=sys.stderr,
-        )
-        return INTERRUPTED
+        return kept(folder)
     files = Files()
-    figure = files.write(lambda: _draw(found, folder))
+    figure = files.write(lambda: draw(lambda: robustness_figure(found), folder / "robustness.png"))
     if options.json:
         print(json.dumps({**data(found), "figure": None if figure is None else str(figure)}))
     elif options.markdown:
@@ -130,11 +116,6 @@ def _speed(options: argparse.Namespace) -> float | None:
     if options.speed is not None:
         raise ParameterError("--speed goes with --gait run: leave one out, or give both")
     return None
-
-
-def _draw(found: Robustness, folder: Path) -> Path:
-    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
-        return save_figure(robustness_figure(found), folder / "robustness.png")
 
 
 def data(found: Robustness) -> dict[str, Any]:

@@ -79,6 +79,12 @@ class Curves:
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`."""
 
+    def decide(
+        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
+    ) -> Decision:
+        """See :class:`~.planner.Planner`: what is chosen depends on the feet, so ``curve`` does."""
+        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
+
     def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
         """The decision for a step (None: there is none) to a state ``end`` (3,)."""
         angle, before = (_STEEP, self.parameters.leg_stiffness) if step is None else step[:2]
@@ -144,12 +150,6 @@ class StandPlanner(Curves):
     """Stands: the CoM comes to rest between the feet, and stays there."""
 
     lands = False
-
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
-        """See :class:`~.planner.Planner`."""
-        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.planners.planner import Decision
 from template_control.embedding.references.timed import TERMS, Quintic, chained, timed_stride
 from template_control.embedding.standing.curves import BetweenFeet, Found
 from template_control.embedding.standing.passes import Pass, Passes
@@ -75,12 +75,6 @@ class StepPlanner(Curves):
         self.passes = passes or Passes(vaults, self._single)
         gait = StandingGait.of(self.parameters, self.options)
         self.gait = replace(gait, stride=stride, step_duration=self.options.step)
-
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
-        """See :class:`~.planner.Planner`: what is chosen depends on the feet, so ``curve`` does."""
-        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
@@ -153,13 +147,15 @@ class StepPlanner(Curves):
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
     ) -> tuple[Decision, Stride]:
         """The foot has landed: to rest."""
-        found = self._resting(self._turned(start), (self._way * toes[0], self._way * toes[1]))
-        pieces = self._back(self._stilled(found, self.options.beat))
-        stride = timed_stride(self.automaton, node, pieces, toes)
+        found, stride = self._to_rest(node, start, toes)
         return replace(decision, feasible=self._fits(found)), stride
 
-    def _resting(self, start: Array, toes: tuple[float, float]) -> Found:
-        return self._between(toes).to_rest(start, True)
+    def _to_rest(self, node: str, start: Array, toes: tuple[float, float]) -> tuple[Found, Stride]:
+        """The curve to rest, seen in the direction of the step, and its stride in the world."""
+        feet = self._between((self._way * toes[0], self._way * toes[1]))
+        found = feet.to_rest(self._turned(start), True)
+        pieces = self._back(self._stilled(found, self.options.beat))
+        return found, timed_stride(self.automaton, node, pieces, toes)
 
     # -- both ways --------------------------------------------------------------------
 
@@ -201,7 +197,5 @@ class StepPlanner(Curves):
             meta=stride.meta[:rows],
         )
         end = stride.sample(np.nextafter(landing.time, 0.0))[0].reshape(3, 2).T
-        found = self._resting(self._turned(end), (self._way * both[0], self._way * both[1]))
-        pieces = self._back(self._stilled(found, self.options.beat))
-        rest = timed_stride(self.automaton, landing.target, pieces, both)
+        _, rest = self._to_rest(landing.target, end, both)
         return chained(cut, rest), True
