@@ -199,7 +199,7 @@ class EmbeddingController:
         """
         self.robot.update(q, v)
         if force is not None:
-            self._stumble.feel(force[:, [0, -1]], self.robot.foot_velocity[:, 1], dt)
+            self._stumble.feel(force, self.robot.foot_velocity[:, 1], dt)
             contact = contact & ~self._stumble.slipping
         self.feet.swing_time += dt
         self._sense(contact)

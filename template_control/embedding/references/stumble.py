@@ -49,26 +49,29 @@ class Stumble:
     def __init__(self, options: StumbleOptions, weight: float) -> None:
         self._options = options
         self._least = options.force * weight
-        self._left = np.zeros(2)
-        self._touching = np.zeros(2)
+        self._left = [0.0, 0.0]
+        self._touching = [0.0, 0.0]
         self.slipping = np.zeros(2, dtype=bool)
 
     @property
     def blocked(self) -> NDArray[np.bool_]:
         """(2,) whether a wall is in front of each foot."""
-        return self._left > 0.0
+        return np.array(self._left) > 0.0
 
     def feel(self, force: Array, rising: Array, dt: float) -> None:
         """Look at what acts on the feet, and how they move.
 
         Args:
-            force: (2, 2) x and y of the ground's force on each foot [N].
+            force: (2, d) the ground's force on each foot, forward first and up last [N].
             rising: (2,) their upward speeds [m/s].
             dt: since the last look [s].
         """
-        o, across, up = self._options, np.abs(force[:, 0]), force[:, 1]
-        wall = (across > self._least) & (across > o.steepness * up)
-        self._left -= dt
-        self._left[wall & (force[:, 0] < 0.0)] = o.linger
-        self._touching = np.where(up > 0.0, self._touching + dt, 0.0)
-        self.slipping = wall | ((rising < -o.sinking) & (self._touching < o.graze))
+        o = self._options
+        # Number by number: arrays of two would take five times as long, at every tick.
+        for foot, (one, rises) in enumerate(zip(force.tolist(), rising.tolist(), strict=True)):
+            along, up = one[0], one[-1]
+            wall = abs(along) > max(self._least, o.steepness * up)
+            left = o.linger if wall and along < 0.0 else self._left[foot] - dt
+            touching = self._touching[foot] + dt if up > 0.0 else 0.0
+            self._left[foot], self._touching[foot] = left, touching
+            self.slipping[foot] = wall or (rises < -o.sinking and touching < o.graze)
