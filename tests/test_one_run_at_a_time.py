@@ -8,9 +8,11 @@ import pytest
 
 import template_control as tc
 from template_control.embedding.planners.transition import RUN_TO_WALK, TransitionPlanner
+from template_control.embedding.robot_route import robot_route
 from template_control.errors import ParameterError
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.scenario.scenario import Scenario, Segment
 
 OPTIONS = tc.SimulationOptions(steps=3, record_every=10)
 
@@ -56,6 +58,14 @@ def test_a_second_run_of_one_robot_and_planner_is_as_the_first(robot, default_ga
     first, second = (tc.simulate(robot, planner, OPTIONS) for _ in range(2))
     for name in ("time", "q", "torque", "section_state", "section_controls"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+def test_a_second_run_of_one_route_is_as_the_first(robot):
+    walk = Scenario((Segment("walk", 1.1, steps=2),), start=(1.1, 0.978, 0.0))
+    route = robot_route(robot, walk, push_off=False)
+    first, again = (tc.simulate(robot, route, OPTIONS) for _ in range(2))
+    assert first.metadata["arrived"]
+    np.testing.assert_array_equal(again.q, first.q)
 
 
 @pytest.mark.parametrize("shared", ["robot", "planner"])

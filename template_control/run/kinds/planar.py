@@ -22,7 +22,7 @@ from template_control.run.kinds.kind import Kind
 from template_control.run.options import Course, SimulationOptions
 from template_control.run.recorder import Recorder
 from template_control.run.sensing import Senses, Sensors
-from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.maps.section import APEX, REST
 from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import Scale
@@ -62,9 +62,10 @@ class Planar(Kind):
                 " a free robot"
             )
         robot, route, pose = self.robot, controller.planning.route, o.pose
+        planner, node = controller.planning.begin(route.section)  # anew, if it was used before
         z = route.start if o.start is None else np.array(o.start)
         if pose is None and route.section == APEX:
-            pose = self._apex_pose(controller, z[: APEX.dimension])
+            pose = self._apex_pose(controller, z[: APEX.dimension], planner, node)
         if pose is None and route.section == REST:
             pose = standing_pose(route.parameters)
         if pose is not None:
@@ -78,14 +79,14 @@ class Planar(Kind):
         controller.start()
         return q, v
 
-    def _apex_pose(self, controller: EmbeddingController, z: Array) -> Pose:
+    def _apex_pose(
+        self, controller: EmbeddingController, z: Array, planner: Planner, node: Node
+    ) -> Pose:
         """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
-        planning, o = controller.planning, controller.options
-        planner, node = planning.begin(APEX)
-        gait = planner.gait
-        pitch = controller.first_pitch()
+        o, pitch = controller.options, controller.first_pitch()
         swing = phase_control(o.phases, node).swing or o.swing
-        return apex_pose(self.robot, ApexStart(z, gait, swing, pitch, planning.automaton))
+        automaton = controller.planning.automaton
+        return apex_pose(self.robot, ApexStart(z, planner.gait, swing, pitch, automaton))
 
     def plant(self, world: World) -> AbstractContextManager[Plant]:
         """See :meth:`.kind.Kind.plant`."""
