@@ -69,7 +69,7 @@ Phases = Mapping[Phase | str, PhaseControl]
 # A running leg folds high and comes down late: a foot that sinks all the way touches early, while
 # the CoM still rises, and straightens the knee into its stop.
 _RUNNING_SWING = SwingOptions(
-    clearance=0.15, rise=0.4, descent=0.14, landing_speed=0.6, early=0.01, leg_share=0.975
+    clearance=0.15, rise=0.4, descent=0.14, landing_speed=0.6, leg_share=0.975
 )
 # Ground forces are several times the weight: the trunk is turned by angular momentum.
 _RUNNING_STANCE = PhaseControl(

@@ -45,7 +45,7 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
     """
     own = scenario.on(template_for(robot))
     p = own.parameters
-    unit = float(np.sqrt(p.gravity * p.rest_length))
+    unit = p.speed_unit
     if push_off is None:
         push_off = own.only_walks and isinstance(robot, PlanarBiped)
     if push_off and not own.only_walks:

@@ -52,7 +52,7 @@ def default_gait(robot: Biped, touchdown_angle: Angle | None = None) -> WalkingG
     """
     parameters = template_for(robot)
     angle, speed = robot.walk or _WALK
-    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    unit = parameters.speed_unit
     return gait_at(
         parameters, angle if touchdown_angle is None else touchdown_angle, float(speed * unit)
     )
@@ -106,7 +106,7 @@ def walking_speeds(robot: Biped, torque_scale: Positive = 1.0) -> tuple[float, f
     """
     p = template_for(robot)
     family = walking_by_speed()
-    unit = float(np.sqrt(p.gravity * p.rest_length))
+    unit = p.speed_unit
     slowest, fastest = (unit * speed for speed in _WALKED)
     swings = []
     for chain in family.chains:
@@ -153,6 +153,10 @@ def robot_gait_for_speed(
 def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
     """What the legs' swing asks for, estimated with a straight leg that follows the quintic.
 
+    Args:
+        robot: last updated with straight legs, as :func:`template_for` leaves it.
+        gait: that is walked.
+
     Returns:
         The largest difference that it makes between the speeds of CoM and template [m/s], and the
         largest hip torque over its limit.
@@ -163,7 +167,6 @@ def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
     time = gait.step_duration - double
     # The foot goes two steps while the hips move on.
     angle = (2.0 * gait.step_length - gait.mean_speed * time) / robot.leg_length
-    template_for(robot)  # which leaves the robot updated with straight legs
     joint = robot.legs[0][-2]  # the knee comes last
     hip = robot.base_dof + joint
     momentum = abs(float(robot.angular_momentum_jacobian[hip])) * _QUINTIC_SPEED * angle / time

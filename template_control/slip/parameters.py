@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Positive
@@ -26,3 +27,8 @@ class SlipParameters(Checked):
     gravity: Positive = 9.81
     rest_length: Positive = 1.0
     leg_stiffness: Positive = 16.5e3
+
+    @property
+    def speed_unit(self) -> float:
+        """sqrt(g l0), the speed that others are told over [m/s]."""
+        return sqrt(self.gravity * self.rest_length)

@@ -37,7 +37,8 @@ def footholds(record: FreeRecord, foot: int) -> tuple[Array, Array]:
     Returns:
         (n, 2) x and y in the world in the middle of each stance [m]; (n,) times [s].
     """
-    stands = record.space_force[:, foot, 2] > 0.02 * record.metadata["mass"] * 9.81
+    weight = record.metadata["mass"] * record.metadata["template"]["gravity"]
+    stands = record.space_force[:, foot, 2] > 0.02 * weight
     edges = np.flatnonzero(np.diff(np.concatenate(([0], stands.astype(np.int8), [0]))))
     spans = [(a, b) for a, b in edges.reshape(-1, 2) if record.time[b - 1] - record.time[a] > 0.05]
     middle = np.array([(a + b) // 2 for a, b in spans], dtype=np.int64)

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
 
 from template_control.embedding.ahead.gait_row import (
     CONTROL,
@@ -37,7 +38,8 @@ STRIDE = "wp"
 """The steps of these gaits."""
 SLOTS = np.array([int(slot) for slot in WALKING_SLOTS[STRIDE]])
 """Their controls."""
-_DOUBLINGS = 12  # of the Riccati recursion: 4096 steps
+COLUMNS = np.concatenate((np.arange(PADDED), PADDED + SLOTS))
+"""States and controls among what the step's map is differentiated by."""
 
 
 def row_at(table: GaitTable, speed: float) -> Array:
@@ -61,7 +63,7 @@ def gait_table(parameters: SlipParameters, options: AheadOptions) -> GaitTable:
         options: tolerances that the costs come from, scaled to the template.
     """
     family = walking_by_speed()
-    unit = float(np.sqrt(parameters.gravity * parameters.rest_length))
+    unit = parameters.speed_unit
     parts = [_rows(chain, parameters, options) for chain in family.chains]
     speeds = [chain.vlo_speed * unit for chain in family.chains]
     for i in range(len(parts) - 1):
@@ -78,8 +80,8 @@ def gait_table(parameters: SlipParameters, options: AheadOptions) -> GaitTable:
 
 def _rows(chain: Chain, p: SlipParameters, o: AheadOptions) -> Array:
     """(n, WIDTH) of a chain's knots, which are gaits to rounding."""
-    unit, weight = np.sqrt(p.gravity * p.rest_length), p.mass * p.gravity / p.rest_length
-    step, columns = ReturnMap(p, STRIDE), np.concatenate((np.arange(PADDED), PADDED + SLOTS))
+    unit, weight = p.speed_unit, p.mass * p.gravity / p.rest_length
+    step = ReturnMap(p, STRIDE)
     rows = np.zeros((len(chain.height), WIDTH))
     a, b = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3, CONTROLS))
     for i, row in enumerate(rows):
@@ -87,7 +89,7 @@ def _rows(chain: Chain, p: SlipParameters, o: AheadOptions) -> Array:
         u = controls(float(chain.touchdown_angle[i]), k, k)
         u[Slot.K_PUSH] = k
         z = np.array([chain.vlo_speed[i] * unit, chain.height[i] * p.rest_length, 0.0])
-        result, slopes, _ = step.derivatives(z, u, columns)
+        result, slopes, _ = step.derivatives(z, u, COLUMNS)
         units = np.array([1.0, *[k] * (CONTROLS - 1)])
         a[i], b[i] = slopes[:3, :3], slopes[:3, 3:] * units
         row[STIFFNESS], row[STATE:CONTROL], row[CONTROL:COST] = k, z, u[SLOTS] / units
@@ -96,7 +98,7 @@ def _rows(chain: Chain, p: SlipParameters, o: AheadOptions) -> Array:
         shift = settling_map(a[i], b[i], np.array(o.lqr.tolerance), o.lqr.control_weight)
         row[SETTLING:GAIN] = shift.ravel()
     q, r = np.diag(1.0 / np.square(o.tolerance)), 1.0 / control_tolerance(o) ** 2
-    p_ahead = _riccati(a, b, q, r)
+    p_ahead = np.array([solve_discrete_are(*at, q, np.diag(r)) for at in zip(a, b, strict=True)])
     weighted = np.swapaxes(b, 1, 2) @ p_ahead
     gain = np.linalg.solve(np.diag(r) + weighted @ b, weighted @ a)
     rows[:, COST:SETTLING] = p_ahead.reshape(-1, 9)
@@ -107,19 +109,3 @@ def _rows(chain: Chain, p: SlipParameters, o: AheadOptions) -> Array:
 def control_tolerance(options: AheadOptions) -> Array:
     """(4,) differences of alpha and the stiffnesses over k that cost 1."""
     return np.array([options.angle_tolerance, *[options.stiffness_tolerance] * (CONTROLS - 1)])
-
-
-def _riccati(a: Array, b: Array, q: Array, r: Array) -> Array:
-    """(n, 3, 3) solutions of n discrete Riccati equations by the doubling algorithm.
-
-    P = Q + A' P (I + B R^-1 B' P)^-1 A; ``r`` is the diagonal of R.
-    """
-    g = (b / r) @ np.swapaxes(b, 1, 2)
-    p = np.broadcast_to(q, a.shape).copy()
-    identity = np.eye(3)
-    for _ in range(_DOUBLINGS):
-        inverse = np.linalg.inv(identity + g @ p)
-        across = a @ inverse
-        turned = np.swapaxes(a, 1, 2)
-        g, p, a = g + across @ g @ turned, p + turned @ p @ inverse @ a, across @ a
-    return 0.5 * (p + np.swapaxes(p, 1, 2))

@@ -19,6 +19,7 @@ from template_control.embedding.ahead.gait_row import (
     GaitTable,
 )
 from template_control.embedding.ahead.gait_table import (
+    COLUMNS,
     SLOTS,
     STRIDE,
     control_tolerance,
@@ -192,7 +193,7 @@ def prospect(parameters: SlipParameters, o: AheadOptions, table: GaitTable) -> P
         rounds=o.rounds,
         done=o.done,
         slots=SLOTS,
-        columns=np.concatenate((np.arange(PADDED), PADDED + SLOTS)),
+        columns=COLUMNS,
     )
 
 

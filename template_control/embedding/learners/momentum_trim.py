@@ -60,7 +60,7 @@ class MomentumTrim:
         p = parameters
         self.options = options
         self.forget()
-        self._speed = float(np.sqrt(p.gravity * p.rest_length))
+        self._speed = p.speed_unit
         self._bound = options.bound * p.gravity
         self._path: TemplatePath | None = None
         self._gait: Gait | None = None

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 
-import numpy as np
-
 from template_control.checks.checked import checked
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.standing.options import StandingOptions
@@ -30,7 +28,7 @@ def gaits_by_speed(parameters: SlipParameters) -> Family:
         parameters: the template.
     """
     chain = walking_by_speed().chains[-1]
-    unit = float(np.sqrt(parameters.gravity * parameters.rest_length))
+    unit = parameters.speed_unit
     ends = (float(chain.vlo_speed[0]) * unit, float(chain.vlo_speed[-1]) * unit)
     return Family(partial(chain.gait, parameters), ends)
 

@@ -74,7 +74,7 @@ class Passes:
     def _found(self) -> list[Pass]:
         o, p = self.options, self.parameters
         speeds = np.linspace(o.slowest, o.passes[1], o.passes[0])
-        speeds *= np.sqrt(p.gravity * p.rest_length)
+        speeds *= p.speed_unit
         found = (self._over(self._vaults.at(float(speed))) for speed in speeds)
         return [over for over in found if over is not None]
 

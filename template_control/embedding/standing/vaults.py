@@ -98,7 +98,7 @@ class Vaults:
         self._node = automaton.start("w").name
         self._known: dict[float, Vault] = {}
         self._ways: dict[float, Array] = {}
-        unit = float(np.sqrt(parameters.gravity * parameters.rest_length))
+        unit = parameters.speed_unit
         self._speeds = np.linspace(options.slowest * unit, family.speeds[1], _SPEEDS)
 
     def between(self, wanted: float, present: float) -> list[float]:

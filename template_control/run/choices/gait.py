@@ -86,4 +86,4 @@ class GaitChoice(Checked):
         if self.speed is not None:
             return self.speed
         template = template_for(robot)
-        return _RUN * float(np.sqrt(template.gravity * template.rest_length))
+        return _RUN * template.speed_unit

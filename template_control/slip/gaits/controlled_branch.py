@@ -60,7 +60,7 @@ class ControlledFamily(Branch):
         self.map, self.policy, self.varied = step, policy, varied
         self.n = step.dimensions[0]
         p = step.parameters
-        speed = np.sqrt(p.gravity * p.rest_length)
+        speed = p.speed_unit
         sizes = (p.mass * p.gravity * p.rest_length, p.rest_length, speed)
         target = dict(zip(VARIED, sizes, strict=True))[varied]
         self.scale = np.array([*[speed, p.rest_length, speed][: self.n], target])

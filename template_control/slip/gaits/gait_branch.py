@@ -63,7 +63,7 @@ class Family(Branch):
         self.section = self.map.sections[0]
         self.n = self.section.dimension
         p = parameters
-        speed = np.sqrt(p.gravity * p.rest_length)
+        speed = p.speed_unit
         self.scale = np.array([*[speed, p.rest_length, speed][: self.n], 1.0, p.leg_stiffness])
         self._energy_scale = p.mass * p.gravity * p.rest_length
 

@@ -33,7 +33,7 @@ def mean_speed_range(
     """
     if touchdown_angle is None:
         return walking_by_speed().range(parameters)
-    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    unit = parameters.speed_unit
     ends = []
     for speeds in (_VLO_SPEEDS, _VLO_SPEEDS[::-1]):
         means = (_mean_speed(parameters, touchdown_angle, unit * s) for s in speeds)
@@ -79,7 +79,7 @@ def gait_for_speed(
     if touchdown_angle is None:
         return replace(walking_by_speed().gait_for(p, mean_speed), name=name)
     angle = touchdown_angle
-    unit = np.sqrt(p.gravity * p.rest_length)
+    unit = p.speed_unit
 
     def surplus(vlo_speed: float) -> float:
         return _mean_speed(p, angle, vlo_speed) - mean_speed

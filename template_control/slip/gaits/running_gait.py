@@ -81,7 +81,7 @@ class RunningGait:
 @checked
 def running_speeds(parameters: SlipParameters) -> tuple[float, float]:
     """Slowest and fastest dx/dt at apex of the family [m/s]."""
-    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    unit = parameters.speed_unit
     return float(_SLOWEST * unit), float(_FASTEST * unit)
 
 
@@ -126,7 +126,7 @@ def running_gait(
             gait.
     """
     p = parameters
-    unit = np.sqrt(p.gravity * p.rest_length)
+    unit = p.speed_unit
     low, high = running_speeds(p)
     if not low - _SAME * unit <= speed <= high + _SAME * unit:
         raise GaitError(
@@ -193,7 +193,7 @@ class RunningFamily:
             speed: dx/dt at apex [m/s].
         """
         p = self._known[0].parameters
-        same = _SAME * np.sqrt(p.gravity * p.rest_length)
+        same = _SAME * p.speed_unit
         for gait in self._known:
             if abs(gait.apex[0] - speed) <= same:
                 return gait

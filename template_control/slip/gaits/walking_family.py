@@ -24,7 +24,7 @@ _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 @checked
 def speed_range(parameters: SlipParameters) -> tuple[float, float]:
     """Slowest and fastest dx/dt at VLO of the family [m/s]."""
-    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    unit = parameters.speed_unit
     return float(_SPEEDS[0] * unit), float(_SPEEDS[-1] * unit)
 
 
@@ -48,7 +48,7 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
             f"no walking gait has {vlo_speed:g} m/s at VLO: give a speed from {low:.3g} to"
             f" {high:.3g} m/s"
         )
-    unit = np.sqrt(parameters.gravity * parameters.rest_length)
+    unit = parameters.speed_unit
     angle = np.radians(np.interp(vlo_speed / unit, _SPEEDS, _ANGLES))
     return gait_at(parameters, float(angle), vlo_speed)
 
@@ -61,7 +61,7 @@ def _others(gait: WalkingGait) -> tuple[float, float, Callable[..., WalkingGait]
     if gait.stride in _PAPER:
         return *speed_range(gait.parameters), walking_gait
     chain = walking_by_speed().chain_of(gait)
-    unit = np.sqrt(gait.parameters.gravity * gait.parameters.rest_length)
+    unit = gait.parameters.speed_unit
     return float(chain.vlo_speed[0] * unit), float(chain.vlo_speed[-1] * unit), chain.gait
 
 
@@ -97,7 +97,7 @@ class WalkingFamily:
             return present, True
         p = present.parameters
         low, high, make = _others(present)
-        same = _SAME * np.sqrt(p.gravity * p.rest_length)
+        same = _SAME * p.speed_unit
         wanted = float(target[0])
         for gait in (present, *self._known):
             if abs(gait.vlo[0] - wanted) <= same:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
 
 from template_control.checks.checked import checked
 from template_control.errors import GaitError
@@ -23,8 +24,6 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _NEXT = 2 + NEXT  # column of the next foothold
-_PASSES = 1000  # of the Riccati iteration; it needs some ten
-_SAME = 1e-13  # relative change of a cost that has converged
 
 
 @dataclass(frozen=True)
@@ -92,14 +91,11 @@ def lateral_gait(
 
 
 def _cost_to_go(a: Array, b: Array, state_cost: Array, step_cost: float) -> Array:
-    """The Riccati equation's solution (2, 2), by iteration: some ten passes, as steps are long."""
-    stage = np.diag(state_cost)
-    cost = stage
-    for _ in range(_PASSES):
-        toward = cost @ b
-        left = a - np.outer(b, (toward @ a) / (step_cost + b @ toward))
-        new = stage + a.T @ cost @ left
-        if np.max(np.abs(new - cost)) <= _SAME * np.max(np.abs(new)):
-            return new
-        cost = new
-    raise GaitError("no law brings the sideways motion of this gait back: choose another gait")
+    """The Riccati equation's solution (2, 2)."""
+    try:
+        found = solve_discrete_are(a, b[:, None], np.diag(state_cost), np.array([[step_cost]]))
+    except np.linalg.LinAlgError:
+        raise GaitError(
+            "no law brings the sideways motion of this gait back: choose another gait"
+        ) from None
+    return np.asarray(found)

@@ -14,8 +14,6 @@ Array = NDArray[np.float64]
 COLUMNS = 2 + NEXT + 1
 """y, dy/dt and the footholds 0, 1 and 2 that they depend on."""
 
-_SERIES = SERIES
-
 
 @compiled
 def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> None:
@@ -29,7 +27,7 @@ def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> N
         out: overwritten; 0 for a leg in the air. Legs do not pull.
     """
     coefficients, meta = path.coefficients, path.meta
-    sample(_SERIES, Path(coefficients[0, row], coefficients[1, row]), time, com)
+    sample(SERIES, Path(coefficients[0, row], coefficients[1, row]), time, com)
     total = max(com[5] + path.gravity, 0.0) / com[1]
     rear, front = path.footholds[row, 0] >= 0, path.footholds[row, 1] >= 0
     share = 1.0 if front else 0.0

@@ -127,6 +127,6 @@ class CatchingRoute:
 
     def _run(self, walk: StrideGoal, stride: str, speed: float, then: str) -> StrideGoal:
         p = self.parameters
-        relative = speed / float(np.sqrt(p.gravity * p.rest_length))
+        relative = speed / p.speed_unit
         target = np.array([speed, suited_height(relative) * p.rest_length])
         return StrideGoal(stride, target, speed, walk.segment, then)

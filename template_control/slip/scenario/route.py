@@ -280,7 +280,7 @@ class ScenarioRoute:
         self.start = np.array(start, dtype=float)
         p = self.parameters
         self._guess = _FIRST_DURATION * np.sqrt(p.rest_length / p.gravity)
-        self._unit = float(np.sqrt(p.rest_length * p.gravity))
+        self._unit = p.speed_unit
         self.reset()
 
     @property

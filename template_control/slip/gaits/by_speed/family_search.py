@@ -201,7 +201,7 @@ def _bends(chain: Array) -> float:
 def chain_of(members: list[Member]) -> Chain:
     """The members of a chain without dimension."""
     p, gaits = REFERENCE, [member.gait for member in members]
-    unit = float(np.sqrt(p.gravity * p.rest_length))
+    unit = p.speed_unit
     stiffness, angle, height = np.array([coordinates(gait) for gait in gaits]).T
     return Chain(
         vlo_speed=np.array([gait.vlo[0] for gait in gaits]) / unit,

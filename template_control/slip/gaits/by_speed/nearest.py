@@ -48,7 +48,7 @@ def nearest_gait(parameters: SlipParameters, vlo_speed: float, guess: Array) -> 
         GaitError: if there is none near it.
     """
     p, step = parameters, ReturnMap(parameters)
-    unit, weight = float(np.sqrt(p.gravity * p.rest_length)), p.mass * p.gravity / p.rest_length
+    unit, weight = p.speed_unit, p.mass * p.gravity / p.rest_length
     x = np.array(guess, dtype=float)
     for _ in range(_STEPS):
         z, u = _stride(x, vlo_speed, weight, p.rest_length)

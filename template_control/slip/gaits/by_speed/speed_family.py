@@ -73,7 +73,7 @@ class Chain:
         Raises:
             GaitError: if there is none near the curve.
         """
-        speed = np.clip(vlo_speed / _unit(parameters), self.vlo_speed[0], self.vlo_speed[-1])
+        speed = np.clip(vlo_speed / parameters.speed_unit, self.vlo_speed[0], self.vlo_speed[-1])
         return nearest_gait(parameters, vlo_speed, self._curve(speed))
 
     def gait_for(self, parameters: SlipParameters, mean_speed: float) -> WalkingGait:
@@ -86,7 +86,7 @@ class Chain:
         Raises:
             GaitError: if there is none near the curve.
         """
-        p, unit = parameters, _unit(parameters)
+        p, unit = parameters, parameters.speed_unit
         wanted = mean_speed / unit
         knot = int(np.clip(np.searchsorted(self.mean_speed, wanted) - 1, 0, len(self.height) - 2))
         ends = self.vlo_speed[[knot, knot + 1]]
@@ -120,7 +120,7 @@ class SpeedFamily:
 
     def range(self, parameters: SlipParameters) -> tuple[float, float]:
         """Slowest and fastest mean speed of a template [m/s], to a centimetre per second."""
-        low, high = 100.0 * _unit(parameters) * self.limits[[0, -1]]
+        low, high = 100.0 * parameters.speed_unit * self.limits[[0, -1]]
         return float(np.ceil(low - _ROUNDING)) / 100.0, float(np.floor(high + _ROUNDING)) / 100.0
 
     def gait_for(self, parameters: SlipParameters, mean_speed: float) -> WalkingGait:
@@ -151,7 +151,7 @@ class SpeedFamily:
         Returns:
             dx/dt [m/s], y [m].
         """
-        chain, unit = self._chain(parameters, mean_speed), _unit(parameters)
+        chain, unit = self._chain(parameters, mean_speed), parameters.speed_unit
         speed, height = chain.vlo_at(mean_speed / unit)
         return speed * unit, height * parameters.rest_length
 
@@ -161,11 +161,7 @@ class SpeedFamily:
 
     def _chain(self, parameters: SlipParameters, mean_speed: float) -> Chain:
         inner = self.limits[1:-1]
-        return self.chains[int(np.searchsorted(inner, mean_speed / _unit(parameters)))]
-
-
-def _unit(p: SlipParameters) -> float:
-    return float(np.sqrt(p.gravity * p.rest_length))
+        return self.chains[int(np.searchsorted(inner, mean_speed / parameters.speed_unit))]
 
 
 def family_from(data: Mapping[str, Any]) -> SpeedFamily:
@@ -182,5 +178,5 @@ def walking_by_speed() -> SpeedFamily:
 
 def family_speeds(parameters: SlipParameters) -> tuple[float, float]:
     """Slowest and fastest dx/dt at VLO of the library's family [m/s]."""
-    chains, unit = walking_by_speed().chains, _unit(parameters)
+    chains, unit = walking_by_speed().chains, parameters.speed_unit
     return float(chains[0].vlo_speed[0]) * unit, float(chains[-1].vlo_speed[-1]) * unit
