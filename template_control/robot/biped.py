@@ -127,10 +127,15 @@ class Biped(ABC):
         # Pinocchio keeps these arrays in place, so the views stay good.
         self.mass_matrix, self.nonlinear_effects = data.M, data.nle
         self._joint_places = [data.oMi[j].translation for j in range(first, model.njoints)]
+        self._prepare()
 
     def __repr__(self) -> str:
         joints = ", ".join(self.joint_names)
         return f"<{type(self).__name__} {self.name}: {self.mass:.4g} kg, joints {joints}>"
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Make what :meth:`update` reads and writes."""
 
     def _compute(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Let Pinocchio compute all at (q, v).

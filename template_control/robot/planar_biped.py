@@ -65,16 +65,8 @@ class PlanarBiped(Biped):
     base_dof = base_joints = BASE_DOF
     directions = 2
 
-    def __init__(
-        self,
-        path: Path,
-        urdf: str,
-        model: pin.Model,
-        feet: tuple[str, str],
-        foot_radius: float,
-        walk: tuple[float, float] | None = None,
-    ) -> None:
-        super().__init__(path, urdf, model, feet, foot_radius, walk)
+    def _prepare(self) -> None:
+        model = self.model
         self.leg_length = min(
             sum(sagittal_length(model.jointPlacements[j]) for j in leg[1:])
             + sagittal_length(model.frames[foot].placement)
@@ -87,7 +79,7 @@ class PlanarBiped(Biped):
         self.foot_turning[:, _PITCH] = 1.0
         for row, leg in zip(self.foot_turning, self.legs, strict=True):
             row[[BASE_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
-        self._sources = sources(model, self._data, self._foot_ids, foot_radius)
+        self._sources = sources(model, self._data, self._foot_ids, self.foot_radius)
         terms = PlanarTerms.zeros(self.nv)
         self._terms = tuple(terms)
         self.com, self.com_velocity, self.com_bias = terms[:3]

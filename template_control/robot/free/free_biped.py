@@ -81,16 +81,8 @@ class FreeBiped(Biped):
     base_joints = _ROOT
     directions = 3
 
-    def __init__(
-        self,
-        path: Path,
-        urdf: str,
-        model: pin.Model,
-        feet: tuple[str, str],
-        foot_radius: float,
-        walk: tuple[float, float] | None = None,
-    ) -> None:
-        super().__init__(path, urdf, model, feet, foot_radius, walk)
+    def _prepare(self) -> None:
+        model = self.model
         self.leg_length = min(
             sagittal_length(model.jointPlacements[leg[-1]])
             + sagittal_length(model.frames[foot].placement)
@@ -99,7 +91,7 @@ class FreeBiped(Biped):
         data = self._data
         self.rotation: Array = data.oMi[_ROOT].rotation
         self._hips = [data.oMi[leg[-2]].translation for leg in self._leg_joints]
-        self._sources = sources(model, data, self._foot_ids, foot_radius)
+        self._sources = sources(model, data, self._foot_ids, self.foot_radius)
         self.space = FreeTerms.zeros(self.nv)
         self._terms = tuple(self.space)
         self._frame = np.array([0.0, 0.0, 1.0, 0.0])
