@@ -48,10 +48,10 @@ from .slip.gaits.mean_speed import gait_for_speed as gait_for_speed
 from .slip.gaits.running_gait import running_gait as running_gait
 from .slip.maps.return_map import ReturnMap as ReturnMap
 from .slip.parameters import SlipParameters as SlipParameters
-from .slip.scenario.route import ScenarioRoute as ScenarioRoute
 from .slip.scenario.run import simulate_scenario as simulate_scenario
 from .slip.scenario.scenario import example_one as example_one
-from .slip.scenario.scenario import load_scenario as load_scenario
+from .slip.scenario.scenario_file import load_scenario as load_scenario
+from .slip.scenario.scenario_route import ScenarioRoute as ScenarioRoute
 from .slip.scenario.speed_command import SpeedCommand as SpeedCommand
 from .slip.scenario.speed_command import SpeedProfile as SpeedProfile
 from .slip.scenario.speed_route import SpeedRoute as SpeedRoute

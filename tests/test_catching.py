@@ -25,8 +25,9 @@ from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.catching import BreakingRoute, CatchingRoute, CatchOptions
-from template_control.slip.scenario.route import ScenarioRoute, SteadyRoute
+from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 P = SlipParameters()
 WALK = walking_gait(P, 1.1)

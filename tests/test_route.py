@@ -11,9 +11,10 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.maps.section import APEX, VLO, section_of
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.scenario.route import ScenarioRoute, SteadyRoute
+from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment, example_one
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 P = SlipParameters()
 WALK = np.array([1.1, 0.98, 0.0])

@@ -14,7 +14,8 @@ from template_control.paper.example_one import summary
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.record import ScenarioRecord
 from template_control.slip.scenario.run import simulate_scenario
-from template_control.slip.scenario.scenario import Scenario, Segment, example_one, load_scenario
+from template_control.slip.scenario.scenario import Scenario, Segment, example_one
+from template_control.slip.scenario.scenario_file import load_scenario
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "example_one.toml"
 

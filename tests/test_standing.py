@@ -19,8 +19,9 @@ from template_control.slip import Event, Slot, walking_gait
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.gaits.walking_family import speed_range
 from template_control.slip.maps.section import REST, VLO
-from template_control.slip.scenario.route import ScenarioRoute, SteadyRoute
+from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 P = tc.SlipParameters()
 OPTIONS = StandingOptions()

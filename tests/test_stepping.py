@@ -11,8 +11,9 @@ from template_control.slip import Event
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.breaking import STEP_OUT
 from template_control.slip.maps.section import REST
-from template_control.slip.scenario.route import ScenarioRoute, SteadyRoute
+from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 P = tc.SlipParameters()
 OPTIONS = StandingOptions()

@@ -19,8 +19,8 @@ from template_control.slip.gaits.by_speed.speed_family import family_speeds
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.gaits.walking_family import speed_range
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.scenario.route import ScenarioRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.slip.similarity import Scale, scaled
 
 _RANGES = {"walk": speed_range, "run": running_speeds}

@@ -35,8 +35,8 @@ from template_control.run.simulation import STEPS, simulate
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.slip.gaits.walking_family import walking_gait
-from template_control.slip.scenario.route import ScenarioRoute
 from template_control.slip.scenario.scenario import STAND_HEIGHT, Scenario, Segment
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 _STAND = 2.0  # a walk's first and last stand [s]
 

@@ -35,8 +35,9 @@ from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.catching import CATCHING_STRIDES, CatchingRoute
-from template_control.slip.scenario.route import Route, ScenarioRoute, SteadyRoute
+from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 Array = NDArray[np.float64]
 

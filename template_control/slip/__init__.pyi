@@ -78,14 +78,14 @@ from .scenario.catching import CatchOptions as CatchOptions
 from .scenario.paces import PaceOptions as PaceOptions
 from .scenario.record import ScenarioRecord as ScenarioRecord
 from .scenario.route import Route as Route
-from .scenario.route import ScenarioRoute as ScenarioRoute
 from .scenario.route import SteadyRoute as SteadyRoute
 from .scenario.route import StrideGoal as StrideGoal
 from .scenario.run import simulate_scenario as simulate_scenario
 from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import Segment as Segment
 from .scenario.scenario import example_one as example_one
-from .scenario.scenario import load_scenario as load_scenario
+from .scenario.scenario_file import load_scenario as load_scenario
+from .scenario.scenario_route import ScenarioRoute as ScenarioRoute
 from .scenario.speed_command import SpeedCommand as SpeedCommand
 from .scenario.speed_command import SpeedProfile as SpeedProfile
 from .scenario.speed_route import SpeedRoute as SpeedRoute

@@ -14,7 +14,8 @@ from template_control.errors import ParameterError
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.planner import OwnPlanner, PlannerChoice
 from template_control.slip.automaton.vocabulary import MapKind
-from template_control.slip.scenario.scenario import Scenario, load_scenario
+from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.scenario.scenario_file import load_scenario
 
 _PLANNERS = {options.kind: options for options in (LqrOptions, AheadOptions, ModifiedOptions)}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)}

@@ -23,8 +23,9 @@ from template_control.slip.gaits.running_gait import RunningGait, running_gait, 
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.catching import CatchingRoute
-from template_control.slip.scenario.route import Route, ScenarioRoute, SteadyRoute
+from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.slip.similarity import REFERENCE
 

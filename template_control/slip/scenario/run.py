@@ -25,8 +25,9 @@ from template_control.slip.control.step_solver import StepSolution
 from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
 from template_control.slip.maps.section import APEX, PADDED, VLO, section_of
 from template_control.slip.scenario.record import ScenarioRecord
-from template_control.slip.scenario.route import ScenarioRoute, StrideGoal
+from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import MOST_STRIDES, Scenario
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 Array = NDArray[np.float64]
 

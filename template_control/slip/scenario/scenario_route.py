@@ -1,0 +1,259 @@
+"""The route of a scenario: its segments, stride by stride."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import checked
+from template_control.slip.maps.section import APEX, REST, VLO, Section
+from template_control.slip.scenario.paces import PaceOptions
+from template_control.slip.scenario.route import StrideGoal
+from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segment
+
+Array = NDArray[np.float64]
+
+_WALK, _CHANGE, _STOP, _CLOSE = "w", "ww", "ws", "sf"
+_STRIDES: dict[tuple[Section, Gait], str] = {
+    (VLO, "walk"): _WALK,
+    (VLO, "run"): "wr",
+    (APEX, "run"): "r",
+    (APEX, "walk"): "rw",
+    (REST, "stand"): "s",
+    (REST, "walk"): "sw",
+    (VLO, "stand"): _STOP,
+}
+_TRANSITIONS = ("wr", "rw", "sw", _STOP, _CLOSE, _CHANGE)
+_LEADS_TO: dict[str, tuple[Section, Gait]] = {
+    _WALK: (VLO, "walk"),
+    "wr": (APEX, "run"),
+    "r": (APEX, "run"),
+    "rw": (VLO, "walk"),
+    "s": (REST, "stand"),
+    "sw": (VLO, "walk"),
+    _STOP: (REST, "stand"),
+    _CLOSE: (REST, "stand"),
+    _CHANGE: (VLO, "walk"),
+}
+_FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
+_LONGEST = 2.0  # of that guess: what took longer was no stride alone, but one that a run caught
+
+
+@dataclass(frozen=True)
+class _Progress:
+    """Where in a scenario a run is.
+
+    Attributes:
+        speed: of the profile where the segment begins [m/s].
+        began: when that was, None before the run [s].
+        index: of the segment.
+        strides: done in the segment, transitions not counted.
+        duration: of the last stride of each kind [s].
+        last: kind of the stride under way, and when it began; None at the start.
+        walking: the walk has come to its speed since the last stand.
+        took: how long it took, None if the times are to tell [s].
+        over: past the last segment.
+    """
+
+    speed: float
+    began: float | None = None
+    index: int = 0
+    strides: int = 0
+    duration: Mapping[str, float] = field(default_factory=dict)
+    last: tuple[str, float] | None = None
+    walking: bool = True
+    took: float | None = None
+    over: bool = False
+
+    @property
+    def kind(self) -> str:
+        """Of the stride under way."""
+        return "" if self.last is None else self.last[0]
+
+    def arrived(self, now: float) -> _Progress:
+        """At a section: the stride that was under way is done."""
+        if self.last is None:
+            return replace(self, began=now)
+        kind, left = self.last
+        took = now - left if self.took is None else self.took
+        here = replace(self, duration={**self.duration, kind: took}, last=None, took=None)
+        if kind in _TRANSITIONS and not (kind == _CHANGE and self.walking):
+            # The transition leads to where the segment's profile begins.
+            return replace(here, began=now)
+        return replace(here, strides=self.strides + 1)
+
+    def profile(self, segment: Segment, now: float) -> float:
+        """The segment's profile, whatever ends it [m/s]."""
+        return self.speed + segment.acceleration * (now - (self.began or 0.0))
+
+    def wanted(self, segment: Segment, now: float) -> float:
+        """The profile's speed, which stops rising at ``until_speed`` [m/s]."""
+        value = self.profile(segment, now)
+        if segment.until_speed is not None and segment.acceleration > 0.0:
+            return min(value, segment.until_speed)
+        return max(value, 0.0)
+
+    def ends(self, segment: Segment, now: float, speed: float) -> bool:
+        """Whether the segment ends at a section passed at ``now`` with ``speed``."""
+        if segment.duration is not None and now - (self.began or 0.0) >= segment.duration:
+            return True
+        if segment.steps is not None and self.strides >= segment.steps:
+            return True
+        if segment.until_speed is None:
+            return False
+        wanted = self.profile(segment, now)
+        if segment.acceleration > 0.0:
+            return wanted >= segment.until_speed
+        return wanted <= segment.until_speed and speed < segment.until_speed
+
+
+class ScenarioRoute:
+    """The route of a :class:`~.scenario.Scenario`: its speed profile and its gaits.
+
+    The times of the calls tell how long strides take, how many were made, and when a
+    transition has led to the segment that it belongs to.
+
+    Args:
+        scenario: the profile.
+        apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
+        paces: when a walk changes its speed by a stride of its own.
+        vlo_height: y wanted at VLO [m] by dx/dt there [m/s]; None: the scenario's.
+        walks: kind of its walking steps, "wp" with push-off.
+    """
+
+    @checked
+    def __init__(
+        self,
+        scenario: Scenario,
+        apex_height: Callable[[float], float] | None = None,
+        paces: PaceOptions | None = None,
+        vlo_height: Callable[[float], float] | None = None,
+        walks: Literal["w", "wp"] = "w",
+    ) -> None:
+        self.scenario = scenario
+        self.walks = walks
+        self._vlo_height = vlo_height or (lambda speed: scenario.vlo[0])
+        self.paces = paces or PaceOptions()
+        self._apex_height = apex_height or (lambda speed: scenario.apex_height)
+        self.parameters = scenario.parameters
+        stands = scenario.segments[0].gait == STAND
+        self.section = REST if stands else VLO
+        start = (0.0, scenario.stand_height, 0.0) if stands else scenario.start
+        self.start = np.array(start, dtype=float)
+        p = self.parameters
+        self._guess = _FIRST_DURATION * np.sqrt(p.rest_length / p.gravity)
+        self._unit = p.speed_unit
+        self.reset()
+
+    @property
+    def endless(self) -> bool:
+        """See :class:`Route`."""
+        return False
+
+    @property
+    def pushes_off(self) -> bool:
+        """Whether its walking steps have a push-off."""
+        return self.walks != _WALK
+
+    def reset(self) -> None:
+        """Back to the beginning."""
+        first = self.scenario.segments[0]
+        self._progress = _Progress(first.speed or 0.0, walking=first.gait != STAND)
+
+    def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """See :meth:`Route.next`."""
+        self._progress, goal = self._go(section, z, now)
+        return goal
+
+    def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """See :meth:`Route.ahead`."""
+        return self._go(section, z, now)[1]
+
+    def took(self, duration: float) -> None:
+        """Tell how long the stride under way took [s], before the section it ends at.
+
+        This call is optional. Without it the duration is a difference of two times, with its
+        rounding.
+        """
+        self._progress = replace(self._progress, took=duration)
+
+    def _go(self, section: Section, z: Array, now: float) -> tuple[_Progress, StrideGoal | None]:
+        here = self._segment(self._progress.arrived(now), float(z[0]), now)
+        if here.over:
+            return here, None
+        s = self.scenario
+        segment = s.segments[here.index]
+        kind = _STRIDES[section, segment.gait]
+        if section is REST and self._progress.kind == _STOP:
+            kind = _CLOSE  # the last step of a walk is a long one
+        if kind in (_STOP, _WALK):
+            here, kind = self._reached(here, kind, float(z[0]), now)
+        # A transition aims at where the profile begins, the others at where they will end.
+        aims = kind not in _TRANSITIONS or (kind == _CHANGE and here.walking)
+        took = min(here.duration.get(kind, self._guess), _LONGEST * self._guess)
+        ahead = took if aims else 0.0
+        speed = here.wanted(segment, now + ahead)
+        if segment.gait == STAND:
+            speed = self.paces.slowed * self._unit if kind == _CHANGE else 0.0
+        runs = segment.gait == "run"
+        target = (
+            (speed, self._apex_height(speed))
+            if runs
+            else (speed, self._vlo_height(speed), s.vlo[1])
+        )
+        if _LEADS_TO[kind][0] is REST:
+            target = (0.0, s.stand_height, 0.0)
+        then = self._then(kind, here.index)
+        goal = StrideGoal(self._named(kind), np.array(target), speed, here.index, then)
+        return replace(here, last=(kind, now)), goal
+
+    def _named(self, kind: str) -> str:
+        """The kind of stride that a kind of the tables is made as."""
+        return self.walks if kind == _WALK else kind
+
+    def _reached(
+        self, here: _Progress, kind: str, speed: float, now: float
+    ) -> tuple[_Progress, str]:
+        """The stride at VLO with ``speed``: one to another speed comes first where it must."""
+        segment = self.scenario.segments[here.index]
+        if segment.gait == STAND:
+            slow = speed <= self.paces.stoppable * self._unit
+            return replace(here, walking=False), kind if slow else _CHANGE
+        if not self.scenario.stands:
+            return here, kind
+        most = self.paces.behind if here.walking else self.paces.alike
+        if abs(speed - here.wanted(segment, now)) <= most * self._unit:
+            return replace(here, walking=True), kind
+        return here, _CHANGE
+
+    def _then(self, kind: str, index: int) -> str | None:
+        """The next kind of stride after those of ``kind`` in segment ``index``."""
+        section, gait = _LEADS_TO[kind]
+        if kind in _TRANSITIONS:
+            return self._named(_STRIDES[section, gait])
+        later = (segment.gait for segment in self.scenario.segments[index:])
+        return next(
+            (self._named(_STRIDES[section, other]) for other in later if other != gait), None
+        )
+
+    def _segment(self, here: _Progress, speed: float, now: float) -> _Progress:
+        """Enter the segment that holds at ``now``."""
+        segments = self.scenario.segments
+        while not here.over and here.ends(segments[here.index], now, speed):
+            wanted = here.wanted(segments[here.index], now)
+            if here.index + 1 == len(segments):
+                return replace(here, over=True)
+            stands = segments[here.index + 1].gait == STAND
+            given = 0.0 if stands else segments[here.index + 1].speed
+            here = replace(
+                here,
+                speed=wanted if given is None else given,
+                began=now,
+                index=here.index + 1,
+                strides=0,
+            )
+        return here
