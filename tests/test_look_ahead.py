@@ -10,17 +10,11 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.ahead.gait_row import CONTROL, CONTROLS, STATE, STIFFNESS, WIDTH
 from template_control.embedding.ahead.gait_table import SLOTS, gait_table, row_at
-from template_control.embedding.ahead.look_ahead import (
-    Aim,
-    Plan,
-    Workspace,
-    aimed,
-    look_ahead,
-    residuals,
-    slopes,
-)
+from template_control.embedding.ahead.look_ahead import look_ahead
 from template_control.embedding.ahead.options import AheadOptions
+from template_control.embedding.ahead.plan_cost import aimed, residuals, slopes
 from template_control.embedding.ahead.planner import AheadPlanner, prospect
+from template_control.embedding.ahead.prospect import Aim, Plan, Workspace
 from template_control.embedding.ahead.rehearsal import rehearse
 from template_control.embedding.planners.planner import ANY_ANGLE
 from template_control.errors import ScenarioError

@@ -1,17 +1,6 @@
-"""Several walking steps planned at once: bounded Gauss-Newton steps on the exact VLO map.
-
-The plan's cost, over N steps with controls u_0 to u_(N-1) and states z_1 to z_N at VLO:
-
-    sum |(z_i - z*) / tolerance|^2 + |(u_i - u*) / control tolerance|^2 + (rise beyond)^2
-    + (z_N - z*)' P (z_N - z*)
-
-z* and u* are the aimed gait's, shifted so that the robot, with its offset, settles on it; the
-sum over states ends at z_(N-1); P is the LQR's cost-to-go of the same costs.
-"""
+"""Several walking steps planned at once: bounded Gauss-Newton steps on the exact VLO map."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,122 +9,38 @@ from template_control.compiled import compiled
 from template_control.embedding.ahead.gait_row import (
     CONTROL,
     CONTROLS,
-    COST,
     GAIN,
-    SETTLING,
-    STATE,
-    STIFFNESS,
-    GaitTable,
-    gait_row,
 )
+from template_control.embedding.ahead.plan_cost import (
+    PER_STEP,
+    STATES,
+    aimed,
+    residuals,
+    slopes,
+    slots_of,
+)
+from template_control.embedding.ahead.prospect import Aim, Plan, Prospect, Workspace
 from template_control.embedding.planners.gauss_newton import bounded_step
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.dynamics.kernel import Scratch
-from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.section_map import (
     RESULTS,
-    Derivatives,
-    section_jacobian,
     section_map,
 )
-from template_control.whole_body.elimination import cholesky
 
 Array = NDArray[np.float64]
 
-_STATES = 3
-_PER_STEP = _STATES + 1 + CONTROLS  # residuals: states, what rises beyond, controls
 _HALVINGS = 4  # of a Gauss-Newton step that does not lower the cost
 _LESS = 0.5  # of the LQR's feedback, where the template cannot do it
-
-
-class Prospect(NamedTuple):
-    """What holds for every plan.
-
-    Attributes:
-        kernel: the step.
-        table: gaits by speed.
-        tolerance: (3,) of the states.
-        control_tolerance: (4,) of the controls.
-        rise: |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s].
-        bounds: (2, 4) least and greatest alpha relative to the gait's [rad], stiffnesses over k.
-        top_margin: alpha stays this far below asin(y / l0) [rad].
-        rounds: Gauss-Newton steps.
-        done: share of the cost; a step that lowers it by less is the last.
-        slots: (4,) of the controls.
-        columns: (7,) of the map's derivatives, states and controls.
-    """
-
-    kernel: Kernel
-    table: GaitTable
-    tolerance: Array
-    control_tolerance: Array
-    rise: tuple[float, float]
-    bounds: Array
-    top_margin: float
-    rounds: int
-    done: float
-    slots: NDArray[np.int64]
-    columns: NDArray[np.int64]
-
-
-class Aim(NamedTuple):
-    """Where a plan is to lead.
-
-    Attributes:
-        speed: dx/dt at VLO of the aimed gait [m/s].
-        offset: (3,) what the robot adds to each step of the template.
-        angles: least and greatest touchdown angle of the first step [rad].
-    """
-
-    speed: float
-    offset: Array
-    angles: tuple[float, float]
-
-
-class Plan(NamedTuple):
-    """N steps.
-
-    Attributes:
-        states: (N + 1, 3) at VLO, the present one first.
-        controls: (N, 4) alpha and shares of the aimed gait's k.
-        row: of the aimed gait, see :mod:`~.gait_row`.
-    """
-
-    states: Array
-    controls: Array
-    row: Array
-
-
-class Workspace(NamedTuple):
-    """Scratch of the maps.
-
-    Attributes:
-        real: of plans.
-        complex: of their derivatives.
-    """
-
-    real: Scratch
-    complex: Scratch
-
-
-@compiled
-def _slots(p: Prospect, plan: Plan, i: int, u: Array) -> None:
-    """Controls of step ``i`` by Slot, into ``u`` (NUM_SLOTS,)."""
-    for j in range(NUM_SLOTS):
-        u[j] = 0.0
-    for j in range(CONTROLS):
-        unit = 1.0 if j == 0 else plan.row[STIFFNESS]
-        u[p.slots[j]] = plan.controls[i, j] * unit
 
 
 @compiled
 def _step(p: Prospect, work: Workspace, aim: Aim, plan: Plan, i: int) -> bool:
     """Write the state after step ``i``; False where the template does not complete it."""
     u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
-    _slots(p, plan, i, u)
+    slots_of(p, plan, i, u)
     if section_map(p.kernel, None, plan.states[i], u, work.real, result) != 0:
         return False
-    for j in range(_STATES):
+    for j in range(STATES):
         plan.states[i + 1, j] = result[j] + aim.offset[j]
     return True
 
@@ -179,131 +84,15 @@ def _guess(
     for i in range(plan.controls.shape[0]):
         _bounds(p, aim, plan, i, lower, upper)
         for j in range(CONTROLS):
-            wish = target[_STATES + j]
-            for k in range(_STATES):
-                gain = plan.row[GAIN + _STATES * j + k]
+            wish = target[STATES + j]
+            for k in range(STATES):
+                gain = plan.row[GAIN + STATES * j + k]
                 wish -= feedback * gain * (plan.states[i, k] - target[k])
             place = CONTROLS * i + j
             plan.controls[i, j] = min(max(wish, lower[place]), upper[place])
         if not _step(p, work, aim, plan, i):
             return False
     return True
-
-
-@compiled
-def residuals(p: Prospect, plan: Plan, target: Array, factor: Array, out: Array) -> float:
-    """What a plan misses, in tolerances.
-
-    Args:
-        p: the tolerances.
-        plan: its states and controls.
-        target: (7,) z* and u*.
-        factor: (3, 3) lower triangular L with P = L L'.
-        out: (8 N,) overwritten: of each step its state, what rises beyond, its controls.
-
-    Returns:
-        The cost, their sum of squares.
-    """
-    steps, cost = plan.controls.shape[0], 0.0
-    for i in range(steps):
-        row = _PER_STEP * i
-        for j in range(_STATES):
-            if i < steps - 1:
-                out[row + j] = (plan.states[i + 1, j] - target[j]) / p.tolerance[j]
-            else:
-                out[row + j] = 0.0
-                for k in range(j, _STATES):
-                    out[row + j] += factor[k, j] * (plan.states[i + 1, k] - target[k])
-        beyond = abs(plan.states[i + 1, 2]) - p.rise[0]
-        out[row + _STATES] = max(beyond, 0.0) / p.rise[1]
-        for j in range(CONTROLS):
-            miss = plan.controls[i, j] - target[_STATES + j]
-            out[row + _STATES + 1 + j] = miss / p.control_tolerance[j]
-    for i in range(_PER_STEP * steps):
-        cost += out[i] * out[i]
-    return cost
-
-
-@compiled
-def slopes(p: Prospect, work: Workspace, plan: Plan, factor: Array, rows: Array) -> None:
-    """Derivatives of :func:`residuals` by all controls.
-
-    Args:
-        p: the tolerances.
-        work: overwritten.
-        plan: its states and controls; the template completes its steps.
-        factor: as for :func:`residuals`.
-        rows: (8 N, 4 N) overwritten.
-    """
-    steps = plan.controls.shape[0]
-    size = CONTROLS * steps
-    u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
-    by_control = np.empty((RESULTS, CONTROLS))
-    by_both = np.empty((RESULTS, _STATES + CONTROLS))
-    state, following = np.zeros((_STATES, size)), np.zeros((_STATES, size))
-    for i in range(_PER_STEP * steps):
-        for j in range(size):
-            rows[i, j] = 0.0
-    for i in range(steps):
-        _slots(p, plan, i, u)
-        if i == 0:
-            # The present state is what it is.
-            found = Derivatives(result, by_control)
-            section_jacobian(
-                p.kernel, None, plan.states[i], u, p.columns[_STATES:], work.complex, found
-            )
-        else:
-            found = Derivatives(result, by_both)
-            section_jacobian(p.kernel, None, plan.states[i], u, p.columns, work.complex, found)
-        skip = 0 if i == 0 else _STATES
-        for a in range(_STATES):
-            for c in range(CONTROLS * i):
-                total = 0.0
-                for b in range(_STATES):
-                    total += by_both[a, b] * state[b, c]
-                following[a, c] = total
-            for c in range(CONTROLS):
-                unit = 1.0 if c == 0 else plan.row[STIFFNESS]
-                following[a, CONTROLS * i + c] = found.jacobian[a, skip + c] * unit
-        row = _PER_STEP * i
-        beyond = abs(plan.states[i + 1, 2]) > p.rise[0]
-        sign = 1.0 if plan.states[i + 1, 2] > 0.0 else -1.0
-        for c in range(CONTROLS * (i + 1)):
-            for a in range(_STATES):
-                state[a, c] = following[a, c]
-            for a in range(_STATES):
-                if i < steps - 1:
-                    rows[row + a, c] = state[a, c] / p.tolerance[a]
-                else:
-                    for k in range(a, _STATES):
-                        rows[row + a, c] += factor[k, a] * state[k, c]
-            if beyond:
-                rows[row + _STATES, c] = sign * state[2, c] / p.rise[1]
-        for c in range(CONTROLS):
-            rows[row + _STATES + 1 + c, CONTROLS * i + c] = 1.0 / p.control_tolerance[c]
-
-
-@compiled
-def aimed(p: Prospect, aim: Aim, plan: Plan, target: Array, factor: Array) -> None:
-    """The aimed gait, as the robot settles on it.
-
-    Args:
-        p: the table of gaits.
-        aim: speed and offset.
-        plan: its ``row`` is overwritten.
-        target: (7,) overwritten with z* and u*.
-        factor: (3, 3) overwritten with L, P = L L'.
-    """
-    row = plan.row
-    gait_row(p.table, aim.speed, row)
-    for i in range(_STATES + CONTROLS):
-        target[i] = row[STATE + i]
-        for j in range(_STATES):
-            target[i] += row[SETTLING + _STATES * i + j] * aim.offset[j]
-    for i in range(_STATES):
-        for j in range(_STATES):
-            factor[i, j] = row[COST + _STATES * i + j]
-    cholesky(factor, _STATES)
 
 
 @compiled
@@ -322,9 +111,9 @@ def look_ahead(p: Prospect, work: Workspace, z: Array, aim: Aim, plan: Plan) -> 
     """
     steps = plan.controls.shape[0]
     size = CONTROLS * steps
-    target, factor = np.empty(_STATES + CONTROLS), np.empty((_STATES, _STATES))
+    target, factor = np.empty(STATES + CONTROLS), np.empty((STATES, STATES))
     aimed(p, aim, plan, target, factor)
-    for j in range(_STATES):
+    for j in range(STATES):
         plan.states[0, j] = z[j]
     feedback = 1.0
     while not _guess(p, work, aim, plan, target, feedback):
@@ -332,7 +121,7 @@ def look_ahead(p: Prospect, work: Workspace, z: Array, aim: Aim, plan: Plan) -> 
             return np.inf
         feedback = max(feedback - _LESS, 0.0)
     lower, upper = np.empty(size), np.empty(size)
-    rows, residual = np.empty((_PER_STEP * steps, size)), np.empty(_PER_STEP * steps)
+    rows, residual = np.empty((PER_STEP * steps, size)), np.empty(PER_STEP * steps)
     start, x = np.empty(size), np.empty(size)
     cost = residuals(p, plan, target, factor, residual)
     for _ in range(p.rounds):

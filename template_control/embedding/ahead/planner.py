@@ -26,14 +26,9 @@ from template_control.embedding.ahead.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.embedding.ahead.look_ahead import (
-    Aim,
-    Plan,
-    Prospect,
-    Workspace,
-    look_ahead,
-)
+from template_control.embedding.ahead.look_ahead import look_ahead
 from template_control.embedding.ahead.options import AheadOptions
+from template_control.embedding.ahead.prospect import Aim, Plan, Prospect, Workspace
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.walk_kernels import WALK
