@@ -32,7 +32,7 @@ from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.stumble import Stumble
 from template_control.embedding.section_report import Learnt, SectionReport
-from template_control.embedding.sensing import Sensed
+from template_control.embedding.sensing import Sensing
 from template_control.embedding.station import stations
 from template_control.embedding.stride_planning import StridePlanning
 from template_control.errors import ParameterError
@@ -69,7 +69,7 @@ class EmbeddingController:
         planning: the stride's decision and the path that follows it.
         feet: roles and swings of the feet.
         reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
-        ground: height of the template's ground: of the foot that landed last [m].
+        sensing: the robot's state in the template's terms.
         phase_offset: the point whose direction is the phase is this far ahead of the CoM [m].
         template_forces: (2, 2) leg forces of the template at this phase [N], rear and front.
     """
@@ -104,11 +104,9 @@ class EmbeddingController:
         self.template_forces = np.zeros((2, 2))
         self.phase_time = 0.0
         self.phase_offset = 0.0
-        self.ground = 0.0
         self.time = 0.0
         self._fresh = True
-        self._rear_shift = 0.0
-        self._sensed = Sensed(swing_time=self.feet.swing_time, acceleration=self.reference[4:])
+        self.sensing = Sensing(robot, self.feet, self.reference[4:])
         self._stumble = Stumble(o.stumble, robot.mass * robot.gravity)
         self._guards = RobotGuards(self.parameters, o.guards)
         self._stations = stations(automaton, robot.nv, o.phases, o.swing)
@@ -137,12 +135,12 @@ class EmbeddingController:
     def template_com(self) -> tuple[float, float]:
         """The template's CoM at the robot's phase, in the world [m]."""
         x, y = self.reference[:2]
-        return float(self._origin + x), float(self.ground + y)
+        return float(self._origin + x), float(self.sensing.ground + y)
 
     @property
     def _origin(self) -> float:
         """Where the template's rear toe is in the world: at the foot, if that stands [m]."""
-        return float(self._sensed.toes[0]) if self.station.stance else self.planning.toe
+        return float(self.sensing.now.toes[0]) if self.station.stance else self.planning.toe
 
     def first_pitch(self) -> float:
         """Of the trunk where the route begins [rad]."""
@@ -165,14 +163,13 @@ class EmbeddingController:
         self.lean.reset()
         self._enter(node.name)
         self.feet.begin(rear)
-        self._sensed.feet = self.feet.of
         half = 0.5 * planner.gait.step_duration
         for leg in self.station.swings:
             self._lift(self.feet.of[leg], (swung or (half, half))[leg])
         if node.stance:
             # Of two feet on the ground the front one landed last.
             self.feet.landed = self.feet.of[self.station.stance[-1]]
-        self.ground = float(self.robot.foot_position[self.feet.landed, 1]) if node.stance else 0.0
+        self.sensing.begin(bool(node.stance))
         self._sense(np.zeros(2, dtype=bool))
         self._decide(section)
 
@@ -214,32 +211,14 @@ class EmbeddingController:
     # -- the automaton ----------------------------------------------------------------
 
     def _sense(self, contact: NDArray[np.bool_]) -> None:
-        r, s, (rear, front) = self.robot, self._sensed, self.feet.of
-        if self.station.stance:
-            self.ground = float(r.foot_position[self.feet.landed, 1])
-        s.toes[0] = r.foot_position[rear, 0] + self._rear_shift
-        s.toes[1] = r.foot_position[front, 0]
-        s.state[0], s.state[1] = r.com[0], r.com[1] - self.ground
-        s.state[3] = r.com_velocity[1]
-        s.contact = contact
-        self._sense_speed()
-
-    def _sense_speed(self) -> None:
-        """Forward speed as the phase has it.
-
-        The swing leg's angular momentum makes dx/dt of the CoM swing within a step while the
-        momentum about the foot, which is what the template predicts, does not.
-        """
-        r, s = self.robot, self._sensed
-        s.state[2] = r.com_velocity[0]
-        if self.station.control.momentum_speed:
-            s.state[2] += r.angular_momentum / (r.mass * s.state[1])
+        station = self.station
+        self.sensing.read(contact, bool(station.stance), station.control.momentum_speed)
 
     def _advance(self) -> None:
         """Take the first edge of the present node that the robot fires."""
         for edge in self.station.ways:
             due = self.planning.dues[edge.event] - self.phase_time
-            if self._guards.fired(edge, self._sensed, due):
+            if self._guards.fired(edge, self.sensing.now, due):
                 self._take(edge)
                 return
 
@@ -249,27 +228,22 @@ class EmbeddingController:
         self.planning.pass_event(edge.event)
         self._enter(str(edge.target))
         self.feet.apply(edge.reset)
-        self._sensed.feet = self.feet.of
         lifted = stood - self._standing()
         for foot in lifted:
             self._lift(foot)
-        s = self._sensed
-        if self.feet.landed in lifted and self.station.stance:
+        sensing, stance = self.sensing, self.station.stance
+        if self.feet.landed in lifted and stance:
             # A step back: the other foot is the one on the ground.
-            self.feet.landed = self.feet.of[self.station.stance[0]]
-            ground = float(self.robot.foot_position[self.feet.landed, 1])
-            s.state[1] += self.ground - ground
-            self.ground = ground
+            sensing.stand_on(self.feet.of[stance[0]])
         if lifted or self.feet.of != roles:
-            self._rear_shift = 0.0
-            rear, front = self.feet.of
-            s.toes[:] = self.robot.foot_position[[rear, front], 0]
-            self.planning.stand_on(rear)
-        if self.station.control.momentum_speed is not before.control.momentum_speed:
-            self._sense_speed()
-        if lifted and not self.station.stance:
+            sensing.take_roles()
+            self.planning.stand_on(self.feet.of[Leg.REAR])
+        momentum = self.station.control.momentum_speed
+        if momentum is not before.control.momentum_speed:
+            sensing.read_speed(momentum)
+        if lifted and not stance:
             # No force moves the CoM now: its path, and all footholds on it, are certain.
-            self.planning.follow(self.node, s, self.time)
+            self.planning.follow(self.node, sensing.now, self.time)
             self._on_new_path()
         placed = PLACED.get(edge.reset)
         if placed is not None:
@@ -289,22 +263,8 @@ class EmbeddingController:
         return {self.feet.of[leg] for leg in self.station.stance}
 
     def _land(self, leg: Leg) -> None:
-        """The template's ground is now that of the foot which has landed.
-
-        Where that is higher or lower than the rear foot's, the template's rear toe is moved so
-        that its leg keeps its length, and with it its force.
-        """
-        s, foot = self._sensed, self.feet.of[leg]
-        self.feet.landed = foot
-        ground = float(self.robot.foot_position[foot, 1])
-        higher = ground - self.ground
-        height = s.state[1] - higher
-        if leg is not Leg.REAR:
-            back = s.state[0] - s.toes[Leg.REAR]
-            moved = np.sqrt(max(back**2 + s.state[1] ** 2 - height**2, 0.0))
-            self._rear_shift = float(back - np.copysign(moved, back))
-            s.toes[Leg.REAR] += self._rear_shift
-        self.ground, s.state[1] = ground, height
+        """The template's ground is now that of the foot which has landed."""
+        higher, s = self.sensing.land(leg), self.sensing.now
         if self.station.control.lands:
             self.planning.land(self.node, s, self.time)
         else:
@@ -312,7 +272,7 @@ class EmbeddingController:
         self._on_new_path()
 
     def _decide(self, section: Section) -> None:
-        s = self._sensed
+        s = self.sensing.now
         if self.reports:
             nominal = self.reports[-1].decision.nominal
             self.load.end_stride(nominal)
@@ -330,7 +290,7 @@ class EmbeddingController:
 
     def _plan_again(self) -> None:
         """Plan from here where a touchdown is overdue or the robot has left its path."""
-        s, planning = self._sensed, self.planning
+        s, planning = self.sensing.now, self.planning
         if planning.overdue(self.node, self.phase_time):
             planning.reach_on(self.node, s, self.time)
         elif planning.surprised(s.state[2] - self.reference[2], self.phase_time, self.time):
@@ -349,7 +309,7 @@ class EmbeddingController:
 
     def _locate(self, dt: float) -> None:
         """The template's state and forces at the robot's phase."""
-        s, path, toe = self._sensed, self.planning.path, self.planning.toe
+        s, path, toe = self.sensing.now, self.planning.path, self.planning.toe
         x, y = s.state[0] + self.phase_offset - s.toes[0], s.state[1]
         # Since the last tick, unless the path begins at this one. A direction needs a guess only.
         passed = 0.0 if self._fresh and self.station.control.clock is Clock.TIME else dt
@@ -382,14 +342,14 @@ class EmbeddingController:
                     # The template cannot complete the stride; the gait's own foothold is the
                     # best guess.
                     gait = self.planner.gait
-                    foothold = self._sensed.toes[Leg.REAR] + gait.step_length
+                    foothold = self.sensing.now.toes[Leg.REAR] + gait.step_length
                     due = gait.step_duration - self.feet.swing_time[foot]
-                swing.advance(foothold, due, dt, self.ground)
+                swing.advance(foothold, due, dt, self.sensing.ground)
             wanted.furthest[foot] = swing.furthest(hips, self.robot.leg_length)
 
     def _track(self, q: Array, v: Array, dt: float) -> None:
         """Let the phase's tasks write what they ask for."""
-        s, wanted, station = self._sensed, self.wanted, self.station
+        s, wanted, station = self.sensing.now, self.wanted, self.station
         wanted.com_now[:] = s.state
         wanted.com_now[0] -= s.toes[0]
         wanted.com_push = self.trim.acceleration if station.control.trims else 0.0

@@ -7,6 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.references.feet import Feet
+from template_control.robot.biped import Biped
+from template_control.slip.automaton.vocabulary import Leg
+
 Array = NDArray[np.float64]
 
 
@@ -33,3 +37,100 @@ class Sensed:
     swing_time: Array = field(default_factory=lambda: np.full(2, np.inf))
     feet: tuple[int, int] = (0, 1)
     acceleration: Array = field(default_factory=lambda: np.zeros(2))
+
+
+class Sensing:
+    """Reads the robot's state on the template's ground, which the foot that landed last stands on.
+
+    Args:
+        robot: the model; every tick updates it.
+        feet: their roles.
+        acceleration: (2,) wanted of the CoM, which others write [m/s^2].
+
+    Attributes:
+        now: what was read last.
+        ground: height of the template's ground [m].
+    """
+
+    def __init__(self, robot: Biped, feet: Feet, acceleration: Array) -> None:
+        self._robot, self._feet = robot, feet
+        self.now = Sensed(swing_time=feet.swing_time, acceleration=acceleration)
+        self.ground = 0.0
+        self._rear_shift = 0.0
+
+    def begin(self, stands: bool) -> None:
+        """Begin a run; where no foot stands, the ground is at height 0."""
+        self.now.feet = self._feet.of
+        self.ground = self._height(self._feet.landed) if stands else 0.0
+
+    def read(self, contact: NDArray[np.bool_], stands: bool, momentum: bool) -> None:
+        """Read the state of this tick.
+
+        Args:
+            contact: (2,) whether each foot touches the ground.
+            stands: whether a foot carries; the ground is under the one that landed last.
+            momentum: as for :meth:`read_speed`.
+        """
+        r, s, (rear, front) = self._robot, self.now, self._feet.of
+        if stands:
+            self.ground = self._height(self._feet.landed)
+        s.toes[0] = r.foot_position[rear, 0] + self._rear_shift
+        s.toes[1] = r.foot_position[front, 0]
+        s.state[0], s.state[1] = r.com[0], r.com[1] - self.ground
+        s.state[3] = r.com_velocity[1]
+        s.contact = contact
+        self.read_speed(momentum)
+
+    def read_speed(self, momentum: bool) -> None:
+        """Read the forward speed as the phase has it.
+
+        The swing leg's angular momentum makes dx/dt of the CoM swing within a step while the
+        momentum about the foot, which is what the template predicts, does not.
+
+        Args:
+            momentum: whether the speed includes the angular momentum about the CoM.
+        """
+        r, s = self._robot, self.now
+        s.state[2] = r.com_velocity[0]
+        if momentum:
+            s.state[2] += r.angular_momentum / (r.mass * s.state[1])
+
+    def take_roles(self) -> None:
+        """The feet have changed their roles, or one of them has lifted off."""
+        self._rear_shift = 0.0
+        self.now.feet = rear, front = self._feet.of
+        self.now.toes[:] = self._robot.foot_position[[rear, front], 0]
+
+    def stand_on(self, foot: int) -> None:
+        """Put the ground under a foot: the one that landed last has lifted off."""
+        self._feet.landed = foot
+        self.now.state[1] -= self._rise(foot)
+
+    def land(self, leg: Leg) -> float:
+        """Put the ground under the foot which has landed.
+
+        Where that is higher or lower than the rear foot's, the template's rear toe is moved so
+        that its leg keeps its length, and with it its force.
+
+        Returns:
+            How much higher the ground is now [m].
+        """
+        s, foot = self.now, self._feet.of[leg]
+        self._feet.landed = foot
+        higher = self._rise(foot)
+        height = s.state[1] - higher
+        if leg is not Leg.REAR:
+            back = s.state[0] - s.toes[Leg.REAR]
+            moved = np.sqrt(max(back**2 + s.state[1] ** 2 - height**2, 0.0))
+            self._rear_shift = float(back - np.copysign(moved, back))
+            s.toes[Leg.REAR] += self._rear_shift
+        s.state[1] = height
+        return higher
+
+    def _rise(self, foot: int) -> float:
+        """Put the ground under ``foot``; how much higher it is there [m]."""
+        before, self.ground = self.ground, self._height(foot)
+        return self.ground - before
+
+    def _height(self, foot: int) -> float:
+        return float(self._robot.foot_position[foot, 1])

@@ -139,7 +139,7 @@ class FreeController(EmbeddingController):
     def sway(self) -> Array:
         """(2,) y of the CoM, and dy/dt with the angular momentum as the forward speed has it."""
         s = self.robot.space
-        height = self._sensed.state[1]
+        height = self.sensing.now.state[1]
         speed = s.com_velocity[_SIDE]
         if self.station.control.momentum_speed:
             speed = speed - s.momentum[0] / (self.robot.mass * height)
