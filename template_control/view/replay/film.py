@@ -108,7 +108,7 @@ class _Stage:
                 line.set_data(*self._spring(record.template_com[row], self.toes[row, leg]))
             else:
                 line.set_data([], [])
-        self.trail.set_data(*record.com[rows[: frame + 1]].T)
+        self.trail.set_data(*record.com[rows[0] : row + 1].T)
         self.com.set_data(*record.com[row][:, None])
         self.template.set_data(*record.template_com[row][:, None])
         self.forces.set_offsets(record.foot[row])
