@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+import pybullet
 import pytest
 
 from template_control.errors import RobotError
@@ -11,9 +12,9 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.plant.free.mujoco import FreeMujocoPlant
 from template_control.plant.mujoco import MujocoOptions
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.free.free_biped import FreeBiped, JointLimits
 from template_control.robot.free.start import FreePose, free_state_in
-from template_control.robot.library import load_free_robot, robot_path
+from template_control.robot.library import FREE_ROBOTS, load_free_robot, robot_path
 
 
 @pytest.fixture(scope="module")
@@ -21,34 +22,51 @@ def bolt():
     return load_free_robot("bolt")
 
 
+@pytest.fixture(scope="module", params=FREE_ROBOTS)
+def free_robot(request):
+    return load_free_robot(request.param)
+
+
 def states(robot, count=10):
-    """Random configurations high above the ground, and velocities."""
+    """Random configurations high above the ground, away from the joints' stops; velocities."""
     rng = np.random.default_rng(5)
+    low, high = np.clip(robot.joint_range, -1.0, 1.0).T
+    low, high = np.r_[-np.ones(3), low + 0.01], np.r_[np.ones(3), high - 0.01]
     for _ in range(count):
-        step = np.concatenate(([0.0, 0.0, 5.0], rng.uniform(-1.0, 1.0, robot.nv - 3)))
+        step = np.concatenate(([0.0, 0.0, 5.0], rng.uniform(low, high)))
         yield pin.integrate(robot.model, robot.neutral(), step), rng.uniform(-2.0, 2.0, robot.nv)
 
 
-def of_world(q, v):
-    """Linear and angular velocity of the trunk in the world's axes, and the joints'."""
+def integrated(plant):
+    """(3,) the point of the trunk whose velocity the engine integrates, in its frame [m]."""
+    if isinstance(plant, FreeMujocoPlant):
+        return np.zeros(3)
+    told = pybullet.getDynamicsInfo(plant.body, -1, physicsClientId=plant.client)
+    return np.array(told[3])
+
+
+def of_world(q, v, point):
+    """Velocity of a point of the trunk and angular velocity in the world's axes; the joints'."""
     rotation = pin.Quaternion(q[3:7]).matrix()
-    return np.concatenate((rotation @ v[:3], rotation @ v[3:6], v[6:]))
+    linear = rotation @ (v[:3] + np.cross(v[3:6], point))
+    return np.concatenate((linear, rotation @ v[3:6], v[6:]))
 
 
 def plant_acceleration(robot, plant, q, v, torque):
     """By one step of the plant, in the world's axes: its integration is semi-implicit."""
-    after_q, after_v = np.zeros(robot.nq), np.zeros(robot.nv)
+    after_q, after_v, point = np.zeros(robot.nq), np.zeros(robot.nv), integrated(plant)
     plant.reset(q, v)
     plant.step(torque)
     plant.read(after_q, after_v)
-    return (of_world(after_q, after_v) - of_world(q, v)) / plant.time_step
+    return (of_world(after_q, after_v, point) - of_world(q, v, point)) / plant.time_step
 
 
-def model_acceleration(robot, q, v, torque):
+def model_acceleration(robot, q, v, torque, point):
     generalised = np.concatenate((np.zeros(6), torque))
     a = pin.aba(robot.model, robot.model.createData(), q, v, generalised)
-    rotation = pin.Quaternion(q[3:7]).matrix()
-    linear = rotation @ (a[:3] + np.cross(v[3:6], v[:3]))
+    rotation, spin = pin.Quaternion(q[3:7]).matrix(), v[3:6]
+    away = np.cross(a[3:6], point) + np.cross(spin, np.cross(spin, point))
+    linear = rotation @ (a[:3] + np.cross(spin, v[:3]) + away)
     return np.concatenate((linear, rotation @ a[3:6], a[6:]))
 
 
@@ -63,28 +81,31 @@ PLANTS = pytest.mark.parametrize(
 
 
 @PLANTS
-def test_forward_dynamics_agree_with_the_plants(bolt, plant_of):
+def test_forward_dynamics_agree_with_the_plants(free_robot, plant_of):
     """Of torques, of gravity and of velocity."""
     rng = np.random.default_rng(6)
-    with plant_of(bolt) as plant:
-        for q, v in states(bolt):
+    with plant_of(free_robot) as plant:
+        for q, v in states(free_robot):
             torque = rng.uniform(-0.5, 0.5, 6)
-            found = plant_acceleration(bolt, plant, q, v, torque)
-            np.testing.assert_allclose(found, model_acceleration(bolt, q, v, torque), atol=1e-8)
+            found = plant_acceleration(free_robot, plant, q, v, torque)
+            expected = model_acceleration(free_robot, q, v, torque, integrated(plant))
+            np.testing.assert_allclose(found, expected, atol=1e-8)
 
 
 @PLANTS
-def test_mass_matrix_and_bias_forces_agree_with_the_plants(bolt, plant_of):
+def test_mass_matrix_and_bias_forces_agree_with_the_plants(free_robot, plant_of):
     """M a + h = S' tau with the plant's accelerations; the torques' columns show M."""
-    with plant_of(bolt) as plant:
-        for q, v in states(bolt, 3):
-            bolt.update(q, v)
+    with plant_of(free_robot) as plant:
+        for q, v in states(free_robot, 3):
+            free_robot.update(q, v)
             rotation = pin.Quaternion(q[3:7]).matrix()
             for torque in (np.zeros(6), *(0.1 * np.eye(6))):
-                world = plant_acceleration(bolt, plant, q, v, torque)
-                own = rotation.T @ world[:3] - np.cross(v[3:6], v[:3])
-                a = np.concatenate((own, rotation.T @ world[3:6], world[6:]))
-                left = bolt.mass_matrix @ a + bolt.nonlinear_effects
+                world = plant_acceleration(free_robot, plant, q, v, torque)
+                spin, turning, point = v[3:6], rotation.T @ world[3:6], integrated(plant)
+                away = np.cross(turning, point) + np.cross(spin, np.cross(spin, point))
+                own = rotation.T @ world[:3] - np.cross(spin, v[:3]) - away
+                a = np.concatenate((own, turning, world[6:]))
+                left = free_robot.mass_matrix @ a + free_robot.nonlinear_effects
                 np.testing.assert_allclose(left, [*np.zeros(6), *torque], atol=1e-8)
 
 
@@ -100,23 +121,23 @@ def test_the_plant_reads_the_state_it_was_given(bolt, plant_of):
             np.testing.assert_allclose(v, wanted_v, atol=1e-12)
 
 
-def test_terms_match_finite_differences_in_the_heading_frame(bolt):
+def test_terms_match_finite_differences_in_the_heading_frame(free_robot):
     h = 1e-6
-    bolt.face(0.7, np.array([0.3, -0.2]))
-    s = bolt.space
-    for q, v in states(bolt, 5):
+    free_robot.face(0.7, np.array([0.3, -0.2]))
+    s = free_robot.space
+    for q, v in states(free_robot, 5):
 
         def rate(read, q=q, v=v):
             values = []
             for step in (h, -h):
-                bolt.update(pin.integrate(bolt.model, q, step * v), v)
+                free_robot.update(pin.integrate(free_robot.model, q, step * v), v)
                 values.append(np.copy(read()))
             return (values[0] - values[1]) / (2.0 * h)
 
         com = rate(lambda: s.com)
         velocity, momentum = rate(lambda: s.com_velocity), rate(lambda: s.momentum)
-        foot, turning = rate(lambda: bolt.contact_velocity), rate(lambda: s.turning)
-        bolt.update(q, v)
+        foot, turning = rate(lambda: free_robot.contact_velocity), rate(lambda: s.turning)
+        free_robot.update(q, v)
         np.testing.assert_allclose(s.com_velocity, com, atol=1e-7)
         np.testing.assert_allclose(s.com_bias, velocity, atol=1e-6)
         np.testing.assert_allclose(s.momentum_bias, momentum, atol=1e-6)
@@ -125,9 +146,9 @@ def test_terms_match_finite_differences_in_the_heading_frame(bolt):
         np.testing.assert_allclose(s.com_jacobian @ v, s.com_velocity, atol=1e-12)
         np.testing.assert_allclose(s.momentum_jacobian @ v, s.momentum, atol=1e-12)
         np.testing.assert_allclose(s.turning_jacobian @ v, s.turning, atol=1e-12)
-        np.testing.assert_allclose(bolt.com, s.com[[0, 2]])
-        assert bolt.angular_momentum == s.momentum[1]
-    bolt.face(0.0, np.zeros(2))
+        np.testing.assert_allclose(free_robot.com, s.com[[0, 2]])
+        assert free_robot.angular_momentum == s.momentum[1]
+    free_robot.face(0.0, np.zeros(2))
 
 
 def test_a_turn_keeps_its_pivot_and_turns_the_rest(bolt):
@@ -181,6 +202,8 @@ def test_a_start_is_in_the_pose(bolt):
 
 
 def test_the_limits_are_those_of_the_actuators(bolt):
+    np.testing.assert_allclose(bolt.joint_range[:, 1], 2 * [1.0, 1.9, 3.4])
+    np.testing.assert_allclose(bolt.joint_range[:, 0], -bolt.joint_range[:, 1])
     np.testing.assert_allclose(bolt.torque_limit, 2.7)
     np.testing.assert_allclose(bolt.velocity_limit, 83.8, atol=0.05)
     assert bolt.legs == ((0, 1, 2), (3, 4, 5))
@@ -197,6 +220,12 @@ def test_the_limits_are_those_of_the_actuators(bolt):
 def test_what_is_no_free_biped_is_refused(feet, message):
     with pytest.raises(RobotError, match=message):
         FreeBiped.from_urdf(robot_path("bolt"), feet, 0.016)
+
+
+def test_ranges_are_given_for_every_joint_of_a_leg():
+    limits = JointLimits(torque=2.0, velocity=80.0, ranges=((-1.0, 1.0), (-2.0, 2.0)))
+    with pytest.raises(RobotError, match="3 joints move foot 'FL_FOOT', and 2 ranges"):
+        FreeBiped.from_urdf(robot_path("bolt"), ("FL_FOOT", "FR_FOOT"), 0.016, limits=limits)
 
 
 def test_a_planar_robot_is_not_free():

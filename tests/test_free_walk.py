@@ -9,6 +9,7 @@ import pytest
 import template_control as tc
 from template_control.cli.main import main
 from template_control.cli.options.world import simulation_choice
+from template_control.cli.report.run_table import in_space
 from template_control.errors import ParameterError
 from template_control.robot.library import load_free_robot
 from template_control.run.data_frame import columns
@@ -45,6 +46,12 @@ def test_bolt_walks_free(straight):
     assert figures["step_width"]["least"] > 0.02
     assert abs(record.space_com[-1, 1]) < 0.2
     assert np.all(np.abs(record.torque) <= 2.7 + 1e-9)
+    ranges = {"HAA": 1.0, "HFE": 1.9, "KFE": 3.4}
+    for joint, (name, angle) in enumerate(figures["joint_angle"].items()):
+        assert angle["least"] == pytest.approx(record.q[:, 7 + joint].min())
+        assert angle["most"] == pytest.approx(record.q[:, 7 + joint].max())
+        assert angle["upper"] == -angle["lower"] == ranges[name[-3:]]
+        assert angle["lower"] < angle["least"] < angle["most"] < angle["upper"]
 
 
 @pytest.mark.slow(seconds=1)
@@ -118,6 +125,25 @@ def test_the_command_walks_free(tmp_path, capfd):
     assert {"from_above.png", "lateral_portrait.png", "attitude.png", "run.toml"} <= {
         path.name for path in (tmp_path / "run").iterdir()
     }
+
+
+def test_a_joint_past_its_limit_is_told():
+    attitude = dict.fromkeys(("roll", "pitch", "yaw"), 0.0)
+    figures = {
+        "attitude_rms": attitude,
+        "attitude_max": attitude,
+        "turned": 0.0,
+        "mean_yaw_drift": 0.0,
+        "step_width": None,
+        "joint_angle": {
+            "hip": {"least": -0.5, "most": 0.2, "lower": -0.4, "upper": 0.4},
+            "knee": {"least": 0.1, "most": 1.0, "lower": 0.0, "upper": 2.0},
+        },
+    }
+    rows = {}
+    in_space(figures, rows.__setitem__)
+    assert rows["hip angle"] == "-0.50 to +0.20 of -0.4 to 0.4 rad, past its limit"
+    assert rows["knee angle"] == "+0.10 to +1.00 of 0 to 2 rad"
 
 
 def test_what_a_free_robot_cannot_do_is_refused(refused):

@@ -1,8 +1,11 @@
 from .biped import Biped as Biped
 from .five_link import FiveLink as FiveLink
 from .five_link import Link as Link
+from .five_link import SolidLink as SolidLink
 from .free.free_biped import FreeBiped as FreeBiped
 from .free.free_biped import JointLimits as JointLimits
+from .free.free_five_link import FreeFiveLink as FreeFiveLink
+from .free.free_five_link import HipBlock as HipBlock
 from .free.start import FreePose as FreePose
 from .free.start import free_state_in as free_state_in
 from .library import FREE_ROBOTS as FREE_ROBOTS

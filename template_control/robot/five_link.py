@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
@@ -10,7 +11,9 @@ from template_control.checks.ranges import Interval, NotNegative, Positive
 from template_control.errors import RobotError
 
 _COLOURS = {"grey": "0.55 0.57 0.60 1", "blue": "0.16 0.38 0.63 1", "orange": "0.86 0.45 0.13 1"}
-_SIDES = (("left", "blue", 0.5), ("right", "orange", -0.5))
+SIDES = {"left": ("blue", 0.5), "right": ("orange", -0.5)}
+"""Colour of a side's leg, and its place over the hips' distance."""
+
 _BASE = (
     ("base_x", "prismatic", "world", "slide_x", "1 0 0"),
     ("base_z", "prismatic", "slide_x", "slide_z", "0 0 1"),
@@ -36,6 +39,30 @@ class Link(Checked):
     mass: Positive
     com: Positive
     inertia: Positive
+
+    @property
+    def moments(self) -> tuple[float, float, float]:
+        """About x, y and z through its centre of mass [kg m^2].
+
+        The plane does not feel the first and the last: they are those of a rod along z.
+        """
+        return self.inertia, self.inertia, 0.1 * self.inertia
+
+
+@dataclass(frozen=True)
+class SolidLink(Link):
+    """A link of a robot that moves in space.
+
+    Attributes:
+        side_inertia: about +x and +z through its centre of mass [kg m^2]. ``inertia`` is about +y.
+    """
+
+    side_inertia: tuple[Positive, Positive]
+
+    @property
+    def moments(self) -> tuple[float, float, float]:
+        """See :attr:`Link.moments`."""
+        return self.side_inertia[0], self.inertia, self.side_inertia[1]
 
 
 @dataclass(frozen=True)
@@ -70,54 +97,46 @@ class FiveLink(Checked):
 
     def urdf(self) -> str:
         """The robot as URDF text, planar: x, z and pitch unactuated, hinges about +y."""
-        thigh, shank = self.thigh, self.shank
         parts = [
-            f"<robot name={quoteattr(self.name)}>",
-            *(f'<material name="{n}"><color rgba="{c}"/></material>' for n, c in _COLOURS.items()),
             '<link name="world"/>',
-            *(f'<link name="{name}">{_massless()}</link>' for name in ("slide_x", "slide_z")),
-            self._trunk(),
+            *(f'<link name="{name}">{massless()}</link>' for name in ("slide_x", "slide_z")),
+            self.trunk_link(),
         ]
-        for side, colour, _ in _SIDES:
-            parts += [
-                _segment(f"{side}_thigh", thigh, colour),
-                _segment(f"{side}_shank", shank, colour),
-                self._foot(f"{side}_foot", colour),
-            ]
-        parts += [_joint(*row, limit=(-1e3, 1e3, 0.0, 1e3)) for row in _BASE]
-        axis = "0 1 0"
-        for side, _, share in _SIDES:
-            hip, knee = self.torque_limit
-            parts += [
-                _joint(
-                    f"{side}_hip",
-                    "revolute",
-                    "trunk",
-                    f"{side}_thigh",
-                    axis,
-                    origin=f"0 {share * self.hip_width:g} 0",
-                    limit=(*self.hip_range, hip, self.velocity_limit),
-                ),
-                _joint(
-                    f"{side}_knee",
-                    "revolute",
-                    f"{side}_thigh",
-                    f"{side}_shank",
-                    axis,
-                    origin=f"0 0 {-thigh.length:g}",
-                    limit=(*self.knee_range, knee, self.velocity_limit),
-                ),
-                _joint(
-                    f"{side}_ankle",
-                    "fixed",
-                    f"{side}_shank",
-                    f"{side}_foot",
-                    origin=f"0 0 {-shank.length:g}",
-                ),
-            ]
-        return "\n".join(['<?xml version="1.0"?>', *parts, "</robot>", ""])
+        for side in SIDES:
+            parts += self.leg_links(side)
+        parts += [joint(*row, limit=(-1e3, 1e3, 0.0, 1e3)) for row in _BASE]
+        for side in SIDES:
+            parts += self.leg_joints(side, "trunk", self.hip_place(side))
+        return urdf_of(self.name, parts)
 
-    def _trunk(self) -> str:
+    def hip_place(self, side: str) -> str:
+        """Where a hip is in the trunk, as URDF text.
+
+        Args:
+            side: of :data:`SIDES`.
+        """
+        return f"0 {SIDES[side][1] * self.hip_width:g} 0"
+
+    def leg_joints(self, side: str, parent: str, origin: str) -> list[str]:
+        """Hip, knee and the fixed ankle, as URDF text.
+
+        Args:
+            side: of :data:`SIDES`.
+            parent: link that the thigh hangs from.
+            origin: of the hip there.
+        """
+        (hip, knee), speed, axis = self.torque_limit, self.velocity_limit, "0 1 0"
+        hip_limit, knee_limit = (*self.hip_range, hip, speed), (*self.knee_range, knee, speed)
+        thigh, shank = f"{side}_thigh", f"{side}_shank"
+        bend, end = f"0 0 {-self.thigh.length:g}", f"0 0 {-self.shank.length:g}"
+        return [
+            joint(f"{side}_hip", "revolute", parent, thigh, axis, origin=origin, limit=hip_limit),
+            joint(f"{side}_knee", "revolute", thigh, shank, axis, origin=bend, limit=knee_limit),
+            joint(f"{side}_ankle", "fixed", shank, f"{side}_foot", origin=end),
+        ]
+
+    def trunk_link(self) -> str:
+        """The trunk as URDF text."""
         trunk = self.trunk
         size = f"{0.4 * trunk.length:g} {1.5 * self.hip_width:g} {trunk.length:g}"
         box = f'<geometry><box size="{size}"/></geometry>'
@@ -128,33 +147,61 @@ class FiveLink(Checked):
             f"  <collision>{place}{box}</collision></link>"
         )
 
-    def _foot(self, name: str, colour: str) -> str:
+    def leg_links(self, side: str) -> list[str]:
+        """Thigh, shank and foot as URDF text.
+
+        Args:
+            side: of :data:`SIDES`.
+        """
+        colour = SIDES[side][0]
         sphere = f'<geometry><sphere radius="{self.foot_radius:g}"/></geometry>'
-        return (
-            f'<link name="{name}">{_massless()}\n  <visual>{sphere}<material name="{colour}"/>'
-            f"</visual>\n  <collision>{sphere}</collision></link>"
-        )
+        return [
+            _segment(f"{side}_thigh", self.thigh, colour),
+            _segment(f"{side}_shank", self.shank, colour),
+            f'<link name="{side}_foot">{massless()}\n'
+            f'  <visual>{sphere}<material name="{colour}"/></visual>\n'
+            f"  <collision>{sphere}</collision></link>",
+        ]
 
 
-def _inertia(value: float) -> str:
-    # Out of the plane any physically valid number serves: a link that is a rod along z.
+def urdf_of(name: str, parts: Iterable[str]) -> str:
+    """A URDF's text.
+
+    Args:
+        name: of the robot.
+        parts: links and joints.
+    """
+    colours = (f'<material name="{n}"><color rgba="{c}"/></material>' for n, c in _COLOURS.items())
+    head = ('<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>")
+    return "\n".join([*head, *colours, *parts, "</robot>", ""])
+
+
+def inertial(height: float, mass: float, moments: tuple[float, float, float]) -> str:
+    """A link's masses as URDF text.
+
+    Args:
+        height: of its centre of mass in its frame [m].
+        mass: [kg].
+        moments: about x, y and z through the centre of mass [kg m^2].
+    """
+    xx, yy, zz = moments
     return (
-        f'<inertia ixx="{value:.8g}" ixy="0" ixz="0" iyy="{value:.8g}" iyz="0"'
-        f' izz="{0.1 * value:.8g}"/>'
+        f'\n  <inertial><origin xyz="0 0 {height:.8g}"/><mass value="{mass:.8g}"/>'
+        f'<inertia ixx="{xx:.8g}" ixy="0" ixz="0" iyy="{yy:.8g}" iyz="0"'
+        f' izz="{zz:.8g}"/></inertial>'
+    )
+
+
+def massless() -> str:
+    """Masses of a link that has none; without them PyBullet gives it a kilogram."""
+    return (
+        '\n  <inertial><mass value="0"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0"'
+        ' izz="0"/></inertial>'
     )
 
 
 def _inertial(link: Link, up: bool = False) -> str:
-    height = link.com if up else -link.com
-    return (
-        f'\n  <inertial><origin xyz="0 0 {height:.8g}"/><mass value="{link.mass:.8g}"/>'
-        f"{_inertia(link.inertia)}</inertial>"
-    )
-
-
-def _massless() -> str:
-    # Without an explicit zero PyBullet gives a link a kilogram.
-    return '\n  <inertial><mass value="0"/>' + _inertia(0.0) + "</inertial>"
+    return inertial(link.com if up else -link.com, link.mass, link.moments)
 
 
 def _segment(name: str, link: Link, colour: str) -> str:
@@ -167,7 +214,7 @@ def _segment(name: str, link: Link, colour: str) -> str:
     )
 
 
-def _joint(
+def joint(
     name: str,
     kind: str,
     parent: str,
@@ -176,6 +223,16 @@ def _joint(
     origin: str = "0 0 0",
     limit: tuple[float, float, float, float] | None = None,
 ) -> str:
+    """A joint as URDF text.
+
+    Args:
+        name: of the joint.
+        kind: revolute, prismatic or fixed.
+        parent, child: its links.
+        axis: that it turns about; "" for none.
+        origin: in the parent.
+        limit: lower, upper [rad], effort [N m], velocity [rad/s]; None for none.
+    """
     text = (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
         f'\n  <origin xyz="{origin}"/>'

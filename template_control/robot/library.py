@@ -25,7 +25,8 @@ class _Entry:
         about: one line.
         distribution: the Python package that brings the URDF; "" for ours.
         feet, sagittal_joints, foot_radius, walk: see :meth:`PlanarBiped.from_urdf`.
-        limits: of a robot that walks free, in place of the URDF's; None where it cannot.
+        free: whether it can walk free.
+        limits: of a robot that walks free, in place of the URDF's; None to keep those.
     """
 
     file: str
@@ -35,13 +36,19 @@ class _Entry:
     sagittal_joints: tuple[str, ...] = ()
     foot_radius: float | None = None
     walk: tuple[float, float] | None = None
+    free: bool = False
     limits: JointLimits | None = None
 
 
 # Bolt's actuator, the module of the Open Dynamic Robot Initiative (Grimminger et al., "An open
 # torque-controlled modular robot architecture for legged locomotion research", 2020): a motor of
-# 0.025 N m/A and 300 rpm/V behind belts of 9:1, 12 A at most, 24 V.
-_BOLT_ACTUATOR = JointLimits(torque=0.025 * 9.0 * 12.0, velocity=300.0 * 24.0 / 9.0 * np.pi / 30.0)
+# 0.025 N m/A and 300 rpm/V behind belts of 9:1, 12 A at most, 24 V. Ranges: those that the
+# initiative's driver lets the real robot's joints have (odri_control_interface, config_bolt.yaml).
+_BOLT_ACTUATOR = JointLimits(
+    torque=0.025 * 9.0 * 12.0,
+    velocity=300.0 * 24.0 / 9.0 * np.pi / 30.0,
+    ranges=((-1.0, 1.0), (-1.9, 1.9), (-3.4, 3.4)),
+)
 
 _ENTRIES = {
     "five-link": _Entry("five_link.urdf", "light legs, as robots built for the SLIP have them"),
@@ -61,14 +68,21 @@ _ENTRIES = {
         feet=("FL_FOOT", "FR_FOOT"),
         sagittal_joints=("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE"),
         foot_radius=0.016,
+        free=True,
         limits=_BOLT_ACTUATOR,
+    ),
+    "five-link-3d": _Entry(
+        "five_link_3d.urdf",
+        "five-link with hip ab- and adduction, limits of Unitree's H1",
+        sagittal_joints=("left_hip", "left_knee", "right_hip", "right_knee"),
+        free=True,
     ),
 }
 
 ROBOTS: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
 """Names that :func:`load_robot` knows, with a line about each."""
 
-FREE_ROBOTS = tuple(name for name, entry in _ENTRIES.items() if entry.limits is not None)
+FREE_ROBOTS = tuple(name for name, entry in _ENTRIES.items() if entry.free)
 """Names that :func:`load_free_robot` knows."""
 
 
@@ -136,7 +150,7 @@ def load_free_robot(name: str | Path) -> FreeBiped:
     if text not in _ENTRIES and (text.endswith(".urdf") or "/" in text):
         return FreeBiped.from_urdf(text)
     path, entry = robot_path(text), _ENTRIES[text]
-    if entry.limits is None:
+    if not entry.free:
         raise RobotError(
             f"robot {text!r} is planar and cannot walk free: give one of {list(FREE_ROBOTS)} or a"
             " URDF file"

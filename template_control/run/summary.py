@@ -149,8 +149,8 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         flight_share (robot, template: of the gait), duty_factor (share of the time that a foot is
         on the ground), control_tick_seconds and qp_solve_seconds (median, p99), plan_seconds
         (median, p99), real_time_factor, steps_not_nominal (plans that left the planner's own law),
-        record; of a run in space also what
-        :func:`~template_control.run.kinds.free_summary.in_space` tells.
+        record; of a run in space also joint_angle (per joint least and most, and the range's lower
+        and upper [rad]) and what :func:`~template_control.run.kinds.free_summary.in_space` tells.
     """
     m = record.metadata
     duration = m["duration"]

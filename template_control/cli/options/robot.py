@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from template_control.errors import ParameterError
-from template_control.robot.library import ROBOTS
+from template_control.robot.library import FREE_ROBOTS, ROBOTS
 from template_control.run.choices.robot import RobotChoice
 
 _DEFAULT = RobotChoice().model
@@ -37,8 +37,8 @@ def add_robot_options(parser: argparse.ArgumentParser) -> None:
         "--free",
         action="store_const",
         const=True,
-        help="nothing holds the robot: it walks in space, as bolt can and 3D URDFs of two legs with"
-        " hip ab- and adduction",
+        help=f"nothing holds the robot: it walks in space, as {', '.join(FREE_ROBOTS)} can, and 3D"
+        " URDFs of two legs with hip ab- and adduction",
     )
     own = parser.add_argument_group("a URDF of your own")
     own.add_argument(

@@ -56,7 +56,7 @@ def print_table(figures: dict[str, Any]) -> None:
             f"{1e3 * rms[axis]:.2f} / {1e3 * worst[axis]:.2f} mm",
         )
     if "attitude_rms" in figures:
-        _in_space(figures, row)
+        in_space(figures, row)
     for joint, torque in figures["joint_torque"].items():
         row(
             f"{joint} torque, peak / RMS of limit",
@@ -93,8 +93,13 @@ def print_table(figures: dict[str, Any]) -> None:
     plain_console().print(table)
 
 
-def _in_space(figures: dict[str, Any], row: Callable[[str, str], None]) -> None:
-    """Rows of a robot that nothing holds."""
+def in_space(figures: dict[str, Any], row: Callable[[str, str], None]) -> None:
+    """The rows of a robot that nothing holds.
+
+    Args:
+        figures: of the run.
+        row: adds one.
+    """
     rms, most = figures["attitude_rms"], figures["attitude_max"]
     for angle in rms:
         row(f"{angle}, RMS / max", f"{rms[angle]:.4f} / {most[angle]:.4f} rad")
@@ -105,6 +110,13 @@ def _in_space(figures: dict[str, Any], row: Callable[[str, str], None]) -> None:
         row(
             "step width, mean / deviation / least",
             f"{width['mean']:.3f} / {width['deviation']:.3f} / {width['least']:.3f} m",
+        )
+    for joint, angle in figures.get("joint_angle", {}).items():  # earlier versions did not keep it
+        past = angle["least"] < angle["lower"] or angle["most"] > angle["upper"]
+        row(
+            f"{joint} angle",
+            f"{angle['least']:+.2f} to {angle['most']:+.2f} of {angle['lower']:g} to"
+            f" {angle['upper']:g} rad" + (", past its limit" if past else ""),
         )
 
 

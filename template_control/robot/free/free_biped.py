@@ -22,10 +22,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Positive
+from template_control.checks.ranges import Interval, Positive
 from template_control.robot.biped import Biped, sagittal_length
 from template_control.robot.free.free_terms import BASE_DOF, FreeTerms, gather, sources
-from template_control.robot.free.requirements import check_free, set_limits
+from template_control.robot.free.requirements import check_free, set_limits, set_ranges
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planarise import spheres
 from template_control.robot.requirements import foot_radius_of
@@ -50,10 +50,12 @@ class JointLimits(Checked):
     Attributes:
         torque: the largest [N m].
         velocity: the largest [rad/s].
+        ranges: of a leg's joints, from the trunk to the knee [rad]; empty to keep the URDF's.
     """
 
     torque: Positive
     velocity: Positive
+    ranges: tuple[Interval, ...] = ()
 
 
 class FreeBiped(Biped):
@@ -75,6 +77,7 @@ class FreeBiped(Biped):
         origin: (2,) x and y of the heading frame's origin in the world [m].
         space: all terms with three directions, in the heading frame.
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
+        joint_range: (nu, 2) from where to where each joint turns, by the URDF's limits [rad].
     """
 
     base_dof = BASE_DOF
@@ -89,6 +92,8 @@ class FreeBiped(Biped):
             for leg, foot in zip(self._leg_joints, self._foot_ids, strict=True)
         )
         data = self._data
+        limits = (model.lowerPositionLimit, model.upperPositionLimit)
+        self.joint_range = np.column_stack(limits)[_POSITION:]
         self.rotation: Array = data.oMi[_ROOT].rotation
         self._hips = [data.oMi[leg[-2]].translation for leg in self._leg_joints]
         self._sources = sources(model, data, self._foot_ids, self.foot_radius)
@@ -149,6 +154,8 @@ class FreeBiped(Biped):
         tree = read_urdf(path)
         if limits is not None:
             set_limits(tree, limits.torque, limits.velocity)
+            if limits.ranges:
+                set_ranges(path, tree, feet, limits.ranges)
         spheres(tree, feet, foot_radius)
         find_meshes(path, tree)
         check_shapes(path, tree)

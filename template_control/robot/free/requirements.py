@@ -36,6 +36,45 @@ def set_limits(robot: ET.Element, torque: float, velocity: float) -> None:
             limit.set("velocity", f"{velocity:.12g}")
 
 
+def set_ranges(
+    path: Path, robot: ET.Element, feet: Sequence[str], ranges: Sequence[tuple[float, float]]
+) -> None:
+    """Give the joints of both legs other ranges.
+
+    Args:
+        path: of the URDF, for the message.
+        robot: its root element, whose moving joints have limits; changed.
+        feet: names of the two foot links.
+        ranges: of a leg's joints, from the trunk to the knee [rad].
+
+    Raises:
+        RobotError: if a leg has another number of joints.
+    """
+    carriers = {_link(joint, "child"): joint for joint in robot.findall("joint")}
+    for foot in feet:
+        leg, link = [], foot
+        while link in carriers:
+            joint = carriers.pop(link)
+            link = _link(joint, "parent")
+            if joint.get("type") != "fixed":
+                leg.append(joint)
+        if len(leg) != len(ranges):
+            raise RobotError(
+                f"{path}: {len(leg)} joints move foot {foot!r}, and {len(ranges)} ranges are given:"
+                " give one for each joint of a leg"
+            )
+        for joint, (lower, upper) in zip(reversed(leg), ranges, strict=True):
+            for limit in joint.findall("limit"):
+                limit.set("lower", f"{lower:.12g}")
+                limit.set("upper", f"{upper:.12g}")
+
+
+def _link(joint: ET.Element, end: str) -> str:
+    """Name of the link at an end of a joint."""
+    found = joint.find(end)
+    return "" if found is None else str(found.get("link"))
+
+
 def check_free(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
     """Check that the robot is a biped whose legs can place their feet anywhere.
 
@@ -78,3 +117,11 @@ def check_free(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
                 raise RobotError(
                     f"{path}: joint {model.names[joint]!r} has {kind} {limit}: give its limit"
                 )
+    for joint in (*legs[0], *legs[1]):
+        place = model.idx_qs[joint]
+        lower, upper = model.lowerPositionLimit[place], model.upperPositionLimit[place]
+        if not lower < upper:
+            raise RobotError(
+                f"{path}: joint {model.names[joint]!r} has lower {lower:g} and upper {upper:g}:"
+                " give a range that it can turn in"
+            )

@@ -47,11 +47,17 @@ class FreeRecorder(Recorder):
         super().__init__(controller, every)
         self._free = controller
         self._rows: list[Array] = []
+        self._first = controller.robot.nq - len(controller.robot.joint_names)
+        self._least = np.full(len(controller.robot.joint_names), np.inf)
+        self._most = -self._least
 
     def tick(self, true: Truth, solution: Solution, seconds: float) -> None:
         """See :meth:`template_control.run.recorder.Recorder.tick`."""
         c, robot = self._free, self._free.robot
         sampled = self.ticks % self.every == 0
+        angles = true.q[self._first :]
+        np.minimum(self._least, angles, out=self._least)
+        np.maximum(self._most, angles, out=self._most)
         cosine, sine = np.cos(robot.heading), np.sin(robot.heading)
         world = true.contact_force
         planar = np.column_stack((cosine * world[:, 0] + sine * world[:, 1], world[:, 2]))
@@ -66,6 +72,18 @@ class FreeRecorder(Recorder):
         parts = (robot.to_world(robot.space.com), feet, world, robot.roll_pitch_yaw())
         row = np.concatenate((*parts, robot.heading, sway, side), axis=None)
         self._rows.append(row)
+
+    def summary(self) -> dict[str, Any]:
+        """See :meth:`template_control.run.recorder.Recorder.summary`; and the joints' angles."""
+        robot = self._free.robot
+        rows = np.column_stack((self._least, self._most, robot.joint_range)).tolist()
+        return {
+            **super().summary(),
+            "joint_angle": {
+                name: dict(zip(("least", "most", "lower", "upper"), row, strict=True))
+                for name, row in zip(robot.joint_names, rows, strict=True)
+            },
+        }
 
     def record(self, metadata: dict[str, Any]) -> FreeRecord:
         """See :meth:`template_control.run.recorder.Recorder.record`."""
