@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +12,11 @@ from template_control.errors import RobotError
 from template_control.robot import (
     FreeBiped,
     FreeFiveLink,
+    FreePose,
     HipBlock,
+    JointLimits,
     SolidLink,
+    free_state_in,
     load_free_robot,
     robot_path,
 )
@@ -141,13 +145,8 @@ ABDUCTION = '<axis xyz="1 0 0"/><limit lower="-0.43" upper="0.43" effort="200" v
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('effort="300"', 'effort="0"', "'left_knee' has effort"),
         ('effort="200" velocity="23"', 'effort="200" velocity="0"', "'left_abduction' has velo"),
         ('effort="300"', 'effort="nan"', "limit has effort 'nan'"),
-        ('lower="0" upper="2.05"', 'lower="2.05" upper="0"', "left_knee"),
-        ('name="left_hip" type="revolute"', 'name="left_hip" type="continuous"', "'left_hip'"),
-        ('name="left_hip" type="revolute"', 'name="left_hip" type="fixed"', "2 joints move foot"),
-        ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>', "'left_hip' of foot 'left_foot' does not"),
         (ABDUCTION, ABDUCTION.replace("1 0 0", "0 0 0"), "axis is 0 0 0"),
         ('<link name="left_foot">', '<link name="toe">', "no child link 'left_foot'"),
         ('joint name="right_hip"', 'joint name="left_hip"', "two joints 'left_hip'"),
@@ -160,15 +159,69 @@ def test_a_urdf_that_is_wrong_is_told(load, text, old, new, told):
         load(changed(text, old, new, 2 if "sphere" in old else 1))
 
 
-def test_a_joint_in_no_leg_is_refused(load, text):
-    arm = re.search(r'<link name="left_shank">.*?</link>', text, re.S).group()
-    joint = (
-        '<joint name="elbow" type="revolute"><parent link="trunk"/><child link="arm"/>'
-        '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="9" velocity="9"/></joint>'
-    )
-    more = arm.replace("left_shank", "arm") + joint + "</robot>"
-    with pytest.raises(RobotError, match=r"joints \['elbow'\] are in no leg: make them fixed"):
-        load(changed(text, "</robot>", more))
+# -- the messages that docs/your_free_robot.md explains -----------------------------------------
+
+PAGE = (Path(__file__).parents[1] / "docs" / "your_free_robot.md").read_text()
+HIP = 'name="left_hip" type="revolute"'
+ARM = """<link name="arm"><inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1"
+  iyz="0" izz="0.1"/></inertial></link><joint name="elbow" type="revolute"><parent link="trunk"/>
+  <child link="arm"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="9" velocity="9"/>
+  </joint>
+"""
+
+
+def edited(old, new):
+    return lambda load: load(changed(robot_path("five-link-3d").read_text(), old, new))
+
+
+def start(robot, height=0.98):
+    feet = np.array([[0.0, 0.1, 0.0], [0.0, -0.1, 0.05]])
+    pose = FreePose(np.array([0.0, 0.0, height]), np.zeros(3), feet, np.zeros((2, 3)))
+    free_state_in(robot, pose)
+
+
+def limited(ranges):
+    path, limits = robot_path("five-link-3d"), JointLimits(200.0, 20.0, ranges)
+    return FreeBiped.from_urdf(path, limits=limits)
+
+
+MISTAKES = {
+    "joints move foot … three or four are needed": edited(HIP, HIP.replace("revolute", "fixed")),
+    "does not turn about the lateral axis y, as hip and knee must": edited(
+        '<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>'
+    ),
+    "are in no leg: make them fixed": edited("</robot>", ARM + "</robot>"),
+    "is JointModel… and must be revolute with limits": edited(
+        HIP, HIP.replace("revolute", "continuous")
+    ),
+    "has effort … give its limit": edited('effort="300"', 'effort="0"'),
+    "has lower … and upper … give a range that it can turn in": edited(
+        'lower="0" upper="2.05"', 'lower="2.05" upper="0"'
+    ),
+    "ranges are given: give one for each joint of a leg": lambda _: limited(((-1.0, 1.0),)),
+    "hang on the same leg: name one of each": lambda _: FreeBiped.from_urdf(
+        robot_path("five-link")
+    ),
+    "is planar and cannot walk free": lambda _: load_free_robot("human"),
+    "the legs do not reach a CoM height of …": lambda _: start(
+        load_free_robot("five-link-3d"), 1.4
+    ),
+    "needs joints beyond their limits": lambda _: start(
+        limited(((-0.5, 0.5), (-1.0, 1.0), (0.0, 0.3)))
+    ),
+}
+
+
+def test_every_explained_message_is_provoked_here():
+    section = PAGE.split("## 4.")[1]
+    assert re.findall(r"^\| `(.*?)`", section, flags=re.MULTILINE) == list(MISTAKES)
+
+
+@pytest.mark.parametrize("message", MISTAKES)
+def test_a_mistake_gives_its_message(message, load):
+    pattern = ".*".join(re.escape(part) for part in message.split("…"))
+    with pytest.raises(RobotError, match=pattern):
+        MISTAKES[message](load)
 
 
 @pytest.mark.slow(seconds=20)

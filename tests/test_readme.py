@@ -34,6 +34,7 @@ GUIDES = (
     "running.md",
     "architecture.md",
     "free.md",
+    "your_free_robot.md",
 )
 
 
