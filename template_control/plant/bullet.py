@@ -298,16 +298,20 @@ class BulletPlant:
             torque: (nu,) joint torques [N m].
             push: horizontal disturbance on the trunk's centre of mass [N].
         """
+        self._advance(torque, push, 0.0)
+
+    def _advance(self, torque: Array, push: float, aside: float) -> None:
+        """One physics step with a push along the world's x and y [N]."""
         p, c = pybullet, self.client
         self._contacts = None
         p.setJointMotorControlArray(
             self.body, self._actuated, p.TORQUE_CONTROL, forces=torque, physicsClientId=c
         )
-        if push:
+        if push or aside:
             p.applyExternalForce(
                 self.body,
                 self._trunk,
-                [push, 0.0, 0.0],
+                [push, aside, 0.0],
                 self._trunk_com(),
                 p.WORLD_FRAME,
                 physicsClientId=c,

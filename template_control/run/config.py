@@ -123,6 +123,10 @@ class RunConfig(Checked):
                 "a course, of turning rate or step width, is for a free robot: give --free, or"
                 " leave it out"
             )
+        if not self.robot.free and any(push.direction for push in self.simulation.pushes):
+            raise ParameterError(
+                "a push with a direction is for a free robot: give --free, or leave it out"
+            )
         robot = self.robot.load()
         ready(WALK)  # before the gait is looked for, which would compile a part of it alone
         if self.scenario is None:

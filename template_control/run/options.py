@@ -33,12 +33,14 @@ class Push(Checked):
         step: number of the step in which the push begins; 0 is the first.
         phase: time from this step's VLO to the push, over the gait's step duration.
         duration: how long the force acts [s].
+        direction: of a free robot, from forward to the left [rad].
     """
 
     impulse: float
     step: Index = 10
     phase: NotNegative = 0.0
     duration: Positive = 0.1
+    direction: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -94,7 +94,8 @@ class Record:
         rear: (T,) index of the rear stance foot.
         solved: (T,) False where the QP was not solved.
         swing_reference: (T, 2, 2) position of each foot's reference, NaN where it has none.
-        push: (T,) disturbance on the trunk [N].
+        push: (T,) disturbance on the trunk, forward positive; of a free robot its size, negative
+            where it acts backward [N].
         section: (S,) index into ``metadata["sections"]`` of each section reached, the start's
             included.
         section_time: (S,) of each.

@@ -26,7 +26,7 @@ class Truth(NamedTuple):
         q: (nq,) true configuration.
         v: (nv,) true velocity.
         contact_force: (2, 2) the ground's force on each foot [N].
-        push: disturbance on the trunk [N].
+        push: disturbance on the trunk; of a free robot its size, negative backward [N].
     """
 
     time: float

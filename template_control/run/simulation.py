@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from math import copysign, cos, hypot, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,7 +116,8 @@ def simulate(
         with kind.plant(o.plant) as plant:
             plant.reset(q, v)
             try:
-                reason = _loop(plant, controller, recorder, o, senses, (last, progress))
+                world = (plant, kind, senses)
+                reason = _loop(world, controller, recorder, o, (last, progress))
             except KeyboardInterrupt as error:
                 if not recorder.rows:
                     raise
@@ -181,17 +183,18 @@ def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
 
 
 def _loop(
-    plant: Plant,
+    world: tuple[Plant, Kind, Senses],
     controller: EmbeddingController,
     recorder: Recorder,
     o: SimulationOptions,
-    senses: Senses,
     until: tuple[float, Callable[[int], None] | None],
 ) -> str:
     """Run until the steps are done ("") or the robot falls (why).
 
-    ``until`` holds the number of steps, and what is called with those done.
+    ``world`` holds the plant, how pushes act in it, and what is told of it; ``until`` the number
+    of steps, and what is called with those done.
     """
+    plant, kind, senses = world
     last, progress = until
     robot, planning = controller.robot, controller.planning
     dt = o.plant.time_step
@@ -217,8 +220,9 @@ def _loop(
         if len(begun) < len(controller.reports):
             # A step that changes into another stride keeps its pushes where they were.
             begun.append((controller.reports[-1].time, controller.planner.gait.step_duration))
-        push = _push(o.pushes, begun, now)
-        recorder.tick(Truth(now, q, v, forces, push), solution, seconds)
+        along, aside = _push(o.pushes, begun, now)
+        size = copysign(hypot(along, aside), along)
+        recorder.tick(Truth(now, q, v, forces, size), solution, seconds)
         reason = _fallen(plant, controller, q, o, now)
         if reason:
             return f"{reason} at {now:.3f} s, in step {done + 1}"
@@ -228,7 +232,7 @@ def _loop(
             if progress is not None:
                 progress(done)
         try:
-            plant.step(delay.pass_on(solution.torque), push)
+            plant.step(delay.pass_on(solution.torque), *kind.force(along, aside))
         except ParameterError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
@@ -259,19 +263,23 @@ def _tell(report: SectionReport, number: int) -> None:
         _LOG.info("%.3f s, step %d: the planner left its own law", report.time, number)
 
 
-def _push(pushes: tuple[Push, ...], begun: list[tuple[float, float]], now: float) -> float:
-    """Force of the pushes that act at time ``now`` [N].
+def _push(
+    pushes: tuple[Push, ...], begun: list[tuple[float, float]], now: float
+) -> tuple[float, float]:
+    """Force of the pushes that act at time ``now``, forward and to the left [N].
 
     ``begun`` holds when each step began, and the duration of its gait's steps [s].
     """
-    total = 0.0
+    along = aside = 0.0
     for push in pushes:
         if push.step < len(begun):
             time, duration = begun[push.step]
             begin = time + push.phase * duration
             if begin <= now < begin + push.duration:
-                total += push.impulse / push.duration
-    return total
+                force = push.impulse / push.duration
+                along += force * cos(push.direction)
+                aside += force * sin(push.direction)
+    return along, aside
 
 
 def _fallen(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from dataclasses import fields, replace
 from typing import Any
 
@@ -70,9 +71,10 @@ def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--push",
         action="append",
-        metavar="IMPULSE@STEP[:PHASE]",
+        metavar="IMPULSE@STEP[:PHASE[:DIRECTION]]",
         help="push the trunk with IMPULSE N s, forward positive, over 0.1 s, in step STEP (0 is the"
-        " first), PHASE of a step's duration after its VLO; may be given several times",
+        " first), PHASE of a step's duration after its VLO; a free robot DIRECTION degrees to the"
+        " left of forward; may be given several times",
     )
     parser.add_argument(
         "--noise",
@@ -215,10 +217,13 @@ def _without_none(values: dict[str, Any]) -> dict[str, Any]:
 
 def _push(text: str) -> Push:
     impulse, _, when = text.partition("@")
-    step, _, phase = when.partition(":")
+    step, _, rest = when.partition(":")
+    phase, _, degrees = rest.partition(":")
     try:
-        return Push(float(impulse), int(step), float(phase or 0.0))
+        direction = math.radians(float(degrees or 0.0))
+        return Push(float(impulse), int(step), float(phase or 0.0), direction=direction)
     except ValueError:
         raise ParameterError(
-            f"--push {text}: give IMPULSE@STEP or IMPULSE@STEP:PHASE, such as 10@4:0.5"
+            f"--push {text}: give IMPULSE@STEP or IMPULSE@STEP:PHASE, such as 10@4:0.5; or of a"
+            " free robot IMPULSE@STEP:PHASE:DIRECTION, such as 10@4:0.5:90"
         ) from None

@@ -53,6 +53,15 @@ class FreeBulletPlant(BulletPlant):
     def _trunk_com(self) -> Any:
         return pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
 
+    def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
+        """See :meth:`~template_control.plant.plant.Plant.step`.
+
+        Args:
+            torque: (nu,) joint torques [N m].
+            push, aside: disturbance on the trunk's centre of mass along the world's x and y [N].
+        """
+        self._advance(torque, push, aside)
+
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.plant.plant.Plant.reset`."""
         p, c = pybullet, self.client

@@ -75,6 +75,16 @@ class FreeMujocoPlant(MujocoPlant):
     def _told(self, robot: Biped) -> int:
         return len(robot.joint_names)
 
+    def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
+        """See :meth:`~template_control.plant.plant.Plant.step`.
+
+        Args:
+            torque: (nu,) joint torques [N m].
+            push, aside: disturbance on the trunk's centre of mass along the world's x and y [N].
+        """
+        self.data.xfrc_applied[self._trunk, 1] = aside
+        super().step(torque, push)
+
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.plant.plant.Plant.reset`."""
         super().reset(q[_POSITION:], v[BASE_DOF:])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
+from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,6 +134,11 @@ class Free(Kind):
                 " SensorOptions"
             )
         return Sensors(o.sensors, self.robot, controller.parameters.rest_length)
+
+    def force(self, along: float, aside: float) -> tuple[float, ...]:
+        """See :meth:`.kind.Kind.force`: along the world's x and y; forward is the heading."""
+        cosine, sine = cos(self.robot.heading), sin(self.robot.heading)
+        return cosine * along - sine * aside, sine * along + cosine * aside
 
     def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
         """See :meth:`.kind.Kind.recorder`."""

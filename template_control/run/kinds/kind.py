@@ -71,6 +71,14 @@ class Kind(ABC):
         """
 
     @abstractmethod
+    def force(self, along: float, aside: float) -> tuple[float, ...]:
+        """A push as the robot's plant takes it, after the torques.
+
+        Args:
+            along, aside: forward, and to the left [N].
+        """
+
+    @abstractmethod
     def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
         """What records the run.
 

@@ -54,12 +54,17 @@ class Planar(Kind):
         """See :meth:`.kind.Kind.start`; clear at VLO, at rest, and where legs take turns.
 
         Raises:
-            ParameterError: as there, or if the options have a course.
+            ParameterError: as there, or if the options have a course or a push aside.
         """
         if o.course != Course():
             raise ParameterError(
                 f"{self.robot.name} is held in its plane and has no course: leave it out, or take"
                 " a free robot"
+            )
+        if any(push.direction for push in o.pushes):
+            raise ParameterError(
+                f"{self.robot.name} is held in its plane, and a push has a direction: leave it out,"
+                " or take a free robot"
             )
         robot, route, pose = self.robot, controller.planning.route, o.pose
         planner, node = controller.planning.begin(route.section)  # anew, if it was used before
@@ -98,6 +103,10 @@ class Planar(Kind):
         if isinstance(o.sensors, ImuOptions):
             return ImuSensors(o.sensors, self.robot, Scale.of(parameters), o.plant.time_step)
         return Sensors(o.sensors, self.robot, parameters.rest_length)
+
+    def force(self, along: float, aside: float) -> tuple[float, ...]:
+        """See :meth:`.kind.Kind.force`: what holds the robot bears the rest."""
+        return (along,)
 
     def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
         """See :meth:`.kind.Kind.recorder`."""

@@ -1,0 +1,88 @@
+"""A robot that nothing holds is pushed from all sides, slips, weighs more, and treads on steps.
+
+    python examples/free_disturbances.py [ROBOT] [SPEED]
+
+Levels are those of the reference template (80 kg, 1 m), scaled to the robot: 10 N s in eight
+directions at two phases of a step, friction 0.5, masses 10 % off, 1 mrad of noise, 2 ms of delay,
+and steps of the ground of 1 % of l0 at random places. The controller is told of none of them. A
+trial ends 16 steps after its push or step of the ground. It is back on its gait if its last five
+steps are within 2 % of it in speed and height.
+"""
+
+import argparse
+from math import radians
+
+import numpy as np
+
+import template_control as tc
+from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
+from template_control.robustness.ladder import SETTLED, off_gait
+from template_control.slip.similarity import Scale
+
+IMPULSE, HEIGHT, DELAY, NOISE = 10.0, 0.01, 0.002, 1e-3
+BEFORE, AFTER = 4, 16
+DIRECTIONS, PHASES = range(0, 360, 45), (0.1, 0.6)
+PLACES = 3
+
+
+def trials(gait):
+    """Name and options of each trial."""
+    scale = Scale.of(gait.parameters)
+    steps = BEFORE + AFTER
+    impulse = IMPULSE * impulse_unit(gait.parameters)
+    for degrees in DIRECTIONS:
+        for phase in PHASES:
+            seconds, direction = PUSH_SECONDS * scale.time, radians(degrees)
+            push = tc.Push(impulse, BEFORE, phase, seconds, direction)
+            name = f"push to {degrees} deg, phase {phase}"
+            yield name, tc.SimulationOptions(steps=steps, pushes=(push,))
+    for share in (-0.1, 0.1):
+        plant = tc.PlantOptions(mass_scale=1.0 + share)
+        yield f"mass {share:+.0%}", tc.SimulationOptions(steps=steps, plant=plant)
+    yield "friction 0.5", tc.SimulationOptions(steps=steps, plant=tc.PlantOptions(friction=0.5))
+    sensors = tc.SensorOptions.of_size(NOISE, scale, seed=1)
+    yield f"noise {1e3 * NOISE:g} mrad", tc.SimulationOptions(steps=steps, sensors=sensors)
+    grain = tc.PlantOptions().time_step
+    delay = grain * max(1, round(DELAY * scale.time / grain))
+    yield f"delay {1e3 * delay:.3g} ms", tc.SimulationOptions(steps=steps, delay=delay)
+    lot = np.random.default_rng(7)
+    for sign in (1.0, -1.0):
+        for x in lot.uniform(BEFORE, BEFORE + 1.0, PLACES) * gait.step_length:
+            ground = tc.GroundStep(sign * HEIGHT * scale.length, float(x))
+            plant = tc.PlantOptions(ground_step=ground)
+            name = f"step of {1e3 * ground.height:+.1f} mm at {x:.2f} m"
+            yield name, tc.SimulationOptions(steps=steps, plant=plant)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("robot", nargs="?", default="bolt")
+    parser.add_argument("speed", nargs="?", type=float, default=0.55, help="mean speed [m/s]")
+    parser.add_argument("--only", default="", help="trials whose names begin so")
+    options = parser.parse_args()
+    robot = tc.load_free_robot(options.robot)
+    gait = tc.robot_gait_for_speed(robot, options.speed)
+    planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
+    stood = back = count = 0
+    for name, run in trials(gait):
+        if not name.startswith(options.only):
+            continue
+        record = tc.simulate(robot, planner, run)
+        count += 1
+        if record.fell:
+            print(f"{name}: {record.metadata['fall_reason']}", flush=True)
+            continue
+        speed, height = off_gait(record, gait)
+        stood += 1
+        back += max(abs(speed), abs(height)) <= SETTLED
+        roll, pitch, yaw = np.abs(record.attitude).max(axis=0)
+        print(
+            f"{name}: speed {speed:+.1%}, height {height:+.1%}, roll {roll:.3f}, pitch {pitch:.3f},"
+            f" yaw {yaw:.2f} rad, {record.metadata['summary']['qp_failures']} failed QPs",
+            flush=True,
+        )
+    print(f"{options.robot}, {count} trials: {stood} without a fall, {back} back on the gait")
+
+
+if __name__ == "__main__":
+    main()
