@@ -55,6 +55,7 @@ def trials(gait):
 
 
 def main():
+    """Disturb the robot in one way after the other, and tell what comes of it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("robot", nargs="?", default="bolt")
     parser.add_argument("speed", nargs="?", type=float, default=0.55, help="mean speed [m/s]")

@@ -9,6 +9,7 @@ from typing import Any
 from rich.text import Text
 
 from template_control.errors import ParameterError
+from template_control.run.kinds.any_record import load_record
 from template_control.run.record import Record
 from template_control.terminal import plain_console
 from template_control.view.replay.replay import GIF_FPS, GIF_SECONDS, replay, save_film, save_html
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     for path, ending in films:
         if path is not None and path.suffix != ending:
             raise ParameterError(f"{path} does not end in {ending}: give such a name")
-    record = Record.load(options.run_file)
+    record = load_record(options.run_file)
     part = {"speed": options.speed, "start": options.start, "end": options.end}
     if options.fps is not None:
         part["fps"] = options.fps

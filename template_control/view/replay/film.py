@@ -1,4 +1,4 @@
-"""A replay as a film: the run from the side, drawn without browser or display."""
+"""A replay as a film, drawn without browser or display: from the side, a free robot in space."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
+from template_control.run.kinds.free_record import FreeRecord
 from template_control.storage import replacing
 from template_control.view.replay.playback import (
     Playback,
     carrying,
+    coil,
     footholds,
     force_arrows,
     spring,
     template_legs,
 )
+from template_control.view.replay.space_film import SpaceStage
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text
 
 Array = NDArray[np.float64]
@@ -84,12 +87,6 @@ class _Stage:
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
 
-    def _spring(self, begin: Array, end: Array) -> Array:
-        """(2, N) x and y of a leg's spring between two points (2,) [m]."""
-        span = end - begin
-        normal = np.array([-span[1], span[0]]) / max(float(np.linalg.norm(span)), 1e-12)
-        return np.asarray(begin[:, None] + np.stack((normal, span), axis=1) @ self.spring.T)
-
     def show(self, frame: int) -> None:
         record, rows = self.playback.record, self.playback.rows
         row = rows[frame]
@@ -105,7 +102,8 @@ class _Stage:
             self.marks[foot].set_data(places, heights)
         for leg, line in enumerate(self.springs):
             if self.loaded[row, leg]:
-                line.set_data(*self._spring(record.template_com[row], self.toes[row, leg]))
+                ends = (record.template_com[row], self.toes[row, leg])
+                line.set_data(*coil(self.spring, *ends))
             else:
                 line.set_data([], [])
         self.trail.set_data(*record.com[rows[0] : row + 1].T)
@@ -138,7 +136,8 @@ def write_film(
     """
     writer = _writer(path, fps, len(playback.rows))
     with replacing(path) as place:
-        stage = _Stage(playback)
+        free = isinstance(playback.record, FreeRecord)
+        stage = SpaceStage(playback) if free else _Stage(playback)
         try:
             with writer.saving(stage.figure, str(place), dpi):
                 for frame in range(len(playback.rows)):

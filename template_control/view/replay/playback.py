@@ -139,16 +139,39 @@ def spring(radius: float) -> Array:
     return np.concatenate(([[0.0, 0.0], [0.0, 0.15]], inner, [[0.0, 0.85], [0.0, 1.0]]))
 
 
+def coil(shape: Array, begin: Array, end: Array) -> Array:
+    """(2, N) x and y of a leg's spring between two points of the picture.
+
+    Args:
+        shape: from :func:`spring`.
+        begin, end: (2,) [m].
+    """
+    span = end - begin
+    normal = np.array([-span[1], span[0]]) / max(float(np.linalg.norm(span)), 1e-12)
+    return np.asarray(begin[:, None] + np.stack((normal, span), axis=1) @ shape.T)
+
+
 def force_arrows(record: Record) -> Array:
     """(T, 2, 2) the ground's force on each foot as an arrow, zero where it does not carry [m].
 
     The weight is 0.4 rest lengths long. An arrow longer than two weights, at an impact, is
     cut to that.
     """
-    arrow = record.contact_force / weight(record)
-    size = np.linalg.norm(arrow, axis=2, keepdims=True)
-    arrow = arrow * np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))
+    arrow = arrows_of(record.contact_force, record)
     arrow[~carrying(record)] = 0.0
+    return arrow
+
+
+def arrows_of(force: Array, record: Record) -> Array:
+    """Forces as arrows, see :func:`force_arrows`.
+
+    Args:
+        force: (..., 2) or (..., 3) [N].
+        record: the run.
+    """
+    arrow = force / weight(record)
+    size = np.linalg.norm(arrow, axis=-1, keepdims=True)
+    arrow = arrow * np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))
     return np.asarray(0.4 * record.metadata["template"]["rest_length"] * arrow)
 
 

@@ -30,31 +30,29 @@ def plates(centres: Array, size: tuple[float, float]) -> tuple[Array, NDArray[np
     return (centres[:, None] + corners).reshape(-1, 3), faces.reshape(-1, 3)
 
 
-def ground_shape(line: Array, length: float) -> tuple[Any, Array]:
+def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tuple[Any, Array]:
     """The ground under a line: a board where it is level, else its surface.
 
     Args:
         line: (N, 2) x and height of its points [m].
+        sides: y of its right and its left edge [m].
         length: the template's rest length [m].
 
     Returns:
         The shape and its placement (4, 4).
     """
     place = np.eye(4)
-    (low, level), (high, _) = line[0], line[-1]
+    (low, level), (high, _), (right, left) = line[0], line[-1], sides
     if np.all(line[:, 1] == level):
         thick = 0.02 * length
-        place[:3, 3] = 0.5 * (low + high), 0.0, level - 0.5 * thick
-        return mg.Box([high - low, 3.0 * length, thick]), place
+        place[:3, 3] = 0.5 * (low + high), 0.5 * (right + left), level - 0.5 * thick
+        return mg.Box([high - low, left - right, thick]), place
     count = len(line)
-    sides = [
-        np.column_stack((line[:, 0], np.full(count, side), line[:, 1]))
-        for side in (-1.5 * length, 1.5 * length)
-    ]
+    edges = [np.column_stack((line[:, 0], np.full(count, y), line[:, 1])) for y in sides]
     first = np.arange(count - 1)
     near = np.column_stack((first, first + 1, first + count))
     far = np.column_stack((first + 1, first + count + 1, first + count))
-    surface = mg.TriangularMeshGeometry(np.concatenate(sides), np.concatenate((near, far)))
+    surface = mg.TriangularMeshGeometry(np.concatenate(edges), np.concatenate((near, far)))
     return surface, place
 
 

@@ -1,8 +1,8 @@
 """The 3-D scene of a replay: what meshcat is told, objects first, then their animation.
 
-The run's x goes forward along meshcat's x, its y up along meshcat's z. The camera stands to
-the robot's right; the world moves backward past it, because meshcat's camera always looks at
-its origin.
+Forward is meshcat's x, to the left its y and up its z; a free robot's are the world's. The camera
+stands to the right; the world moves backward past it, because meshcat's camera always looks at its
+origin.
 """
 
 from __future__ import annotations
@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 from template_control.view.replay.playback import (
     Playback,
     carrying,
-    footholds,
-    force_arrows,
     spring,
     template_legs,
 )
 from template_control.view.replay.replay_ground import ground_shape, plates, smoothed
-from template_control.view.replay.robot_visuals import foot_sides, load_visuals, placements
+from template_control.view.replay.replay_space import Space, in_space, raised, turned_to
+from template_control.view.replay.robot_visuals import Robot, foot_sides, load_visuals, placements
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
 Array = NDArray[np.float64]
@@ -126,14 +125,16 @@ def scene_commands(playback: Playback) -> list[Any]:
     Raises:
         RecordError: if the robot's visuals cannot be loaded.
     """
-    scene = _Scene(playback.clock)
-    length = float(playback.record.metadata["template"]["rest_length"])
-    _surroundings(scene, playback, length)
-    sides = _robot(scene, playback)
-    _trail(scene, playback, length)
-    _template(scene, playback, length)
-    _forces(scene, playback, length, sides)
-    _footholds(scene, playback, length, sides)
+    scene, record = _Scene(playback.clock), playback.record
+    length = float(record.metadata["template"]["rest_length"])
+    robot = load_visuals(record)
+    space = in_space(record, foot_sides(robot[0], record.metadata["feet"]))
+    _surroundings(scene, playback, space, length)
+    _robot(scene, playback, robot)
+    _trail(scene, playback, space, length)
+    _template(scene, playback, space, length)
+    _forces(scene, playback, space, length)
+    _footholds(scene, playback, space, length)
     return scene.finished()
 
 
@@ -144,18 +145,6 @@ def _rgb(color: str) -> int:
 def _overlay(color: str) -> mg.Material:
     """A flat colour in front of the robot, whose trunk would hide it otherwise."""
     return mg.MeshBasicMaterial(color=_rgb(color), transparent=True, depthTest=False)
-
-
-def _in_space(points: Array) -> Array:
-    """(..., 2) of the run to (..., 3) of meshcat."""
-    return np.stack((points[..., 0], np.zeros(points.shape[:-1]), points[..., 1]), axis=-1)
-
-
-def _along(direction: Array) -> Array:
-    """(F, 4) quaternions that turn z into the direction (F, 2)."""
-    half = 0.5 * np.arctan2(direction[:, 0], direction[:, 1])
-    zero = np.zeros(len(half))
-    return np.stack((zero, np.sin(half), zero, np.cos(half)), axis=-1)
 
 
 def _ribbon(points: Array, width: float) -> mg.TriangularMeshGeometry:
@@ -176,27 +165,29 @@ def _ribbon(points: Array, width: float) -> mg.TriangularMeshGeometry:
     return mg.TriangularMeshGeometry(np.concatenate(vertices), np.array(faces))
 
 
-def _surroundings(scene: _Scene, playback: Playback, length: float) -> None:
+def _surroundings(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
     record, rows = playback.record, playback.rows
     for end in ("top_color", "bottom_color"):
         scene.set("/Background", end, [0.96, 0.97, 0.98])
     for path in ("/Grid", "/Axes"):
         scene.set(path, "visible", False)
-    x = record.com[rows, 0]
+    x, y = space.com[rows, :2].T
+    sides = float(y.min()) - 1.5 * length, float(y.max()) + 1.5 * length
+    middle, width = 0.5 * (sides[0] + sides[1]), sides[1] - sides[0]
     low, high = float(x.min()) - 6.0 * length, float(x.max()) + 6.0 * length
     ground = record.ground
-    shape, place = ground_shape(np.array(ground.line(low, high)), length)
+    shape, place = ground_shape(np.array(ground.line(low, high)), sides, length)
     scene.add("/meshcat/ground", shape, mg.MeshBasicMaterial(color=0xDDE1E6, side="DoubleSide"))
     scene.place("/meshcat/ground", place)
     # A line every rest length shows that the camera travels.
     lines = np.arange(np.ceil(low / length), high / length) * length
     heights = np.array([ground.height_at(place) for place in lines.tolist()])
-    centres = np.stack((lines, 0.0 * lines, heights + 0.001 * length), axis=-1)
-    stripes = plates(centres, (0.012 * length, 3.0 * length))
+    centres = np.stack((lines, middle + 0.0 * lines, heights + 0.001 * length), axis=-1)
+    stripes = plates(centres, (0.012 * length, width))
     material = mg.MeshBasicMaterial(color=0xB4BAC2)
     scene.add("/meshcat/ground_lines", mg.TriangularMeshGeometry(*stripes), material)
     level = smoothed(ground, x, length)
-    travel = np.stack((x, 0.0 * x, level + 0.72 * length), axis=-1)
+    travel = np.stack((x, y, level + 0.72 * length), axis=-1)
     scene.animate("/meshcat", "position", "vector3", -travel)
     # From afar with a narrow view: little perspective, so that lengths can be compared.
     eye = [0.7 * length, 0.45 * length, 4.0 * length]
@@ -204,9 +195,8 @@ def _surroundings(scene: _Scene, playback: Playback, length: float) -> None:
     scene.set("/Cameras/default/rotated/<object>", "zoom", 2.4)
 
 
-def _robot(scene: _Scene, playback: Playback) -> Array:
-    """The robot; returns (2,) how far to the left its feet are."""
-    model, shapes, visuals = load_visuals(playback.record)
+def _robot(scene: _Scene, playback: Playback, robot: Robot) -> None:
+    model, shapes, visuals = robot
     positions, quaternions = placements(model, shapes, playback.record.q[playback.rows])
     for i, visual in enumerate(visuals):
         path = f"/meshcat/robot/{visual.name}"
@@ -217,11 +207,10 @@ def _robot(scene: _Scene, playback: Playback) -> Array:
         scene.place(f"{path}/shape", visual.offset)
         scene.animate(path, "position", "vector3", positions[:, i])
         scene.animate(path, "quaternion", "quaternion", quaternions[:, i])
-    return foot_sides(model, playback.record.metadata["feet"])
 
 
-def _trail(scene: _Scene, playback: Playback, length: float) -> None:
-    com = _in_space(playback.record.com[playback.rows])
+def _trail(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
+    com = space.com[playback.rows]
     ribbon = _ribbon(com, 0.008 * length)
     trail = _Gradual(ribbon.vertices, ribbon.faces, np.tile(np.arange(float(len(com))), 4))
     scene.reveal("/meshcat/com_trail", trail, COM, depthTest=False)
@@ -229,32 +218,32 @@ def _trail(scene: _Scene, playback: Playback, length: float) -> None:
     scene.animate("/meshcat/com", "position", "vector3", com)
 
 
-def _template(scene: _Scene, playback: Playback, length: float) -> None:
+def _template(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
     record, rows = playback.record, playback.rows
-    com = record.template_com[rows]
+    com = space.template[rows]
     scene.add("/meshcat/template/com/dot", mg.Sphere(0.014 * length), _overlay(TEMPLATE))
     # Nearer to the camera than the robot's CoM, or it would be drawn below that.
     nearer = np.eye(4)
     nearer[1, 3] = -0.03 * length
     scene.place("/meshcat/template/com/dot", nearer)
-    scene.animate("/meshcat/template/com", "position", "vector3", _in_space(com))
-    toes, loaded = template_legs(record)
-    coil = _ribbon(_in_space(spring(0.03 * length)), 0.01 * length)
+    scene.animate("/meshcat/template/com", "position", "vector3", com)
+    _, loaded = template_legs(record)
+    coil = _ribbon(raised(spring(0.03 * length)), 0.01 * length)
     for leg, name in enumerate(("rear_leg", "front_leg")):
         path = f"/meshcat/template/{name}"
-        direction = toes[rows, leg] - com
+        direction = space.toes[rows, leg] - com
         scene.add(path, coil, _overlay(TEMPLATE))
-        scene.animate(path, "position", "vector3", _in_space(com))
-        scene.animate(path, "quaternion", "quaternion", _along(direction))
+        scene.animate(path, "position", "vector3", com)
+        scene.animate(path, "quaternion", "quaternion", turned_to(direction))
         size = np.ones((len(rows), 3))
         size[:, 2] = np.linalg.norm(direction, axis=1)
         scene.animate(path, "scale", "vector3", size)
         scene.show(path, loaded[rows, leg])
 
 
-def _forces(scene: _Scene, playback: Playback, length: float, sides: Array) -> None:
+def _forces(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
     record, rows = playback.record, playback.rows
-    arrows, on = force_arrows(record), carrying(record)
+    on = carrying(record)
     shaft, head = np.eye(4), np.eye(4)
     upright = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     shaft[:3, :3] = head[:3, :3] = upright
@@ -269,25 +258,24 @@ def _forces(scene: _Scene, playback: Playback, length: float, sides: Array) -> N
         ):
             scene.add(f"{path}/{part}", geometry, _overlay(color))
             scene.place(f"{path}/{part}", offset)
-        toe = _in_space(record.foot[rows, foot]) + np.array([0.0, sides[foot], 0.0])
-        scene.animate(path, "position", "vector3", toe)
-        scene.animate(path, "quaternion", "quaternion", _along(arrows[rows, foot]))
+        arrow = space.arrow[rows, foot]
+        scene.animate(path, "position", "vector3", space.foot[rows, foot])
+        scene.animate(path, "quaternion", "quaternion", turned_to(arrow))
         size = np.ones((len(rows), 3))
-        size[:, 2] = np.linalg.norm(arrows[rows, foot], axis=1)
+        size[:, 2] = np.linalg.norm(arrow, axis=1)
         scene.animate(path, "scale", "vector3", size)
         scene.show(path, on[rows, foot])
 
 
-def _footholds(scene: _Scene, playback: Playback, length: float, sides: Array) -> None:
+def _footholds(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
     record, rows = playback.record, playback.rows
     for foot, (name, color) in enumerate((("left", LEFT), ("right", RIGHT))):
-        stood = [f for f in footholds(record) if f.foot == foot and f.time <= record.time[rows[-1]]]
-        if not stood:
+        places, since = space.stood[foot]
+        shown = since <= record.time[rows[-1]]
+        if not shown.any():
             continue
-        ground = record.ground
-        over = 0.002 * length
-        centres = np.array([[f.x, sides[foot], ground.height_at(f.x) + over] for f in stood])
+        centres = places[shown] + np.array([0.0, 0.0, 0.002 * length])
         vertices, faces = plates(centres, (0.05 * length, 0.1 * length))
-        frame = np.searchsorted(record.time[rows], [f.time for f in stood]).astype(float)
+        frame = np.searchsorted(record.time[rows], since[shown]).astype(float)
         mesh = _Gradual(vertices, faces, np.repeat(frame, 4))
         scene.reveal(f"/meshcat/footholds/{name}", mesh, color)

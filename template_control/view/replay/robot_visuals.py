@@ -13,6 +13,7 @@ from meshcat import geometry as mg
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
+from template_control.run.kinds.free_record import FreeRecord
 from template_control.run.record import Record
 
 Array = NDArray[np.float64]
@@ -38,7 +39,11 @@ class Visual:
     color: tuple[float, float, float, float]
 
 
-def load_visuals(record: Record) -> tuple[pin.Model, pin.GeometryModel, list[Visual]]:
+Robot = tuple[pin.Model, pin.GeometryModel, list[Visual]]
+"""A robot's model, and its shapes in the geometry model's order."""
+
+
+def load_visuals(record: Record) -> Robot:
     """The robot of a run, and its shapes in the geometry model's order.
 
     Raises:
@@ -49,7 +54,7 @@ def load_visuals(record: Record) -> tuple[pin.Model, pin.GeometryModel, list[Vis
     if not text:
         raise RecordError("the run carries no URDF, so its robot cannot be shown: walk it again")
     _check_meshes(text)
-    model = pin.buildModelFromXML(text)
+    model = model_of(record)
     try:
         shapes = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL)
     except ValueError as error:
@@ -63,13 +68,25 @@ def load_visuals(record: Record) -> tuple[pin.Model, pin.GeometryModel, list[Vis
     return model, shapes, [_visual(shape) for shape in shapes.geometryObjects]
 
 
+def model_of(record: Record) -> pin.Model:
+    """The robot's model, with a free flyer where nothing held it.
+
+    Args:
+        record: the run, which carries a URDF.
+    """
+    text = record.metadata["urdf"]
+    if isinstance(record, FreeRecord):
+        return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+    return pin.buildModelFromXML(text)
+
+
 def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[Array, Array]:
     """Where the shapes are in each of several configurations.
 
     Args:
         model: of the robot.
         shapes: its shapes, from :func:`load_visuals`.
-        q: (F, nv) configurations [m, rad].
+        q: (F, nq) configurations [m, rad].
 
     Returns:
         positions: (F, shapes, 3) x forward, y to the left, z up [m].
