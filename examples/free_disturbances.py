@@ -10,6 +10,7 @@ steps are within 2 % of it in speed and height.
 """
 
 import argparse
+from collections.abc import Iterator
 from math import radians
 
 import numpy as np
@@ -17,7 +18,8 @@ import numpy as np
 import template_control as tc
 from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
 from template_control.robustness.ladder import SETTLED, off_gait
-from template_control.slip.similarity import Scale
+from template_control.run import FreeRecord
+from template_control.slip import Scale, WalkingGait
 
 IMPULSE, HEIGHT, DELAY, NOISE = 10.0, 0.01, 0.002, 1e-3
 BEFORE, AFTER = 4, 16
@@ -25,7 +27,7 @@ DIRECTIONS, PHASES = range(0, 360, 45), (0.1, 0.6)
 PLACES = 3
 
 
-def trials(gait):
+def trials(gait: WalkingGait) -> Iterator[tuple[str, tc.SimulationOptions]]:
     """Name and options of each trial."""
     scale = Scale.of(gait.parameters)
     steps = BEFORE + AFTER
@@ -54,7 +56,7 @@ def trials(gait):
             yield name, tc.SimulationOptions(steps=steps, plant=plant)
 
 
-def main():
+def main() -> None:
     """Disturb the robot in one way after the other, and tell what comes of it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("robot", nargs="?", default="bolt")
@@ -69,6 +71,7 @@ def main():
         if not name.startswith(options.only):
             continue
         record = tc.simulate(robot, planner, run)
+        assert isinstance(record, FreeRecord)  # of a free robot
         count += 1
         if record.fell:
             print(f"{name}: {record.metadata['fall_reason']}", flush=True)

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from template_control.run.record import Record
@@ -72,10 +73,12 @@ class SpaceStage:
         self._trail = axes.plot([], [], color=COM, linewidth=1.2)[0]
         self._marks = [axes.plot([], [], "^", color=c, markersize=5)[0] for c in _LEGS]
         # The left leg is behind the trunk, the right one before it.
-        leg, trunk = {"linewidth": 4, "solid_capstyle": "round"}, {"linewidth": 3}
-        self.legs = [axes.plot([], [], color=LEFT, zorder=2, **leg)[0]]
-        self._trunk = axes.fill([0.0], [0.0], color=TRUNK, alpha=0.55, zorder=3, **trunk)[0]
-        self.legs.append(axes.plot([], [], color=RIGHT, zorder=4, **leg)[0])
+        self.legs = [
+            axes.plot([], [], color=c, linewidth=4, solid_capstyle="round", zorder=order)[0]
+            for c, order in zip(_LEGS, (2, 4), strict=True)
+        ]
+        self._trunk = Polygon(np.zeros((4, 2)), color=TRUNK, linewidth=3, alpha=0.55, zorder=3)
+        axes.add_patch(self._trunk)
         springs = [axes.plot([], [], color=TEMPLATE, linewidth=1.1, zorder=5)[0] for _ in (0, 1)]
         self._springs = springs
         self._com = axes.plot([], [], "o", color=COM, markersize=7, label="CoM", zorder=6)[0]
@@ -127,9 +130,9 @@ class SpaceStage:
             places, since = space.stood[foot]
             self._marks[foot].set_data(*seen(places[since <= record.time[row]]).T)
         template = seen(space.template[row])
-        for leg, line in enumerate(self._springs):
-            pushes = self._loaded[row, leg]
-            ends = (template, seen(space.toes[row, leg]))
+        for end, line in enumerate(self._springs):
+            pushes = self._loaded[row, end]
+            ends = (template, seen(space.toes[row, end]))
             line.set_data(*(coil(self._spring, *ends) if pushes else ([], [])))
         self._trail.set_data(*seen(space.com[rows[: frame + 1]]).T)
         self._com.set_data(*seen(com)[:, None])
