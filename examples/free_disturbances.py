@@ -1,9 +1,9 @@
 """A robot that nothing holds is pushed from all sides, slips, weighs more, and treads on steps.
 
-    python examples/free_disturbances.py [ROBOT] [SPEED]
+    python examples/free_disturbances.py [ROBOT] [SPEED] [--phases 0.1 0.6] [--places 3]
 
 Levels are those of the reference template (80 kg, 1 m), scaled to the robot: 10 N s in eight
-directions at two phases of a step, friction 0.5, masses 10 % off, 1 mrad of noise, 2 ms of delay,
+directions at some phases of a step, friction 0.5, masses 10 % off, 1 mrad of noise, 2 ms of delay,
 and steps of the ground of 1 % of l0 at random places. The controller is told of none of them. A
 trial ends 16 steps after its push or step of the ground. It is back on its gait if its last five
 steps are within 2 % of it in speed and height.
@@ -23,17 +23,18 @@ from template_control.slip import Scale, WalkingGait
 
 IMPULSE, HEIGHT, DELAY, NOISE = 10.0, 0.01, 0.002, 1e-3
 BEFORE, AFTER = 4, 16
-DIRECTIONS, PHASES = range(0, 360, 45), (0.1, 0.6)
-PLACES = 3
+DIRECTIONS = range(0, 360, 45)
 
 
-def trials(gait: WalkingGait) -> Iterator[tuple[str, tc.SimulationOptions]]:
+def trials(
+    gait: WalkingGait, phases: list[float], places: int
+) -> Iterator[tuple[str, tc.SimulationOptions]]:
     """Name and options of each trial."""
     scale = Scale.of(gait.parameters)
     steps = BEFORE + AFTER
     impulse = IMPULSE * impulse_unit(gait.parameters)
     for degrees in DIRECTIONS:
-        for phase in PHASES:
+        for phase in phases:
             seconds, direction = PUSH_SECONDS * scale.time, radians(degrees)
             push = tc.Push(impulse, BEFORE, phase, seconds, direction)
             name = f"push to {degrees} deg, phase {phase}"
@@ -49,7 +50,7 @@ def trials(gait: WalkingGait) -> Iterator[tuple[str, tc.SimulationOptions]]:
     yield f"delay {1e3 * delay:.3g} ms", tc.SimulationOptions(steps=steps, delay=delay)
     lot = np.random.default_rng(7)
     for sign in (1.0, -1.0):
-        for x in lot.uniform(BEFORE, BEFORE + 1.0, PLACES) * gait.step_length:
+        for x in lot.uniform(BEFORE, BEFORE + 1.0, places) * gait.step_length:
             ground = tc.GroundStep(sign * HEIGHT * scale.length, float(x))
             plant = tc.PlantOptions(ground_step=ground)
             name = f"step of {1e3 * ground.height:+.1f} mm at {x:.2f} m"
@@ -61,13 +62,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("robot", nargs="?", default="bolt")
     parser.add_argument("speed", nargs="?", type=float, default=0.55, help="mean speed [m/s]")
+    parser.add_argument("--phases", nargs="+", type=float, default=[0.1, 0.6], help="of pushes")
+    parser.add_argument("--places", type=int, default=3, help="of steps up, and of steps down")
     parser.add_argument("--only", default="", help="trials whose names begin so")
     options = parser.parse_args()
     robot = tc.load_free_robot(options.robot)
     gait = tc.robot_gait_for_speed(robot, options.speed)
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
     stood = back = count = 0
-    for name, run in trials(gait):
+    for name, run in trials(gait, options.phases, options.places):
         if not name.startswith(options.only):
             continue
         record = tc.simulate(robot, planner, run)

@@ -63,7 +63,8 @@ class Plant(Protocol):
 
         Args:
             torque: (nu,) joint torques, held during the step [N m].
-            push: horizontal force on the trunk's centre of mass, forward positive [N].
+            push: horizontal force on the trunk's centre of mass, forward positive [N]. The plant of
+                a free robot has a third parameter: push and it act along the world's x and y.
         """
 
     def close(self) -> None:
