@@ -1,16 +1,18 @@
 """Time of a control tick, split into its parts, over a walk, a run or a walk in space, in PyBullet.
 
-Run: python benchmarks/control_tick.py [steps] [--gait walk] [--gait run] [--gait free] [--speed 3]
+Run: python benchmarks/control_tick.py [steps] [--gait walk] [--gait run] [--gait free] [--whole]
 
-Times are those of the thread: whatever else the machine does in between does not count.
+Times are those of the thread: whatever else the machine does in between does not count. The gaits
+take turns every few ticks, so that a machine which is slow for a while is so to all of them. A last
+table compares their ticks. A clock costs time as well: with --whole there is none within a tick.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Generator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -40,6 +42,8 @@ from template_control.slip.scenario.route import SteadyRoute
 
 GAITS = ("walk", "run", "free")
 _WARM_UP = 3  # steps, while the compiled kernels load
+_TURN = 20  # ticks
+_TICK, _PHYSICS = "whole tick", "physics step (not in the tick)"
 
 Times = dict[str, np.ndarray[Any, Any]]
 
@@ -95,13 +99,49 @@ def _free() -> tuple[EmbeddingController, Any, Any]:
     return controller, q, v
 
 
-def measure(steps: int, gait: str = "walk", speed: float = 3.0) -> Times:
-    """Seconds of every tick by part.
+class Parts(NamedTuple):
+    """Seconds of each part of a tick, a number a tick."""
+
+    update: list[float]
+    quadratic: list[float]
+    solves: list[float]
+    plans: list[float]
+    ticks: list[float]
+    physics: list[float]
+
+    def times(self) -> Times:
+        """The table's rows."""
+        model, whole, solve, plan, tick, physics = (np.array(x) for x in self)
+        return {
+            "Pinocchio update": model,
+            "references, events": tick - model - whole - plan,
+            "plans": plan,
+            "QP assembly": whole - solve,
+            "QP solve": solve,
+            _TICK: tick,
+            _PHYSICS: physics,
+        }
+
+
+def _time_parts(controller: EmbeddingController, parts: Parts) -> None:
+    """Put clocks into a controller, from outside: the library carries none."""
+    robot, planning = controller.robot, controller.planning
+    robot.update = _timed(robot.update, parts.update)  # type: ignore[method-assign]
+    controller.qp.solve = _timed(controller.qp.solve, parts.quadratic)  # type: ignore[method-assign]
+    for name in ("decide", "land", "follow", "reach_on", "reconsider"):
+        setattr(planning, name, _whole(getattr(planning, name), parts.plans))
+    for workspace in (*controller.qp._workspaces, *controller.qp._braked):
+        workspace.solve = _timed(workspace.solve, parts.solves)  # type: ignore[method-assign]
+
+
+def _ticks(gait: str, speed: float, split: bool, parts: Parts) -> Generator[int, None, None]:
+    """Tick by tick, without an end; yields how many steps are over, less those of the warm-up.
 
     Args:
-        steps: that count; a few more are made before.
         gait: walk, run, or free: a walk in space.
         speed: of a run [m/s].
+        split: time the parts of a tick too.
+        parts: to which the times are added, once it is warm.
     """
     if gait == "free":
         controller, q, v = _free()
@@ -109,49 +149,48 @@ def measure(steps: int, gait: str = "walk", speed: float = 3.0) -> Times:
         planar = load_robot("five-link")
         controller, q, v = _walking(planar) if gait == "walk" else _running(planar, speed)
     robot = controller.robot
-    planning = controller.planning
-    update: list[float] = []
-    quadratic: list[float] = []
-    plans: list[float] = []
-    solves: list[float] = []
-    # Timed from outside, on the instances, so that the library carries no clocks.
-    robot.update = _timed(robot.update, update)  # type: ignore[method-assign]
-    controller.qp.solve = _timed(controller.qp.solve, quadratic)  # type: ignore[method-assign]
-    for name in ("decide", "land", "follow", "reach_on", "reconsider"):
-        setattr(planning, name, _whole(getattr(planning, name), plans))
-    for workspace in (*controller.qp._workspaces, *controller.qp._braked):
-        workspace.solve = _timed(workspace.solve, solves)  # type: ignore[method-assign]
-    ticks: list[float] = []
-    physics: list[float] = []
-    forces, dt, warm = np.zeros((2, robot.directions)), 1e-3, 0
-    options = PlantOptions(time_step=dt)
+    if split:
+        _time_parts(controller, parts)
+    forces, dt, done = np.zeros((2, robot.directions)), 1e-3, 0
     touching = 5e-3 * robot.mass * robot.gravity
-    with _plant(robot, options) as plant:
+    with _plant(robot, PlantOptions(time_step=dt)) as plant:
         plant.reset(q, v)
-        while len(controller.reports) <= steps + _WARM_UP:
-            if len(controller.reports) <= _WARM_UP:
-                warm = len(ticks)
+        while True:
             plant.read(q, v)
             plant.contact_forces(forces)
-            for part in (update, quadratic, plans, solves):
+            for part in parts:
+                if done <= 0:
+                    part.clear()
                 part.append(0.0)
             start = time.thread_time()
             solution = controller.tick(q, v, forces[:, -1] > touching, dt)
-            ticks.append(time.thread_time() - start)
+            parts.ticks[-1] = time.thread_time() - start
             start = time.thread_time()
             plant.step(solution.torque)
-            physics.append(time.thread_time() - start)
-    lists = (ticks, update, quadratic, solves, plans)
-    tick, model, whole, solve, plan = (np.array(x)[warm:] for x in lists)
-    return {
-        "Pinocchio update": model,
-        "references, events": tick - model - whole - plan,
-        "plans": plan,
-        "QP assembly": whole - solve,
-        "QP solve": solve,
-        "whole tick": tick,
-        "physics step (not in the tick)": np.array(physics)[warm:],
-    }
+            parts.physics[-1] = time.thread_time() - start
+            done = len(controller.reports) - _WARM_UP
+            yield done
+
+
+def measure(steps: int, gaits: Sequence[str], speed: float, split: bool) -> dict[str, Times]:
+    """Seconds of every tick by part, of each gait.
+
+    Args:
+        steps: of the first gait; the others make about as many ticks.
+        gaits: that take turns.
+        speed: of a run [m/s].
+        split: time the parts of a tick too.
+    """
+    parts = {gait: Parts([], [], [], [], [], []) for gait in gaits}
+    under_way = [_ticks(gait, speed, split, parts[gait]) for gait in gaits]
+    done = 0
+    while done <= steps:
+        for ticks in reversed(under_way):
+            for _ in range(_TURN):
+                done = next(ticks)
+    for ticks in under_way:
+        ticks.close()
+    return {gait: times.times() for gait, times in parts.items()}
 
 
 def _whole(function: Callable[..., Any], into: list[float]) -> Callable[..., Any]:
@@ -173,7 +212,7 @@ def _whole(function: Callable[..., Any], into: list[float]) -> Callable[..., Any
 
 
 def _print(title: str, parts: Times) -> None:
-    whole = np.median(parts["whole tick"])
+    whole = np.median(parts[_TICK])
     table = Table(title=f"{title}, {len(parts['whole tick'])} ticks")
     for name in ("part", "mean us", "median us", "p99 us", "median over whole tick"):
         table.add_column(name, justify="left" if name == "part" else "right")
@@ -186,16 +225,35 @@ def _print(title: str, parts: Times) -> None:
     Console().print(table)
 
 
+def _compare(gaits: dict[str, Times]) -> None:
+    """Ticks in units of the physics step, and of the first gait's tick."""
+    table = Table(title="ticks compared")
+    table.add_column("gait")
+    for name in ("mean over physics step", "mean over the first", "median over the first"):
+        table.add_column(name, justify="right")
+    physics = np.concatenate([parts[_PHYSICS] for parts in gaits.values()]).mean()
+    ticks = {gait: parts[_TICK] for gait, parts in gaits.items()}
+    first = next(iter(ticks.values()))
+    for gait, tick in ticks.items():
+        means = tick.mean() / physics, tick.mean() / first.mean()
+        ratios = *means, np.median(tick) / np.median(first)
+        table.add_row(gait, *(f"{ratio:.3f}" for ratio in ratios))
+    Console().print(table)
+
+
 def main() -> None:
-    """Print a table for each gait."""
+    """Print a table for each gait, and one of all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("steps", nargs="?", type=int, default=200)
     parser.add_argument("--gait", action="append", choices=GAITS, help="walk, run if none")
     parser.add_argument("--speed", type=float, default=3.0, help="of the run [m/s]")
+    parser.add_argument("--whole", action="store_true", help="time whole ticks only")
     options = parser.parse_args()
-    for gait in options.gait or ("walk", "run"):
-        parts = measure(options.steps, gait, options.speed)
-        _print(f"control tick over {options.steps} steps, {gait}", parts)
+    gaits = measure(options.steps, options.gait or GAITS[:2], options.speed, not options.whole)
+    if not options.whole:
+        for gait, parts in gaits.items():
+            _print(f"control tick, {gait}", parts)
+    _compare(gaits)
 
 
 if __name__ == "__main__":

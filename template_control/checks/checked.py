@@ -22,7 +22,7 @@ from itertools import chain, repeat
 from types import SimpleNamespace
 from typing import Any, ClassVar, ParamSpec, TypeVar, get_type_hints
 
-from template_control.checks.fitting import check
+from template_control.checks.fitting import Refused, check, fitter
 from template_control.errors import ParameterError, TemplateControlError
 
 P = ParamSpec("P")
@@ -41,17 +41,22 @@ class Checked:
 
     def __post_init__(self) -> None:
         kind: Any = type(self)
-        for name, hint in _field_hints(kind).items():
+        for name, hint, fit in _fields(kind):
             value = getattr(self, name)
-            found = check(f"{kind.__name__}.{name}", value, hint, self._error)
+            try:
+                found = fit(value)
+            except Refused:
+                check(f"{kind.__name__}.{name}", value, hint, self._error)
+                raise
             if found is not value:
                 object.__setattr__(self, name, found)
 
 
 @cache
-def _field_hints(kind: Any) -> dict[str, Any]:
+def _fields(kind: Any) -> tuple[tuple[str, Any, Callable[[Any], Any]], ...]:
+    """Names, annotations, and what fits a value to each."""
     hints = get_type_hints(kind, include_extras=True)
-    return {name: hints[name] for name in kind.__dataclass_fields__}
+    return tuple((name, hints[name], fitter(hints[name])) for name in kind.__dataclass_fields__)
 
 
 def checked(function: Callable[P, T]) -> Callable[P, T]:

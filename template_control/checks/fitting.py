@@ -20,7 +20,7 @@ _ANY_NUMBER = Range()
 _LONGEST = 60  # characters of a value that a message shows
 
 
-class _Refused(Exception):
+class Refused(Exception):
     """A value does not fit; its text says what would."""
 
 
@@ -43,7 +43,7 @@ def check(
     """
     try:
         return _fit(value, hint)
-    except _Refused as refused:
+    except Refused as refused:
         raise error(f"{where} is {shown(value)}: give {refused}") from None
 
 
@@ -61,18 +61,23 @@ _PLANS: dict[int, tuple[Any, Callable[[Any], Any]]] = {}
 """How to fit a value to an annotation, by the annotation's identity; to hash one takes long."""
 
 
-def _fit(value: Any, hint: Any) -> Any:
-    """See :func:`check`; raises :class:`_Refused`."""
+def fitter(hint: Any) -> Callable[[Any], Any]:
+    """What fits values to an annotation as :func:`check` does, but raises :class:`Refused`."""
     known = _PLANS.get(id(hint))
     if known is None:
         known = _PLANS[id(hint)] = hint, _plan(hint)  # held here, its identity stays its own
-    return known[1](value)
+    return known[1]
+
+
+def _fit(value: Any, hint: Any) -> Any:
+    """See :func:`check`; raises :class:`Refused`."""
+    return fitter(hint)(value)
 
 
 def _plan(hint: Any) -> Callable[[Any], Any]:
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
-        return partial(_annotated, inner=args[0], extras=args[1:])
+        return _annotated(args[0], args[1:])
     if hint in _SIMPLE:
         return _SIMPLE[hint]
     if origin in (Union, types.UnionType):
@@ -88,21 +93,29 @@ def _plan(hint: Any) -> Callable[[Any], Any]:
     return _as_is
 
 
-def _annotated(value: Any, inner: Any, extras: tuple[Any, ...]) -> Any:
+def _annotated(inner: Any, extras: tuple[Any, ...]) -> Callable[[Any], Any]:
     for extra in extras:
         if isinstance(extra, Range):
-            return _number(value, extra, whole=inner is int)
+            return partial(_number, within=extra, whole=inner is int)
         if isinstance(extra, Shape):
-            array = _fit(value, inner)
-            if not extra.holds(array.shape) or (extra.finite and not np.isfinite(array).all()):
-                raise _Refused(extra.words)
-            return array
+            return partial(_shaped, fit=fitter(inner), shape=extra)
         if isinstance(extra, Rising):
-            low, high = _fit(value, inner)
-            if not low < high:
-                raise _Refused("two numbers, the smaller one first")
-            return low, high
-    return _fit(value, inner)
+            return partial(_rising, fit=fitter(inner))
+    return fitter(inner)
+
+
+def _shaped(value: Any, fit: Callable[[Any], Any], shape: Shape) -> Any:
+    array = fit(value)
+    if not shape.holds(array.shape) or (shape.finite and not np.isfinite(array).all()):
+        raise Refused(shape.words)
+    return array
+
+
+def _rising(value: Any, fit: Callable[[Any], Any]) -> Any:
+    low, high = fit(value)
+    if not low < high:
+        raise Refused("two numbers, the smaller one first")
+    return low, high
 
 
 def _number(value: Any, within: Range, whole: bool = False) -> Any:
@@ -114,13 +127,13 @@ def _number(value: Any, within: Range, whole: bool = False) -> Any:
         kinds = (*kinds, float, np.floating)
     fits = isinstance(value, kinds) and not isinstance(value, bool | np.bool_)
     if not fits:
-        raise _Refused(within.words(what))
+        raise Refused(within.words(what))
     try:
         number = int(value) if whole else float(value)
     except OverflowError:
-        raise _Refused(within.words(what)) from None
+        raise Refused(within.words(what)) from None
     if not within.holds(number):
-        raise _Refused(within.words(what))
+        raise Refused(within.words(what))
     # A member of an enumeration stays one.
     kept = isinstance(value, Enum) or type(value) is type(number)
     return value if kept else number
@@ -128,25 +141,25 @@ def _number(value: Any, within: Range, whole: bool = False) -> Any:
 
 def _truth(value: Any) -> bool:
     if not isinstance(value, bool | np.bool_):
-        raise _Refused("True or False")
+        raise Refused("True or False")
     return bool(value)
 
 
 def _text(value: Any) -> str:
     if not isinstance(value, str):
-        raise _Refused("a text")
+        raise Refused("a text")
     return value
 
 
 def _path(value: Any) -> Path:
     if not isinstance(value, Path):
-        raise _Refused("a path")
+        raise Refused("a path")
     return value
 
 
 def _none(value: Any) -> None:
     if value is not None:
-        raise _Refused("None")
+        raise Refused("None")
 
 
 def _as_is(value: Any) -> Any:
@@ -174,11 +187,11 @@ def _one_of(value: Any, hints: tuple[Any, ...]) -> Any:
     for hint in others:
         try:
             return _fit(value, hint)
-        except _Refused as refused:
+        except Refused as refused:
             reasons.append(str(refused))
     if type(None) in hints:
         reasons.append("None")
-    raise _Refused(" or ".join(dict.fromkeys(reasons)))
+    raise Refused(" or ".join(dict.fromkeys(reasons)))
 
 
 def _items(value: Any, hint: Any) -> list[Any]:
@@ -186,7 +199,7 @@ def _items(value: Any, hint: Any) -> list[Any]:
     if isinstance(value, np.ndarray) and value.ndim > 0:
         return list(value.tolist())
     if isinstance(value, str | bytes) or not isinstance(value, Sequence):
-        raise _Refused(_words(hint))
+        raise Refused(_words(hint))
     return list(value)
 
 
@@ -195,37 +208,37 @@ def _tuple(value: Any, hint: Any) -> tuple[Any, ...]:
     many = len(hints) == 2 and hints[1] is Ellipsis
     items = _items(value, hint)
     if not many and len(items) != len(hints):
-        raise _Refused(_words(hint))
+        raise Refused(_words(hint))
     each = [hints[0]] * len(items) if many else hints
     try:
         found = tuple(_fit(item, h) for item, h in zip(items, each, strict=True))
-    except _Refused as refused:
-        raise _Refused(f"{_words(hint)}; each {refused}" if many else _words(hint)) from None
+    except Refused as refused:
+        raise Refused(f"{_words(hint)}; each {refused}" if many else _words(hint)) from None
     unchanged = isinstance(value, tuple) and all(a is b for a, b in zip(found, value, strict=True))
     return value if unchanged else found
 
 
 def _literal(value: Any, hint: Any) -> Any:
     if not any(type(value) is type(x) and value == x for x in get_args(hint)):
-        raise _Refused(_words(hint))
+        raise Refused(_words(hint))
     return value
 
 
 def _mapping(value: Any, hint: Any) -> Any:
     if not isinstance(value, Mapping):
-        raise _Refused(_words(hint))
+        raise Refused(_words(hint))
     key_hint, value_hint = get_args(hint)
     found = {}
     for key, entry in value.items():
         try:
             fitted = _fit(key, key_hint)
-        except _Refused as refused:
-            raise _Refused(f"{_words(hint)}; each key {refused}") from None
+        except Refused as refused:
+            raise Refused(f"{_words(hint)}; each key {refused}") from None
         try:
             found[fitted] = _fit(entry, value_hint)
-        except _Refused as refused:
+        except Refused as refused:
             text = f"{key} is {shown(entry)}, which should be {refused}"
-            raise _Refused(f"{_words(hint)}; {text}") from None
+            raise Refused(f"{_words(hint)}; {text}") from None
     same = all(found.get(key) is entry for key, entry in value.items())
     return value if same else found
 
@@ -244,19 +257,19 @@ def _array(value: Any, kind: Any) -> Any:
     except (TypeError, ValueError, OverflowError):
         numbers = False
     if not numbers:
-        raise _Refused("an array of numbers")
+        raise Refused("an array of numbers")
     return found
 
 
 def _called(value: Any, hint: Any) -> Any:
     if not callable(value):
-        raise _Refused("a function")
+        raise Refused("a function")
     return value
 
 
 def _iterable(value: Any, hint: Any) -> Any:
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-        raise _Refused("a list")
+        raise Refused("a list")
     return value
 
 
@@ -274,10 +287,10 @@ def _instance(value: Any, kind: type) -> Any:
     if getattr(kind, "_is_protocol", False):
         missing = [name for name in _members(kind) if not _has(value, name)]
         if missing or isinstance(value, type):
-            raise _Refused(_words(kind))
+            raise Refused(_words(kind))
         return value
     if not isinstance(value, kind):
-        raise _Refused(_words(kind))
+        raise Refused(_words(kind))
     return value
 
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, NotNegative, Positive, Share
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
+from template_control.embedding.planners.regularised import FromSection, Prior
+from template_control.embedding.planning.nearby import NearbyStrides
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap
@@ -90,7 +91,8 @@ class RunningPlanner:
         o = self.options
         self._grid = 0.5 * o.pace
         # As arrays at once: a plan has little time.
-        self._reach, self._tolerance = np.array([o.pace, o.climb]), np.array(o.tolerance)
+        self._reach = np.array([o.pace, o.climb])
+        self._strides = NearbyStrides(np.array(o.tolerance))
         # Compile now what a stride would otherwise wait for.
         self.decide(gait.apex)
 
@@ -98,6 +100,7 @@ class RunningPlanner:
         """See :class:`~.planner.Planner`: back to the gait it was made for, without an offset."""
         self.offset = np.zeros(PADDED)
         self.gait = self._family.reset()
+        self._strides.forget()
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
@@ -110,7 +113,7 @@ class RunningPlanner:
         aim = np.minimum(np.maximum(wanted, z - self._reach), z + self._reach)
         prior = self._prior(z, near, angles)
         stride = FromSection(self._map, z, prior.slots)
-        u, end = solve_stride(stride, aim - self.offset[:2], prior, self._tolerance)
+        u, end = self._strides.solve(stride, aim - self.offset[:2], prior)
         completed = end is not None
         predicted = APEX.padded(z if end is None else end) + self.offset
         at_target = bool(abs(wanted[0] - aim[0]) < _SAME and abs(wanted[1] - aim[1]) < _SAME)

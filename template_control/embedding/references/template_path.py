@@ -8,6 +8,7 @@ time.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -136,21 +137,23 @@ def join(strides: Sequence[Stride], options: PathOptions | None = None) -> Templ
         strides: at least one; the path's section is the first one's.
         options: how the path is looked up.
     """
-    metas, offset = [], 0.0
+    meta = np.concatenate([stride.meta for stride in strides])
+    coefficients = np.empty((2, len(meta), ORDER + 1))
     events, resets = [], []
+    row, offset = 0, 0.0
     for stride in strides:
-        meta = stride.meta.copy()
-        meta[:, 0] += offset
-        metas.append(meta)
-        events += [(offset + e.time, e.event) for e in stride.events]
-        resets += [(offset + e.time, e.reset) for e in stride.events]
-        offset += stride.duration
-    meta = np.concatenate(metas)
+        rows = slice(row, row + len(stride.meta))
+        meta[rows, 0] += offset
+        coefficients[0, rows], coefficients[1, rows] = stride.cx, stride.cy
+        for fired in stride.events:
+            events.append((offset + fired.time, fired.event))
+            resets.append((offset + fired.time, fired.reset))
+        row, offset = rows.stop, offset + stride.duration
     o = options or PathOptions()
     return TemplatePath(
         strides=tuple(strides),
         curve=Curve(
-            coefficients=np.concatenate([(s.cx, s.cy) for s in strides], axis=1),
+            coefficients=coefficients,
             meta=meta,
             look=np.array([meta[0, 3], o.overrun, o.leap]),
         ),
@@ -167,13 +170,14 @@ def _landings(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[Landi
     """Next touchdowns of the legs by the roles they have at the start."""
     found: dict[int, Landing] = {}
     legs = [Leg.REAR, Leg.FRONT]  # by present role, the role at the start
+    begins = meta[:, 0].tolist()
     for time, reset in resets:
         if reset in (Reset.SHIFT, Reset.SWAP):
             legs.reverse()
         elif reset in (Reset.PLACE_REAR, Reset.PLACE_FRONT):
             role = Leg.REAR if reset is Reset.PLACE_REAR else Leg.FRONT
-            later = np.flatnonzero(meta[:, 0] >= time - 1e-12)
-            x = float(meta[later[0], 3 + role]) if later.size else np.nan
+            later = bisect_left(begins, time - 1e-12)
+            x = float(meta[later, 3 + role]) if later < len(begins) else np.nan
             found.setdefault(legs[role], Landing(x, time))
     never = Landing(np.nan, np.inf)
     return found.get(Leg.REAR, never), found.get(Leg.FRONT, never)

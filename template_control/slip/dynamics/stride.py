@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from template_control.slip.parameters import SlipParameters
 Array = NDArray[np.float64]
 
 _EVENTS = tuple(Event)  # by number
+_OUTCOMES = tuple(Outcome)
 
 
 class FiredEvent(NamedTuple):
@@ -158,7 +160,8 @@ def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
     array = np.array(values, dtype=float)
     if array.shape != (size,):
         raise ParameterError(f"{name} has shape {array.shape}: give {size} numbers")
-    if not np.isfinite(array).all():
+    # The product is much quicker, and not finite where a number is not.
+    if not isfinite(array @ array) and not np.isfinite(array).all():
         raise ParameterError(f"{name} is {array.tolist()}: give finite numbers")
     return array
 
@@ -185,7 +188,12 @@ class StrideSimulator:
         self._model = kernel_model(parameters, max_time)
         self._scratch = new_scratch()
         self._names = tuple(node.name for node in automaton.nodes)
-        self._resets = [{e.event: e.reset for e in node.edges} for node in automaton.nodes]
+        # By numbers: to hash a member of an enumeration takes long.
+        self._resets = [{int(e.event): e.reset for e in node.edges} for node in automaton.nodes]
+        self._kernels = {
+            name: Kernel(automaton.tables, *self._model, node=index)
+            for name, index in automaton.index.items()
+        }
 
     def run(
         self,
@@ -206,7 +214,7 @@ class StrideSimulator:
             ParameterError: for NaN or a wrong shape.
             ParameterError: if there is no node ``start``.
         """
-        if start not in self.automaton.index:
+        if start not in self._kernels:
             raise ParameterError(
                 f"there is no node {start!r}: give one of {', '.join(self.automaton.index)}"
             )
@@ -214,7 +222,7 @@ class StrideSimulator:
         x = finite("state", state, 4)
         c = finite("toes", toes, 2)
         outcome, node, segments, events, duration = run_stride(
-            Kernel(self.automaton.tables, *self._model, node=self.automaton.index[start]),
+            self._kernels[start],
             x,
             c,
             finite("controls", u, NUM_SLOTS),
@@ -222,7 +230,7 @@ class StrideSimulator:
             w,
         )
         return Stride(
-            outcome=Outcome(outcome),
+            outcome=_OUTCOMES[outcome],
             node=names[node],
             state=x,
             toes=c,
@@ -238,10 +246,10 @@ class StrideSimulator:
         """Events from the kernel's rows (n, 8): time, event, nodes left and entered, state."""
         fired, names = [], self._names
         for row, state in zip(rows.tolist(), rows[:, 4:8].copy(), strict=True):
-            event, source, target = _EVENTS[int(row[1])], int(row[2]), int(row[3])
+            event, source, target = int(row[1]), int(row[2]), int(row[3])
             entered = names[target] if target >= 0 else ""
             reset = self._resets[source][event]
-            fired.append(FiredEvent(row[0], event, names[source], entered, state, reset))
+            fired.append(FiredEvent(row[0], _EVENTS[event], names[source], entered, state, reset))
         return tuple(fired)
 
 

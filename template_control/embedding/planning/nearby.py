@@ -1,0 +1,123 @@
+"""A stride close to one that is solved already: the same least squares, on that one's derivatives.
+
+In a run that goes on as it did, states change by millimetres and mm/s from decision to decision.
+The map's derivatives at one solution then serve many; they are most of a solution's cost. Where a
+run is to change its speed, or was pushed, every stride is solved on its own.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from operator import sub
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.planners.gauss_newton import improve
+from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
+from template_control.slip.maps.section import PADDED
+
+Array = NDArray[np.float64]
+
+_STEADY = 1.5  # a run that is to change its state by this many tolerances is not steady
+_NEAR = 0.5  # a state that is this many tolerances away is another stride's
+_TURN = 0.3  # and so is one whose controls are this far, in units of change
+_KEPT = 4  # solutions: of the stride that begins, as its foot lands, of the next, and one to come
+
+
+class Linear(NamedTuple):
+    """A stride about a solution, to first order.
+
+    Attributes:
+        z: (n,) where it begins.
+        x: (f,) its free controls.
+        end: (m,) where it ends.
+        by_state: (m, n) derivatives.
+        by_controls: (m, f) derivatives.
+    """
+
+    z: Array
+    x: Array
+    end: Array
+    by_state: Array
+    by_controls: Array
+
+
+class _Solution:
+    """A stride that was solved; its derivatives are not taken before a second one comes near."""
+
+    def __init__(self, z: Array, u: Array, turns: bool, tolerance: Array) -> None:
+        self.z, self.u, self.turns = z, u, turns
+        self.place: list[float] = (z / tolerance).tolist()
+        self.linear: Linear | None = None
+
+    def about(self, stride: FromSection) -> Linear:
+        """To first order."""
+        if self.linear is None:
+            step, n, slots = stride.step, len(self.z), stride.slots
+            m, columns = step.dimensions[1], np.array([*range(n), *(PADDED + s for s in slots)])
+            end, jacobian, _ = step.derivatives(self.z, self.u, columns)
+            by_state, by_controls = jacobian[:m, :n], jacobian[:m, n:].copy()
+            self.linear = Linear(self.z, self.u[slots], end[:m], by_state, by_controls)
+        return self.linear
+
+
+class NearbyStrides:
+    """Solves strides, and keeps the last solutions.
+
+    Args:
+        tolerance: (m,) errors at the end that count as 1. The section that a stride begins at is
+            that which it ends at.
+    """
+
+    def __init__(self, tolerance: Array) -> None:
+        self.tolerance = tolerance
+        self._known: deque[_Solution] = deque(maxlen=_KEPT)
+
+    def forget(self) -> None:
+        """Solve the next stride on its own."""
+        self._known.clear()
+
+    def solve(self, stride: FromSection, aim: Array, prior: Prior) -> tuple[Array, Array | None]:
+        """As :func:`~.planners.regularised.solve_stride`.
+
+        Args:
+            stride: its P.
+            aim: (m,) where the stride should end.
+            prior: the free controls.
+        """
+        if not (abs(aim - stride.z) < _STEADY * self.tolerance).all():
+            return solve_stride(stride, aim, prior, self.tolerance)
+        turns = bool((prior.upper > prior.lower).all())
+        known = self._nearest(stride.z, turns)
+        found = known and self._nearby(known.about(stride), stride.z, aim, prior)
+        if found:
+            return found
+        u, end = solve_stride(stride, aim, prior, self.tolerance)
+        if end is not None:
+            self._known.append(_Solution(stride.z.copy(), u.copy(), turns, self.tolerance))
+        return u, end
+
+    def _nearest(self, z: Array, turns: bool) -> _Solution | None:
+        least, best = _NEAR, None
+        here = (z / self.tolerance).tolist()
+        for known in self._known:
+            if known.turns is turns:
+                away = max(map(abs, map(sub, here, known.place)))
+                if away < least:
+                    least, best = away, known
+        return best
+
+    def _nearby(
+        self, linear: Linear, z: Array, aim: Array, prior: Prior
+    ) -> tuple[Array, Array] | None:
+        """On the derivatives of a solution that is known; None where they do not hold."""
+        goal = np.array([aim, self.tolerance])
+        end = linear.end + linear.by_state @ (z - linear.z)
+        _, turn, x = improve(end, linear.by_controls, goal, linear.x, prior.table)
+        if turn > _TURN:
+            return None
+        u = prior.controls.copy()
+        u[prior.slots] = x
+        return u, end + linear.by_controls @ (x - linear.x)
