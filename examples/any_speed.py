@@ -3,10 +3,13 @@
     python examples/any_speed.py [--trials 4] [--first 0] [--duration 60] [--robot five-link]
     python examples/any_speed.py --ramp 0.3 [--stay 5]
     python examples/any_speed.py --profile FILE [--save run.npz]
+    python examples/any_speed.py --speeds 8 [--robot rabbit] [--starts 3]
 
 A random profile goes at 0.1 to 0.5 m/s^2 from one speed to the next, all within 0.3 to 1.4 m/s for
 l0 = 1 m, and keeps each for 1 to 5 s. Its number is its seed. A ramp goes from 0.4 to 1.4 m/s with
 this acceleration, stays, and goes back. FILE is TOML with two lists, times [s] and speeds [m/s].
+With --speeds the robot keeps so many speeds, spread evenly over its own range, for 50 steps each;
+with --starts also from so many starts off its gait.
 """
 
 import argparse
@@ -17,8 +20,11 @@ import numpy as np
 
 import template_control as tc
 from template_control.robustness import wilson_interval
+from template_control.run.simulation import perturbed_start
 from template_control.run.summary import summarise
-from template_control.slip import Scale
+from template_control.slip import Scale, WalkingGait
+
+_STEPS, _LAST = 50, 20  # of a run that keeps a speed, and those that it is judged by
 
 
 def random_profile(seed: int, duration: float, unit: float) -> tc.SpeedProfile:
@@ -61,6 +67,44 @@ def walk(name: str, robot: str, profile: tc.SpeedProfile, duration: float) -> tc
     return record
 
 
+def keep(name: str, count: int, starts: int) -> tc.Record:
+    """Keep ``count`` speeds of a robot's own range, and print a row of a table for each run."""
+    robot = tc.load_robot(name)
+    slowest, fastest = tc.walking_speeds(robot)
+    print(f"{robot.name} is told to walk at {slowest:.2f} to {fastest:.2f} m/s")
+    print("| [m/s] | start | steps | dx/dt [m/s] | y [mm] | dy/dt [m/s] | torque | at the limit |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    for speed in np.linspace(slowest, fastest, count).round(4):
+        gait = tc.robot_gait_for_speed(robot, float(speed))
+        for seed in (None, *range(starts)):
+            start = None if seed is None else perturbed_start(gait, seed)
+            options = tc.SimulationOptions(steps=_STEPS, start=start, record_every=10)
+            record = tc.simulate(robot, tc.LqrPlanner(gait), options)
+            print(row(record, gait, float(speed), seed), flush=True)
+    return record
+
+
+def row(record: tc.Record, gait: WalkingGait, speed: float, seed: int | None) -> str:
+    """What a run came to: how far the last steps end off the gait, mean and deviation."""
+    error = record.section_state[1:][-_LAST:] - gait.vlo
+    units = (1.0, 1e3, 1.0)
+    settled = [
+        f"{unit * off:.{3 if unit == 1.0 else 1}f} ± {unit * spread:.{3 if unit == 1.0 else 1}f}"
+        for unit, off, spread in zip(units, error.mean(axis=0), error.std(axis=0), strict=True)
+    ]
+    told = summarise(record, None)
+    torque = max(joint["peak"] / joint["limit"] for joint in told["joint_torque"].values())
+    cells = [
+        f"{speed:.3f}",
+        "gait" if seed is None else f"seed {seed}",
+        f"{record.steps}{', FELL' if record.fell else ''}",
+        *settled,
+        f"{100 * torque:.0f} %",
+        f"{100 * told['saturated_share']:.2f} %",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
 def main() -> None:
     """Walk what was asked for."""
     parser = argparse.ArgumentParser(description="Walk at a speed that changes at any time.")
@@ -70,11 +114,15 @@ def main() -> None:
     parser.add_argument("--ramp", type=float, help="acceleration [m/s^2]")
     parser.add_argument("--stay", type=float, default=5.0, help="at the end of a ramp [s]")
     parser.add_argument("--profile", type=Path, help="TOML with times and speeds")
-    parser.add_argument("--robot", default="five-link")
+    parser.add_argument("--speeds", type=int, help="of the robot's own range, to keep")
+    parser.add_argument("--starts", type=int, default=0, help="off the gait, at each of them")
+    parser.add_argument("--robot", default="five-link", help="name or URDF file")
     parser.add_argument("--save", type=Path, help="file of the last run's record")
     chosen = parser.parse_args()
     unit = Scale.of(tc.template_for(tc.load_robot(chosen.robot))).speed
-    if chosen.profile is not None:
+    if chosen.speeds is not None:
+        record = keep(chosen.robot, chosen.speeds, chosen.starts)
+    elif chosen.profile is not None:
         data = tomllib.loads(chosen.profile.read_text(encoding="utf-8"))
         profile = tc.SpeedProfile(tuple(data["times"]), tuple(data["speeds"]))
         record = walk(str(chosen.profile), chosen.robot, profile, profile.times[-1])

@@ -30,6 +30,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
 from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.leg_forces import leg_forces
+from template_control.embedding.references.rolling import rolled
 from template_control.embedding.references.stumble import Stumble
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensing
@@ -40,7 +41,7 @@ from template_control.parts import ready
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Leg
+from template_control.slip.automaton.vocabulary import Leg, Slot
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
@@ -205,14 +206,16 @@ class EmbeddingController:
         self._locate(dt)
         self._swing(q, v, dt)
         self._track(q, v, dt)
+        self.sensing.foresee(dt)
         self.time += dt
         return self.qp.solve(self.station.tasks, self._stance(), self.load.factor)
 
     # -- the automaton ----------------------------------------------------------------
 
     def _sense(self, contact: NDArray[np.bool_]) -> None:
-        station = self.station
-        self.sensing.read(contact, bool(station.stance), station.control.momentum_speed)
+        control = self.station.control
+        stands = bool(self.station.stance)
+        self.sensing.read(contact, stands, control.momentum_speed, control.rolls)
 
     def _advance(self) -> None:
         """Take the first edge of the present node that the robot fires."""
@@ -236,7 +239,7 @@ class EmbeddingController:
             # A step back: the other foot is the one on the ground.
             sensing.stand_on(self.feet.of[stance[0]])
         if lifted or self.feet.of != roles:
-            sensing.take_roles()
+            sensing.take_roles(self.station.control.rolls)
             self.planning.stand_on(self.feet.of[Leg.REAR])
         momentum = self.station.control.momentum_speed
         if momentum is not before.control.momentum_speed:
@@ -263,12 +266,19 @@ class EmbeddingController:
         return {self.feet.of[leg] for leg in self.station.stance}
 
     def _land(self, leg: Leg) -> None:
-        """The template's ground is now that of the foot which has landed."""
+        """The template's ground is now that of the foot which has landed.
+
+        Where the table says ``unhit``, the path goes on with the speed before it hit the ground.
+        """
         higher, s = self.sensing.land(leg), self.sensing.now
+        measured = s.state[2:].copy()
+        if self.station.control.unhit:
+            s.state[2:] = self.sensing.unhit
         if self.station.control.lands:
             self.planning.land(self.node, s, self.time)
         else:
             self._enter(self.planning.land_off(self.node, s, self.time, higher).name)
+        s.state[2:] = measured
         self._on_new_path()
 
     def _decide(self, section: Section) -> None:
@@ -344,6 +354,9 @@ class EmbeddingController:
                     gait = self.planner.gait
                     foothold = self.sensing.now.toes[Leg.REAR] + gait.step_length
                     due = gait.step_duration - self.feet.swing_time[foot]
+                if station.control.rolls:
+                    angle = float(self.reports[-1].decision.controls[Slot.TOUCHDOWN_ANGLE])
+                    foothold = rolled(foothold, angle, self.robot.foot_radius)
                 swing.advance(foothold, due, dt, self.sensing.ground)
             wanted.furthest[foot] = swing.furthest(hips, self.robot.leg_length)
 

@@ -49,6 +49,12 @@ class PhaseControl(Checked):
         curved: whether the CoM follows the planner's curve in time, and not the template's springs.
         lands: whether the stiffnesses that are still free are chosen again as the phase begins,
             from where the foot has landed.
+        rolls: whether the template's toe stays in one place while the foot rolls
+            (:func:`~template_control.embedding.references.rolling.unrolled`); else it moves with
+            the foot's lowest point.
+        unhit: whether the path from a touchdown begins with the speed before the foot hit the
+            ground. How much of the impact is over when it is felt varies from step to step; the
+            template lands without one.
     """
 
     tasks: tuple[Task, ...]
@@ -60,6 +66,8 @@ class PhaseControl(Checked):
     trims: bool = False
     swing: SwingOptions | None = None
     lands: bool = False
+    rolls: bool = False
+    unhit: bool = False
     curved: bool = False
 
 
@@ -112,8 +120,10 @@ PHASES: Phases = {
     Phase.DS: PhaseControl(
         tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,), trims=True
     ),
-    "DS_sc^wp": _UNTRIMMED,
-    "DS_sd^wp": _UNTRIMMED,
+    "SS_av^wp": replace(_SINGLE_STANCE, rolls=True),
+    "DS_sc^wp": replace(_UNTRIMMED, rolls=True, unhit=True),
+    "DS_sd^wp": replace(_UNTRIMMED, rolls=True),
+    "SS_bv^wp": replace(_SINGLE_STANCE, rolls=True),
     "DS_sc^wr": replace(_UNTRIMMED, lands=True),
     "DS_sd^wr": _UNTRIMMED,
     "SS_sc^wr": replace(_RUNNING_STANCE, lands=True),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.references.feet import Feet
+from template_control.embedding.references.rolling import unrolled
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Leg
 
@@ -50,12 +51,14 @@ class Sensing:
     Attributes:
         now: what was read last.
         ground: height of the template's ground [m].
+        unhit: (2,) dx/dt and dy/dt of this tick if nothing has hit the robot since the last one.
     """
 
     def __init__(self, robot: Biped, feet: Feet, acceleration: Array) -> None:
         self._robot, self._feet = robot, feet
         self.now = Sensed(swing_time=feet.swing_time, acceleration=acceleration)
         self.ground = 0.0
+        self.unhit = np.zeros(2)
         self._rear_shift = 0.0
 
     def begin(self, stands: bool) -> None:
@@ -63,21 +66,23 @@ class Sensing:
         self.now.feet = self._feet.of
         self.ground = self._height(self._feet.landed) if stands else 0.0
 
-    def read(self, contact: NDArray[np.bool_], stands: bool, momentum: bool) -> None:
+    def read(
+        self, contact: NDArray[np.bool_], stands: bool, momentum: bool, rolls: bool = False
+    ) -> None:
         """Read the state of this tick.
 
         Args:
             contact: (2,) whether each foot touches the ground.
             stands: whether a foot carries; the ground is under the one that landed last.
             momentum: as for :meth:`read_speed`.
+            rolls: whether the toes stay in one place while the feet roll.
         """
-        r, s, (rear, front) = self._robot, self.now, self._feet.of
+        r, s = self._robot, self.now
         if stands:
             self.ground = self._height(self._feet.landed)
-        s.toes[0] = r.foot_position[rear, 0] + self._rear_shift
-        s.toes[1] = r.foot_position[front, 0]
         s.state[0], s.state[1] = r.com[0], r.com[1] - self.ground
         s.state[3] = r.com_velocity[1]
+        self._read_toes(rolls)
         s.contact = contact
         self.read_speed(momentum)
 
@@ -95,11 +100,26 @@ class Sensing:
         if momentum:
             s.state[2] += r.angular_momentum / (r.mass * s.state[1])
 
-    def take_roles(self) -> None:
-        """The feet have changed their roles, or one of them has lifted off."""
+    def foresee(self, dt: float) -> None:
+        """Reckon with the speed that the next tick has in ``dt`` if nothing hits the robot."""
+        self.unhit[:] = self.now.state[2:] + self.now.acceleration * dt
+
+    def take_roles(self, rolls: bool = False) -> None:
+        """The feet have changed their roles, or one of them has lifted off.
+
+        Args:
+            rolls: as for :meth:`read`.
+        """
         self._rear_shift = 0.0
-        self.now.feet = rear, front = self._feet.of
-        self.now.toes[:] = self._robot.foot_position[[rear, front], 0]
+        self.now.feet = self._feet.of
+        self._read_toes(rolls)
+
+    def _read_toes(self, rolls: bool) -> None:
+        r, s = self._robot, self.now
+        for leg, foot in enumerate(self._feet.of):
+            toe = float(r.foot_position[foot, 0])
+            s.toes[leg] = unrolled(toe, s.state, r.foot_radius) if rolls else toe
+        s.toes[Leg.REAR] += self._rear_shift
 
     def stand_on(self, foot: int) -> None:
         """Put the ground under a foot: the one that landed last has lifted off."""

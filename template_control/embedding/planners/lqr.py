@@ -38,11 +38,12 @@ from template_control.embedding.planners.step_search import (
 )
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.parts import ready
-from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WalkingGait, control_units, vlo_jacobians
 from template_control.slip.gaits.walking_family import WalkingFamily
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.similarity import (
     LENGTH,
     PER_LENGTH_SQUARED,
@@ -55,6 +56,7 @@ from template_control.slip.similarity import (
 )
 
 Array = NDArray[np.float64]
+_ROUNDS = 2  # of Newton's method for the fixed point; it begins at the last one
 _Several = Annotated[int, Range(2)]
 _Three = tuple[NotNegative, NotNegative, NotNegative]
 
@@ -95,12 +97,16 @@ class PushOffOptions(Checked):
     Attributes:
         cost: of the LQR on kappa_p, as a share of k0.
         points: of kappa_p in the coarse grid of the search.
+        settled_price: cost-to-go up to which a step of the linear law may lead further away. Above
+            it such a step is searched for: near some gaits the law alone settles beside them, in
+            states in which the map is no longer linear.
         second_steps: what :attr:`LqrOptions.second_steps` are in other steps: alpha relative to
             the gait's [rad], kappa_1, kappa_2 and kappa_p over k0. A stiff push-off puts energy in.
     """
 
     cost: Positive = tuned(2.0)
     points: Count = tuned(3)
+    settled_price: NotNegative = tuned(0.01)
     second_steps: tuple[_Four, ...] = tuned(
         (
             (0.0, 1.5, 1.0, 0.75),
@@ -222,6 +228,7 @@ class LqrPlanner:
             r + self.b.T @ self._cost @ self.b, self.b.T @ self._cost @ self.a
         )
         self._settling = settling_map(self.a, self.b, np.array(o.tolerance), o.control_weight)
+        self._shift = self._settling @ self.offset
         self._law = self._aim()
 
     def __repr__(self) -> str:
@@ -235,7 +242,7 @@ class LqrPlanner:
     def _aim(self) -> Law:
         """The linear law about the fixed point the robot has with the present offset."""
         p, o = self.gait.parameters, self.options
-        shift = self._settling @ self.offset
+        shift = self._shift = self._settled()
         slots, units = control_units(self.gait)
         nominal, others = self.gait.controls[slots] / units, len(slots) - 1
         steps = o.push_off.second_steps if self._pushes else o.second_steps
@@ -257,6 +264,29 @@ class LqrPlanner:
             stiffness=p.leg_stiffness,
             kernel=stride_kernel(p, self.gait.stride),
         )
+
+    def _settled(self) -> Array:
+        """(3 + c,) shift of the fixed point by the present offset.
+
+        With push-off the map counts as it is about the shift so far, not as it is about the gait:
+        there are gaits near which a small offset asks for so much of the controls that the linear
+        map's fixed point is none. No offset would ever be learnt from that.
+        """
+        linear: Array = self._settling @ self.offset
+        if not self._pushes:
+            return linear
+        o, (slots, units) = self.options, control_units(self.gait)
+        shift, step = self._shift, ReturnMap(self.gait.parameters, self.gait.stride)
+        for _ in range(_ROUNDS):
+            z, u = self.gait.vlo + shift[:3], self.gait.controls.copy()
+            u[slots] += shift[3:] * units
+            here = step.linearise(z, u)
+            if here.outcome is not Outcome.SECTION:
+                return linear
+            a, b = here.state_jacobian, here.control_jacobian[:, slots] * units
+            rest = here.state + self.offset - z + shift[:3] - a @ shift[:3] - b @ shift[3:]
+            shift = settling_map(a, b, np.array(o.tolerance), o.control_weight) @ rest
+        return shift
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
@@ -280,13 +310,21 @@ class LqrPlanner:
         u, first = np.empty(len(slots)), np.empty(3)
         linear(law, z, u)
         cost = price(law, True, s, z, u, np.inf, first)
-        nominal = cost < self.options.trusted_price
+        nominal = cost < self.options.trusted_price and self._approaches(law, z, first)
         if not nominal:
             cost = search(law, self._grid, s, z, u, first)
         controls = self.gait.controls.copy()
         controls[slots] = u * units
         nominal = nominal and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
+
+    def _approaches(self, law: Law, z: Array, after: Array) -> bool:
+        """Whether a step of the linear law comes nearer to where it leads, or is there."""
+        if not self._pushes:
+            return True
+        before, then = z - law.target, after - law.target
+        left = float(then @ law.cost @ then)
+        return left <= max(float(before @ law.cost @ before), self.options.push_off.settled_price)
 
     def land(
         self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
