@@ -79,10 +79,8 @@ def _running(robot: PlanarBiped, speed: float) -> tuple[EmbeddingController, Any
     gait = running_gait(SlipParameters(mass=robot.mass), speed)
     controller = EmbeddingController(robot, RunningPlanner(gait))
     controller.planning.begin(APEX)
-    options = controller.options
-    start = ApexStart(
-        gait.apex, gait, options.swing, controller.first_pitch(), controller.planning.automaton
-    )
+    swing, automaton = controller.swings.other, controller.planning.automaton
+    start = ApexStart(gait.apex, gait, swing, controller.first_pitch(), automaton)
     pose = apex_pose(robot, start)
     q, v = state_in(robot, pose)
     controller.start(pose.rear, pose.swung)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 import template_control as tc
-from template_control.embedding import HIGH_SWING
 from template_control.robustness.wilson import wilson_interval
 from template_control.slip import WalkingGait
 
@@ -73,12 +72,7 @@ def main() -> None:
         falls, slow = 0, 0
         for number, ground in enumerate(grounds(what, trials, gait)):
             plant = tc.PlantOptions(terrain=ground)
-            run = tc.SimulationOptions(
-                steps=row.steps,
-                plant=plant,
-                embedding=tc.EmbeddingOptions(swing=HIGH_SWING),
-                record_every=5,
-            )
+            run = tc.SimulationOptions(steps=row.steps, plant=plant, record_every=5)
             record = tc.simulate(robot, tc.LqrPlanner(gait), run)
             speed = record.section_state[-5:, 0].mean() / gait.state[0] - 1.0
             falls += record.fell

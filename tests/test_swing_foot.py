@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from template_control.embedding.references.swing_choice import HIGH_SWING
 from template_control.embedding.references.swing_foot import (
-    HIGH_SWING,
     SwingFoot,
     SwingOptions,
     quintic_step,

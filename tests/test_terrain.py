@@ -12,7 +12,6 @@ import pytest
 import template_control as tc
 from template_control import settings
 from template_control.cli.main import main
-from template_control.embedding import HIGH_SWING
 from template_control.errors import ParameterError
 from template_control.plant import (
     BulletPlant,
@@ -304,11 +303,7 @@ def test_options_keep_their_terrain_in_a_file():
 @pytest.fixture(scope="module")
 def up_the_slope(default_gait):
     ground = Terrain.slope(np.radians(2.0), start=0.7)
-    options = tc.SimulationOptions(
-        steps=4,
-        plant=tc.PlantOptions(terrain=ground),
-        embedding=tc.EmbeddingOptions(swing=HIGH_SWING),
-    )
+    options = tc.SimulationOptions(steps=4, plant=tc.PlantOptions(terrain=ground))
     return tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(default_gait), options)
 
 

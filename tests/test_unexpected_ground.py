@@ -1,10 +1,12 @@
 """A foot that meets something: what it feels, what counts as a touchdown, which legs then push."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding import HIGH_SWING, GuardOptions, StumbleOptions
+from template_control.embedding import HIGH_SWING, GuardOptions, StumbleOptions, SwingOptions
 from template_control.embedding.guards import RobotGuards
 from template_control.embedding.planners.planner import Decision
 from template_control.embedding.planning.unexpected_ground import (
@@ -17,6 +19,7 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import VLO
+from template_control.slip.scenario.route import StrideGoal
 
 WEIGHT = 785.0
 
@@ -65,20 +68,31 @@ def test_an_early_contact_counts_in_front_of_the_com(place, due, expected):
     assert guards.fired(edge, sensed, due) is expected
 
 
-def test_legs_push_longer_after_a_step_up(default_gait):
-    """The template steps on ground 3 cm higher, with its leg that much shorter."""
-    gait = default_gait
+def landing(gait, height):
+    """Where the step ends by its controls, from a touchdown on ground that much higher.
+
+    On lower ground the leg has its length when the CoM has fallen, and is faster.
+    """
     simulator = StrideSimulator(gait.parameters, AUTOMATON)
     stride = simulator.run("SS_av^w", VLO.state(gait.vlo), gait.controls)
     touchdown = next(e.time for e in stride.events if e.event is Event.TOUCHDOWN)
     row = np.flatnonzero(np.isclose(stride.meta[:, 0], touchdown))[0]
     toes = tuple(stride.meta[row, 3:5])
     state = np.array([c[row, n] for n in (0, 1) for c in (stride.cx, stride.cy)])
-    state[1] -= 0.03
+    state[1] -= max(height, 0.0)
+    fall = max(-height, 0.0)
+    state[2:] *= np.sqrt(1.0 + 2.0 * gait.parameters.gravity * fall / (state[2:] @ state[2:]))
 
     def ahead(u):
         rest = simulator.run("DS_sc^w", state, u, toes)
         return VLO.of(rest.state), rest.outcome
+
+    return ahead
+
+
+def test_legs_push_longer_after_a_step_up(default_gait):
+    """The template steps on ground 3 cm higher, with its leg that much shorter."""
+    gait, ahead = default_gait, landing(default_gait, 0.03)
 
     def surprise(end):
         return np.abs((end - gait.vlo) / UnexpectedGroundOptions().tolerance).max()
@@ -96,15 +110,50 @@ def test_legs_push_longer_after_a_step_up(default_gait):
     assert np.all((k >= 0.5) & (k <= 2.0))
 
 
+def test_after_a_step_down_the_legs_lead_where_the_next_step_can_brake(default_gait):
+    """The end that looks nearest to the gait is not the one from which a step brakes best."""
+    gait, ahead = default_gait, landing(default_gait, -0.03)
+    planner, options = tc.LqrPlanner(gait), UnexpectedGroundOptions()
+    decision = Decision(gait.controls, gait.vlo, True, True, True)
+    free = [Slot.K_SC, Slot.K_SD]
+    near = choose_legs(ahead, decision, gait.vlo, free, gait.controls, options)
+    cheap = choose_legs(ahead, decision, gait.vlo, free, gait.controls, options, planner.price)
+    end, outcome = ahead(cheap.controls)
+    assert outcome is Outcome.SECTION
+    np.testing.assert_allclose(cheap.predicted, end)
+    assert planner.price(end) < 0.7 * planner.price(near.predicted)
+
+
+@pytest.mark.parametrize(("name", "high"), [("five-link", True), ("rabbit", False)])
+def test_light_legs_lift_their_feet_high_in_steady_walking(name, high):
+    robot = tc.load_robot(name)
+    swings = tc.EmbeddingOptions().swings(robot)
+    walk = StrideGoal("w", np.zeros(3), 1.1)
+    assert (swings.towards(walk) == HIGH_SWING) is high
+    assert swings.towards(replace(walk, then="wr")) == SwingOptions(), "a run comes"
+    own = SwingOptions(clearance=0.07)
+    assert tc.EmbeddingOptions(swing=own).swings(robot).towards(walk) == own
+
+
+@pytest.mark.slow(seconds=20)
+@pytest.mark.parametrize(("place", "height"), [(3.935, 0.03), (3.083, -0.03), (5.851, -0.03)])
+def test_an_unseen_step_leaves_the_walk_at_its_speed(default_gait, place, height):
+    """With the feet lower or with legs chosen by the end state alone the robot fell."""
+    gait = default_gait
+    plant = tc.PlantOptions(terrain=tc.Terrain.step(height, place * gait.step_length))
+    options = tc.SimulationOptions(steps=int(place) + 9, plant=plant, record_every=5)
+    record = tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(gait), options)
+    assert not record.fell
+    assert record.section_state[-2:, 0] == pytest.approx(gait.state[0], rel=0.03)
+
+
 @pytest.mark.slow(seconds=20)
 @pytest.mark.parametrize("place", [3.01, 3.91, 3.995])
 def test_a_step_up_right_before_a_foothold_is_climbed(default_gait, place):
     """The foot came down in front of the wall, or lifted off right behind it."""
     gait = default_gait
     plant = tc.PlantOptions(terrain=tc.Terrain.step(0.03, place * gait.step_length))
-    options = tc.SimulationOptions(
-        steps=12, plant=plant, embedding=tc.EmbeddingOptions(swing=HIGH_SWING)
-    )
+    options = tc.SimulationOptions(steps=12, plant=plant)
     record = tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(gait), options)
     assert not record.fell
     assert record.foot[-1, :, 1].min() > 0.029

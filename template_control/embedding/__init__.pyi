@@ -28,6 +28,7 @@ from .planners.planner import Decision as Decision
 from .planners.planner import Free as Free
 from .planners.planner import LandingPlanner as LandingPlanner
 from .planners.planner import Planner as Planner
+from .planners.planner import PricingPlanner as PricingPlanner
 from .planners.running import RunningOptions as RunningOptions
 from .planners.running import RunningPlanner as RunningPlanner
 from .planners.transition import TransitionOptions as TransitionOptions
@@ -37,7 +38,9 @@ from .references.apex_pose import ApexStart as ApexStart
 from .references.apex_pose import apex_pose as apex_pose
 from .references.leg_forces import UnloadOptions as UnloadOptions
 from .references.stumble import StumbleOptions as StumbleOptions
-from .references.swing_foot import HIGH_SWING as HIGH_SWING
+from .references.swing_choice import HIGH_SWING as HIGH_SWING
+from .references.swing_choice import SwingChoice as SwingChoice
+from .references.swing_choice import Swings as Swings
 from .references.swing_foot import SwingOptions as SwingOptions
 from .references.template_path import PathOptions as PathOptions
 from .robot_route import robot_route as robot_route

@@ -68,6 +68,7 @@ class EmbeddingController:
     Attributes:
         station: where on the automaton the robot is, and what that asks for.
         planning: the stride's decision and the path that follows it.
+        swings: shapes of the swings in phases that have none of their own.
         feet: roles and swings of the feet.
         reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
         sensing: the robot's state in the template's terms.
@@ -100,7 +101,8 @@ class EmbeddingController:
         self.trim = MomentumTrim(self.parameters, o.trim)
         self.lean = TrunkLean(o.lean, o.trunk_pitch)
         self.wanted = Wanted(pitch=o.trunk_pitch)
-        self.feet = Feet(o.swing, self.wanted.foot)
+        self.swings = o.swings(robot)
+        self.feet = Feet(self.swings.other, self.wanted.foot)
         self.reference = self.wanted.com
         self.template_forces = np.zeros((2, 2))
         self.phase_time = 0.0
@@ -110,7 +112,7 @@ class EmbeddingController:
         self.sensing = Sensing(robot, self.feet, self.reference[4:])
         self._stumble = Stumble(o.stumble, robot.mass * robot.gravity)
         self._guards = RobotGuards(self.parameters, o.guards)
-        self._stations = stations(automaton, robot.nv, o.phases, o.swing)
+        self._stations = stations(automaton, robot.nv, o.phases)
         curved = {name for name, station in self._stations.items() if station.control.curved}
         self.planning = StridePlanning(route, planners, o.replan, automaton, curved)
         p = self.parameters
@@ -259,7 +261,8 @@ class EmbeddingController:
 
     def _lift(self, foot: int, swung: float = 0.0) -> None:
         """A swing keeps the shape with which it began, whatever the next stride's is."""
-        self.feet.swing[foot].options = self.station.swing
+        goal = self.reports[-1].goal if self.reports else self.planning.first_goal()
+        self.feet.swing[foot].options = self.station.swing or self.swings.towards(goal)
         self.feet.lift(foot, self.robot, swung)
 
     def _standing(self) -> set[int]:

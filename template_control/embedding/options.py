@@ -15,7 +15,9 @@ from template_control.embedding.phases import PHASES, PhaseControl
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.references.leg_forces import UnloadOptions
 from template_control.embedding.references.stumble import StumbleOptions
+from template_control.embedding.references.swing_choice import SwingChoice, Swings
 from template_control.embedding.references.swing_foot import SwingOptions
+from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
 from template_control.whole_body.solver import QpOptions
@@ -32,7 +34,8 @@ class EmbeddingOptions(QpOptions):
         trunk_pitch: where the trunk is held [rad].
         phases: tasks, clock, feet and learners of each phase.
         guards: when a touchdown or a liftoff is believed.
-        swing: shape of the swing.
+        swing: shape of the swings; None: as ``swing_choice`` has it for the robot.
+        swing_choice: which robots lift their feet high, and when.
         stumble: when a foot in the air has met a wall.
         unload: how a foot is unloaded before it lifts off.
         replan: when a stride is planned anew.
@@ -47,7 +50,8 @@ class EmbeddingOptions(QpOptions):
     trunk_pitch: Annotated[float, Range(-1.5, 1.5)] = tuned(0.0)
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(PHASES))
     guards: GuardOptions = field(default_factory=GuardOptions)
-    swing: SwingOptions = field(default_factory=SwingOptions)
+    swing: SwingOptions | None = None
+    swing_choice: SwingChoice = field(default_factory=SwingChoice)
     stumble: StumbleOptions = field(default_factory=StumbleOptions)
     unload: UnloadOptions = field(default_factory=UnloadOptions)
     replan: ReplanOptions = field(default_factory=ReplanOptions)
@@ -55,3 +59,9 @@ class EmbeddingOptions(QpOptions):
     trim: TrimOptions = field(default_factory=TrimOptions)
     catches: bool = tuned(True)
     lean: LeanOptions = field(default_factory=LeanOptions)
+
+    def swings(self, robot: Biped) -> Swings:
+        """Shapes of a robot's swings in phases that have none of their own."""
+        if self.swing is not None:
+            return Swings(self.swing, self.swing)
+        return self.swing_choice.of(robot)

@@ -45,7 +45,7 @@ class PhaseControl(Checked):
             left to lift off with.
         weighs: whether the load estimate observes this phase.
         trims: whether the momentum trim acts in this phase.
-        swing: shape of the swings that begin in this phase; None: that of the controller's options.
+        swing: shape of the swings that begin in this phase; None: the robot's.
         curved: whether the CoM follows the planner's curve in time, and not the template's springs.
         lands: whether the stiffnesses that are still free are chosen again as the phase begins,
             from where the foot has landed.

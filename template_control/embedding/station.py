@@ -33,7 +33,7 @@ class Station:
         ways: edges to other nodes, in order.
         stance: legs that carry.
         swings: legs in the air that have a foothold to go to.
-        swing: shape of their swings.
+        swing: shape of their swings; None: the robot's.
         locate: finds the robot's place on the path.
         cap: (len(stance),) largest normal force of each stance foot, inf without [N]; the
             controller overwrites those of the legs that unload.
@@ -48,16 +48,14 @@ class Station:
     ways: tuple[Edge, ...]
     stance: tuple[int, ...]
     swings: tuple[int, ...]
-    swing: SwingOptions
+    swing: SwingOptions | None
     locate: Locate
     cap: Array
     awaited: Leg | None
     trimmed: bool
 
 
-def stations(
-    automaton: Automaton, nv: int, phases: Phases, swing: SwingOptions
-) -> dict[str, Station]:
+def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station]:
     """Make a station for each node, by its name.
 
     Args:
@@ -65,7 +63,6 @@ def stations(
         nv: degrees of freedom of the robot.
         phases: what the controller does in each phase. Entries for nodes of the library's
             automaton may stand in it, whatever ``automaton`` is.
-        swing: shape of the swings where an entry has none of its own.
 
     Raises:
         ParameterError: if a node has no entry, or an entry is for no node.
@@ -96,7 +93,7 @@ def stations(
             # Plain numbers: an enumeration's members are slow to index with.
             stance=tuple(int(leg) for leg in node.stance),
             swings=tuple(int(leg) for leg in control.swings),
-            swing=control.swing or swing,
+            swing=control.swing,
             locate=LOCATE[control.clock],
             cap=np.full(len(node.stance), np.inf),
             awaited=PLACED[touchdown.reset] if touchdown is not None else None,

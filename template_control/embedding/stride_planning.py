@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Triple
-from template_control.embedding.planners.planner import LandingPlanner, Planner, Planners
+from template_control.embedding.planners.planner import (
+    LandingPlanner,
+    Planner,
+    Planners,
+    PricingPlanner,
+)
 from template_control.embedding.planning.breaking import find_break
 from template_control.embedding.planning.planned_path import PlannedPath
 from template_control.embedding.planning.replan_options import ReplanOptions
@@ -225,7 +230,8 @@ class StridePlanning(PlannedPath):
             free = free_controls(self.automaton, node)
             nominal, ahead = self.planner.gait.controls, self._rest.ahead(node, sensed)
             target = report.target[: len(report.goal.target)]
-            decision = choose_legs(ahead, report.decision, target, free, nominal, o)
+            price = self.planner.price if isinstance(self.planner, PricingPlanner) else None
+            decision = choose_legs(ahead, report.decision, target, free, nominal, o, price)
             self.reports[-1] = replace(report, decision=decision)
         return self.follow(node, sensed, now)
 

@@ -43,6 +43,7 @@ class Biped(ABC):
         velocity_limit: (nu,) URDF ``velocity`` [rad/s].
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
         leg_length: from hip to the foot sphere's centre with a straight knee [m].
+        leg_mass: of the heavier leg [kg].
         trunk_com: height of the trunk's own CoM above the hips [m].
 
     Attributes (written by :meth:`update`; views that the next call overwrites):
@@ -82,6 +83,7 @@ class Biped(ABC):
     velocity_limit: Array
     legs: tuple[tuple[int, ...], ...]
     leg_length: float
+    leg_mass: float
     trunk_com: float
     mass_matrix: Array
     nonlinear_effects: Array
@@ -123,6 +125,9 @@ class Biped(ABC):
         self._foot_ids = tuple(model.getFrameId(foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
+        self.leg_mass = max(
+            float(sum(model.inertias[j].mass for j in leg)) for leg in self._leg_joints
+        )
         self._data = data = model.createData()
         # Pinocchio keeps these arrays in place, so the views stay good.
         self.mass_matrix, self.nonlinear_effects = data.M, data.nle

@@ -11,6 +11,7 @@ from template_control.embedding.free.phases import FREE_PHASES
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PhaseControl
 from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.lateral.options import LateralOptions
 from template_control.slip.similarity import LENGTH, tuned
@@ -24,6 +25,7 @@ class FreeOptions(EmbeddingOptions):
 
     Attributes:
         phases: tasks, clock, feet and learners of each phase.
+        swing: shape of the swings. A foot has to move aside too, and is not asked to be high.
         catches: a free robot has no run to break into.
         lateral: how the feet are placed sideways.
         step_width: distance aside between left and right footholds [m]. Wider, and the
@@ -33,6 +35,7 @@ class FreeOptions(EmbeddingOptions):
     kind: ClassVar[str] = "free"
 
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(FREE_PHASES))
+    swing: SwingOptions | None = field(default_factory=SwingOptions)
     catches: bool = tuned(False)
     lateral: LateralOptions = field(default_factory=LateralOptions)
     step_width: Positive = tuned(0.22, LENGTH)

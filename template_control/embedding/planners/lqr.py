@@ -300,19 +300,14 @@ class LqrPlanner:
         gait, reachable = self._family.towards(self.gait, target)
         if gait is not self.gait:
             self._settle_on(gait)
-        law, s = self._law, self._scratch
+        law = self._law
         if angles != ANY_ANGLE:
             lower, upper = law.lower.copy(), law.upper.copy()
             lower[0] = min(max(lower[0], angles[0]), upper[0])
             upper[0] = max(min(upper[0], angles[1]), lower[0])
             law = law._replace(lower=lower, upper=upper)
+        u, first, cost, nominal = self._best(law, z)
         slots, units = control_units(self.gait)
-        u, first = np.empty(len(slots)), np.empty(3)
-        linear(law, z, u)
-        cost = price(law, True, s, z, u, np.inf, first)
-        nominal = cost < self.options.trusted_price and self._approaches(law, z, first)
-        if not nominal:
-            cost = search(law, self._grid, s, z, u, first)
         controls = self.gait.controls.copy()
         controls[slots] = u * units
         nominal = nominal and reachable
@@ -325,6 +320,20 @@ class LqrPlanner:
         before, then = z - law.target, after - law.target
         left = float(then @ law.cost @ then)
         return left <= max(float(before @ law.cost @ before), self.options.push_off.settled_price)
+
+    def price(self, z: Array) -> float:
+        """See :meth:`~.planner.PricingPlanner.price`: with the step after the next."""
+        return self._best(self._law, z)[2]
+
+    def _best(self, law: Law, z: Array) -> tuple[Array, Array, float, bool]:
+        """Controls, where they lead, their price, and whether they are the linear law's."""
+        s, u, first = self._scratch, np.empty(len(law.slots)), np.empty(3)
+        linear(law, z, u)
+        cost = price(law, True, s, z, u, np.inf, first)
+        trusted = cost < self.options.trusted_price and self._approaches(law, z, first)
+        if not trusted:
+            cost = search(law, self._grid, s, z, u, first)
+        return u, first, cost, trusted
 
     def land(
         self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]

@@ -122,6 +122,14 @@ class LandingPlanner(Planner, Protocol):
 
 
 @runtime_checkable
+class PricingPlanner(Planner, Protocol):
+    """A planner that tells what a state is worth to its next strides."""
+
+    def price(self, z: Array) -> float:
+        """The least cost that the planner knows from section state ``z`` (n,) on."""
+
+
+@runtime_checkable
 class CurvePlanner(Planner, Protocol):
     """A planner that leads the CoM along a curve in time where no spring carries it."""
 

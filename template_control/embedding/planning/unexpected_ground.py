@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import Index, Interval, NotNegative, Positive
+from template_control.checks.ranges import Count, Index, Interval, NotNegative, Positive
 from template_control.embedding.planners.planner import Ahead, Decision
 from template_control.embedding.planners.regularised import FromHere, Prior, solve_stride
-from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.similarity import LENGTH, SPEED, tuned
 
 Array = NDArray[np.float64]
@@ -23,7 +25,8 @@ class UnexpectedGroundOptions(Checked):
     """How the stiffnesses are chosen where the ground is not where it was thought.
 
     A template that steps up ends its stride slow and sinking. Legs that push longer give back
-    some of the energy that the climb took.
+    some of the energy that the climb took. One that steps down ends it fast, and a step can brake
+    only from some of the states that it may end in: a planner tells them by their price.
 
     Attributes:
         height: of the ground under the foot that has landed, over that under the other one, from
@@ -32,6 +35,8 @@ class UnexpectedGroundOptions(Checked):
         change: of a stiffness, over the gait's, that counts as 1.
         bounds: of the stiffnesses over the gait's.
         rounds: Gauss-Newton steps.
+        tries: points of the grid of stiffnesses whose ends the planner prices.
+        effort: what a change that counts as 1 adds to the planner's price.
     """
 
     height: NotNegative = tuned(0.008, LENGTH)
@@ -39,6 +44,27 @@ class UnexpectedGroundOptions(Checked):
     change: Positive = tuned(0.5)
     bounds: Interval = tuned((0.5, 2.0))
     rounds: Index = tuned(5)
+    tries: Count = tuned(36)
+    effort: NotNegative = tuned(0.1)
+
+
+class _Pricing(NamedTuple):
+    """What makes a choice dear: the state that it leads to, and how far it is from the gait's.
+
+    Attributes:
+        price: of a state.
+        gait: (f,) the gait's stiffnesses [N/m].
+        options: tuning.
+    """
+
+    price: Callable[[Array], float]
+    gait: Array
+    options: UnexpectedGroundOptions
+
+    def effort(self, x: Array) -> float:
+        """Of stiffnesses ``x`` (f,) [N/m]."""
+        change = (x / self.gait - 1.0) / self.options.change
+        return float(self.options.effort * (change @ change))
 
 
 def choose_legs(
@@ -48,8 +74,11 @@ def choose_legs(
     free: Sequence[int],
     nominal: Array,
     options: UnexpectedGroundOptions,
+    price: Callable[[Array], float] | None = None,
 ) -> Decision:
-    """The decision with the stiffnesses that lead the rest of a stride nearest to its target.
+    """The decision with the stiffnesses that lead the rest of a stride to the cheapest end.
+
+    Without a price that is the end nearest to the target.
 
     Args:
         ahead: where the stride ends from here, by its controls.
@@ -58,6 +87,7 @@ def choose_legs(
         free: slots of the stiffnesses that the rest of the stride depends on.
         nominal: (NUM_SLOTS,) the gait's controls.
         options: tuning.
+        price: of the state where a stride ends, to the planner of the next one.
     """
     o, controls = options, decision.controls
     stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE and nominal[slot] > 0.0]
@@ -66,6 +96,31 @@ def choose_legs(
     now = np.clip(controls[stiff], lower, upper)
     prior = Prior(controls.copy(), stiff, now, o.change * base, lower, upper, o.rounds)
     u, end = solve_stride(FromHere(ahead, stiff), target, prior, np.array(o.tolerance))
+    if price is not None:
+        u, end = _cheapest(u, end, prior, ahead, _Pricing(price, nominal[stiff], o))
     if end is None:
         return decision
     return replace(decision, controls=u, predicted=end, nominal=False)
+
+
+def _cheapest(
+    u: Array, end: Array | None, prior: Prior, ahead: Ahead, pricing: _Pricing
+) -> tuple[Array, Array | None]:
+    """The cheapest of a grid within the bounds, and of controls ``u`` that lead to ``end``."""
+    stiff = prior.slots
+    least = np.inf if end is None else pricing.price(end) + pricing.effort(u[stiff])
+    points = max(2, round(pricing.options.tries ** (1.0 / max(len(stiff), 1))))
+    axes = [np.linspace(*ends, points) for ends in zip(prior.lower, prior.upper, strict=True)]
+    for x in np.array(list(product(*axes))):
+        effort = pricing.effort(x)
+        if effort >= least:
+            continue
+        tried = prior.controls.copy()
+        tried[stiff] = x
+        there, outcome = ahead(tried)
+        if outcome is not Outcome.SECTION:
+            continue
+        cost = effort + pricing.price(there)
+        if cost < least:
+            least, u, end = cost, tried, there
+    return u, end

@@ -61,14 +61,6 @@ class SwingOptions(Checked):
     leg_share: Share = tuned(0.98)
 
 
-HIGH_SWING = SwingOptions(clearance=0.06, rise=0.3, descent=0.08, early=0.02)
-"""A swing for rough ground: the foot is high while it travels, and comes down nearly vertically.
-
-It asks more of the legs. With it ``five-link`` walks over steps that the default trips on; a slow
-walk of ``rabbit`` and Example I of ``runner`` fall.
-"""
-
-
 @compiled
 def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
     """Advance (position, velocity, acceleration) by ``dt`` along the quintic to its target.

@@ -95,7 +95,7 @@ class Free(Kind):
             com=np.array([0.0, 0.5 * width + away, z[1]]),
             com_velocity=np.array([z[0], drift, z[2]]),
             feet=np.array(
-                [[0.0, 0.5 * width, 0.0], [0.0, -0.5 * width, controller.options.swing.clearance]]
+                [[0.0, 0.5 * width, 0.0], [0.0, -0.5 * width, controller.swings.other.clearance]]
             ),
             feet_velocity=np.array([[0.0, 0.0, 0.0], [2.0 * z[0], 0.0, 0.0]]),
             rear=_REAR,

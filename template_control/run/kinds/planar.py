@@ -78,7 +78,7 @@ class Planar(Kind):
             controller.start(pose.rear, pose.swung)
             return q, v
         # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
-        swing = np.array([0.0, controller.options.swing.clearance])
+        swing = np.array([0.0, controller.swings.other.clearance])
         pitch = controller.first_pitch()
         q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
         controller.start()
@@ -89,7 +89,7 @@ class Planar(Kind):
     ) -> Pose:
         """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
         o, pitch = controller.options, controller.first_pitch()
-        swing = phase_control(o.phases, node).swing or o.swing
+        swing = phase_control(o.phases, node).swing or controller.swings.other
         automaton = controller.planning.automaton
         return apex_pose(self.robot, ApexStart(z, planner.gait, swing, pitch, automaton))
 
