@@ -53,7 +53,7 @@ def exactly(stride, aim, prior, monkeypatch):
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_near_stride_needs_no_derivatives(gait, step, monkeypatch, held, sign):
-    nearby, aim = NearbyStrides(TOLERANCE), gait.apex + [0.018, -0.001]
+    nearby, aim = NearbyStrides(TOLERANCE, 0.5), gait.apex + [0.018, -0.001]
     angle = float(gait.controls[0]) + 0.002
     taken = []
     for z in (gait.apex, gait.apex + 0.1 * NEAR, gait.apex + sign * NEAR):
@@ -69,9 +69,10 @@ def test_a_near_stride_needs_no_derivatives(gait, step, monkeypatch, held, sign)
     assert taken[1:] == [1, 0], "the second asks for its derivatives, and the third for none"
 
 
-def test_a_far_stride_is_solved_on_its_own(gait, step):
-    nearby = NearbyStrides(TOLERANCE)
-    for z in (gait.apex, gait.apex + FAR):
+@pytest.mark.parametrize(("near", "away"), [(0.5, FAR), (0.0, 0.1 * NEAR)])
+def test_other_strides_are_solved_on_their_own(gait, step, near, away):
+    nearby = NearbyStrides(TOLERANCE, near)
+    for z in (gait.apex, gait.apex + away):
         prior = prior_of(gait, z)
         stride = FromSection(step, z, prior.slots)
         u, end = nearby.solve(stride, gait.apex, prior)

@@ -48,6 +48,8 @@ class RunningOptions(Checked):
         offset_bound: largest offset believed.
         surprise_bound: a larger surprise counts as this much: a push is no offset.
         rounds: Gauss-Newton steps.
+        near: in a steady run, a state that is this many tolerances from that of a stride which is
+            solved already is solved to first order about it; 0: every stride is solved anew.
     """
 
     kind: ClassVar[str] = "deadbeat"
@@ -63,10 +65,12 @@ class RunningOptions(Checked):
     offset_bound: tuple[NotNegative, NotNegative] = tuned((0.3, 0.03), SPEED, LENGTH)
     surprise_bound: tuple[NotNegative, NotNegative] = tuned((0.06, 0.008), SPEED, LENGTH)
     rounds: Index = tuned(4)
+    near: NotNegative = tuned(0.5)
 
 
-AGILE = RunningOptions(change=(0.03, 0.3, 0.3), stiffness_range=(0.4, 2.5), pace=0.45)
-"""For great accelerations: the legs change their stiffness further."""
+AGILE = RunningOptions(change=(0.03, 0.3, 0.3), stiffness_range=(0.4, 2.5), pace=0.45, near=0.0)
+"""For great accelerations: the legs change their stiffness further. Motors are at their limits,
+where the smallest difference counts."""
 
 
 class RunningPlanner:
@@ -92,7 +96,7 @@ class RunningPlanner:
         self._grid = 0.5 * o.pace
         # As arrays at once: a plan has little time.
         self._reach = np.array([o.pace, o.climb])
-        self._strides = NearbyStrides(np.array(o.tolerance))
+        self._strides = NearbyStrides(np.array(o.tolerance), o.near)
         # Compile now what a stride would otherwise wait for.
         self.decide(gait.apex)
 

@@ -21,8 +21,7 @@ from template_control.slip.maps.section import PADDED
 Array = NDArray[np.float64]
 
 _STEADY = 1.5  # a run that is to change its state by this many tolerances is not steady
-_NEAR = 0.5  # a state that is this many tolerances away is another stride's
-_TURN = 0.3  # and so is one whose controls are this far, in units of change
+_TURN = 0.3  # controls this far from a solution's, in units of change, are another stride's
 _KEPT = 4  # solutions: of the stride that begins, as its foot lands, of the next, and one to come
 
 
@@ -69,10 +68,12 @@ class NearbyStrides:
     Args:
         tolerance: (m,) errors at the end that count as 1. The section that a stride begins at is
             that which it ends at.
+        near: a state that is this many tolerances away is another stride's; 0: every one is.
     """
 
-    def __init__(self, tolerance: Array) -> None:
+    def __init__(self, tolerance: Array, near: float) -> None:
         self.tolerance = tolerance
+        self.near = near
         self._known: deque[_Solution] = deque(maxlen=_KEPT)
 
     def forget(self) -> None:
@@ -100,7 +101,7 @@ class NearbyStrides:
         return u, end
 
     def _nearest(self, z: Array, turns: bool) -> _Solution | None:
-        least, best = _NEAR, None
+        least, best = self.near, None
         here = (z / self.tolerance).tolist()
         for known in self._known:
             if known.turns is turns:
