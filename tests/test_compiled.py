@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from template_control import compiled
+from template_control.code_cache.source_stamp import sources
 from template_control.slip.dynamics.guards import guard
-from template_control.source_stamp import sources
 
 _FACTOR = """\
 from template_control.compiled import inner
@@ -72,6 +72,15 @@ def call(package, run=_RUN, **environment):
     )
     value, hits, path = json.loads(done.stdout.splitlines()[-1])
     return value, hits, path and Path(path)
+
+
+def test_a_caller_is_compiled_with_what_the_cache_has_of_its_callee(toy):
+    value, _, folder = call(toy(2.0))
+    for kept in folder.glob("caller.scaled*"):
+        kept.unlink()
+    assert list(folder.glob("factor.factor*.nbc"))
+    assert call(toy(2.0))[:2] == (value, 0)
+    assert list(folder.glob("caller.scaled*.nbc"))
 
 
 def test_a_caller_is_compiled_anew_when_what_it_calls_changes(toy):

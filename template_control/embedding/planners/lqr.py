@@ -32,9 +32,7 @@ from template_control.embedding.planners.step_search import (
     FALL_PRICE,
     Grid,
     Law,
-    linear,
-    price,
-    search,
+    choose,
 )
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.parts import ready
@@ -278,11 +276,8 @@ class LqrPlanner:
             law = law._replace(lower=lower, upper=upper)
         slots, units = control_units(self.gait)
         u, first = np.empty(len(slots)), np.empty(3)
-        linear(law, z, u)
-        cost = price(law, True, s, z, u, np.inf, first)
-        nominal = cost < self.options.trusted_price
-        if not nominal:
-            cost = search(law, self._grid, s, z, u, first)
+        trusted = self.options.trusted_price
+        cost, nominal = choose(law, self._grid, trusted, s, z, u, first)
         controls = self.gait.controls.copy()
         controls[slots] = u * units
         nominal = nominal and reachable
