@@ -11,7 +11,7 @@ from rich.console import Console
 
 _LOG = logging.getLogger("template_control")
 _QUIET = 1.0  # [s] of compiling that nobody is told of
-_USUAL = 104  # functions that are compiled before a first walk, one for each type of its arguments
+_USUAL = 95  # functions that are compiled before a first walk, one for each type of its arguments
 _ROUNDING = 5.0  # [s] of the time that is foretold
 
 
