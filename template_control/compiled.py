@@ -13,7 +13,8 @@ import logging
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -23,11 +24,13 @@ from numba import njit
 from numba.core import config, event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache, _CacheLocator
 from numba.core.dispatcher import Dispatcher
+from numba.extending import overload
 from numba.misc.appdirs import AppDirs
 
+from template_control.code_cache.linked import LinkedCompiler, is_linked, rebuild
+from template_control.code_cache.source_stamp import stamp
 from template_control.compiling import TELLER
 from template_control.file_lock import FileLock, locked
-from template_control.source_stamp import stamp
 
 Decorator = Callable[[Callable[..., Any]], Any]
 
@@ -114,6 +117,11 @@ class _Locator(_CacheLocator):
 class _CacheImpl(CompileResultCacheImpl):
     _locator_classes = (_Locator,)
 
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        if is_linked(payload):
+            return rebuild(target_context, payload)
+        return super().rebuild(target_context, payload)
+
 
 class _Cache(FunctionCache):
     """Numba's cache of one function, in our folder; it fails silently, never an import.
@@ -173,26 +181,39 @@ def lock_folder(folder: Path) -> Path:
     return folder / "locks"
 
 
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """While this lasts, Python's collector rests.
+
+    It would look at the many objects of Numba again and again, which takes a fifth of all the
+    time. What they leave is collected afterwards.
+    """
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+
+
 class _Listener(event.Listener):
     """Takes part when Numba compiles a function; one read from the cache is no event."""
 
     def __init__(self) -> None:
+        self._resting = ExitStack()
         self._depth = 0
-        self._collects = False
 
     def on_start(self, event: Any) -> None:
         TELLER.begin()
         if self._depth == 0:
-            # The collector would look at Numba's many objects again and again: a fifth of all
-            # the time. What they leave is collected afterwards.
-            self._collects = gc.isenabled()
-            gc.disable()
+            self._resting.enter_context(uncollected())
         self._depth += 1
 
     def on_end(self, event: Any) -> None:
         self._depth -= 1
-        if self._depth == 0 and self._collects:
-            gc.enable()
+        if self._depth == 0:
+            self._resting.close()
         TELLER.end()
         cache = event.data["dispatcher"]._cache
         if sys.exc_info()[0] is not None and isinstance(cache, _Cache):
@@ -258,9 +279,31 @@ def inner(function: Callable[..., Any]) -> Any:
     They have no door to Python, which takes as long to compile as what is behind it. Called
     from Python all the same, as by a test, they run as Python.
     """
-    dispatcher = _cached(njit(**_LEAN, **_BARE)(function))
+    return _doorless(function, **_LEAN)
+
+
+def callee(function: Callable[..., Any]) -> Any:
+    """As :func:`inner`, for functions that :data:`compiled` ones call; they may allocate arrays."""
+    return _doorless(function, **_SMALL)
+
+
+def inner_by_type(function: Callable[..., Any]) -> Decorator:
+    """Decorates what chooses, by its arguments' types, the code of an :func:`inner` function.
+
+    Args:
+        function: what Python runs; compiled functions call it by this name.
+    """
+    options = {**_LEAN, "pipeline_class": LinkedCompiler}
+    # Not strict: the choices have type hints of their own.
+    return overload(function, jit_options=options, strict=False, prefer_literal=True)
+
+
+def _doorless(function: Callable[..., Any], **options: Any) -> Any:
+    if not _BARE:
+        return _cached(njit(**options)(function))
+    dispatcher = _cached(njit(**options, **_BARE, pipeline_class=LinkedCompiler)(function))
     kind = type(dispatcher)
-    if _BARE and issubclass(kind, Dispatcher):
+    if issubclass(kind, Dispatcher):
         dispatcher.__class__ = _without_door(kind)
     return dispatcher
 

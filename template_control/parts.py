@@ -8,6 +8,7 @@ that start at the same time by themselves, as those of a test run.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import subprocess
@@ -23,10 +24,10 @@ from pathlib import Path
 import numba
 from numba.core.registry import cpu_target
 
-from template_control.compiled import cache_folder, lock_folder, packages_of
+from template_control.code_cache.source_stamp import stamp
+from template_control.compiled import cache_folder, lock_folder, packages_of, uncollected
 from template_control.compiling import TELLER
 from template_control.file_lock import LOCKS, FileLock
-from template_control.source_stamp import stamp
 
 Part = Callable[[], object]
 
@@ -45,10 +46,13 @@ def ready(parts: Sequence[Part]) -> None:
         parts: functions of modules, which a helper can import.
     """
     wanted = [part for part in parts if part not in _READY]
-    _share_out([part for part in wanted if cache_folder(packages_of(part))])
-    for part in wanted:
-        part()
-        _READY.add(part)
+    if not wanted:
+        return
+    with uncollected():
+        _share_out([part for part in wanted if cache_folder(packages_of(part))])
+        for part in wanted:
+            part()
+            _READY.add(part)
 
 
 def _share_out(parts: Sequence[Part]) -> None:
@@ -171,6 +175,7 @@ def _end_with_the_parent() -> None:
 def _help(names: Sequence[str]) -> None:
     """Take the parts of these names that nobody has taken."""
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    gc.disable()  # this process ends before it is worth it
     for name in names:
         module, _, function = name.partition(":")
         _take(getattr(importlib.import_module(module), function))

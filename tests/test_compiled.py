@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from template_control import compiled
+from template_control.code_cache.source_stamp import sources
 from template_control.slip.dynamics.guards import guard
-from template_control.source_stamp import sources
 
 _FACTOR = """\
 from template_control.compiled import inner
@@ -74,6 +74,15 @@ def call(package, run=_RUN, **environment):
     return value, hits, path and Path(path)
 
 
+def test_a_caller_is_compiled_with_what_the_cache_has_of_its_callee(toy):
+    value, _, folder = call(toy(2.0))
+    for kept in folder.glob("caller.scaled*"):
+        kept.unlink()
+    assert list(folder.glob("factor.factor*.nbc"))
+    assert call(toy(2.0))[:2] == (value, 0)
+    assert list(folder.glob("caller.scaled*.nbc"))
+
+
 def test_a_caller_is_compiled_anew_when_what_it_calls_changes(toy):
     assert call(toy(2.0))[:2] == (2.0, 0)
     assert call(toy(2.0))[:2] == (2.0, 1)
@@ -84,7 +93,7 @@ def test_a_caller_is_compiled_anew_when_what_it_calls_changes(toy):
 
 
 def test_folders_of_old_contents_do_not_pile_up(toy):
-    for factor in range(6):
+    for factor in range(5):
         value, _, path = call(toy(float(factor)))
         assert value == factor
     assert path.is_dir()

@@ -37,13 +37,13 @@ SLIP_STAGES = (
 )
 SHARED = (
     "checks",
+    "code_cache",
     "compiled",
     "compiling",
     "errors",
     "file_lock",
     "parts",
     "settings",
-    "source_stamp",
     "storage",
     "terminal",
     "version",

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import compiled
+from template_control.compiled import callee, compiled
 from template_control.whole_body.elimination import cholesky, eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
@@ -31,7 +31,7 @@ _FAR = 1e20  # ProxQP's infinity
 _GRID = 2.0**24  # steps of a torque up to its limit
 
 
-@compiled
+@callee
 def rows_per_foot(directions: int) -> int:
     """Constraints of a stance foot: two for each tangential direction, one for the normal one.
 
@@ -178,7 +178,7 @@ def assemble(
     return True
 
 
-@compiled
+@callee
 def _forward(factor: Array, vector: Array) -> None:
     """vector = L^-1 vector, in place."""
     for i in range(vector.shape[0]):
@@ -213,7 +213,7 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
         out[i] = share * torque_limit[i]
 
 
-@compiled
+@callee
 def _add_square(
     row: Array, row_weight: float, scale: Array, hessian: Array, gradient: Array
 ) -> None:
@@ -240,7 +240,7 @@ def follow(a_map: Array, f_map: Array, tau: Array, acceleration: Array, force: A
     _affine(f_map, tau, force)
 
 
-@compiled
+@callee
 def _affine(matrix: Array, tau: Array, out: Array) -> None:
     """out = matrix[:, :-1] tau + matrix[:, -1]."""
     n = tau.shape[0]

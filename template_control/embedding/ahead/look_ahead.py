@@ -24,7 +24,7 @@ from template_control.embedding.planners.gauss_newton import bounded_step
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.maps.section_map import (
     RESULTS,
-    section_map,
+    one_stride,
 )
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def _step(p: Prospect, work: Workspace, aim: Aim, plan: Plan, i: int) -> bool:
     """Write the state after step ``i``; False where the template does not complete it."""
     u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
     slots_of(p, plan, i, u)
-    if section_map(p.kernel, None, plan.states[i], u, work.real, result) != 0:
+    if one_stride(p.kernel, None, plan.states[i], u, work.real, result) != 0:
         return False
     for j in range(STATES):
         plan.states[i + 1, j] = result[j] + aim.offset[j]

@@ -8,13 +8,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import compiled
+from template_control.compiled import callee, compiled
 from template_control.whole_body.elimination import cholesky, solve_cholesky
 
 Array = NDArray[np.float64]
 
+_NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
 
-@compiled
+
+@callee
 def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Array) -> Array:
     """x + dx with the least |rows dx + residual| between the bounds.
 
@@ -35,7 +37,7 @@ def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Ar
     normal, right = np.empty((size, size)), np.empty((size, 1))
     free = np.empty(size, np.int64)
     for _ in range(size):
-        count = 0
+        count = _NONE
         for i in range(size):
             if not held[i]:
                 free[count] = i

@@ -32,9 +32,8 @@ from template_control.embedding.planners.step_search import (
     FALL_PRICE,
     Grid,
     Law,
-    linear,
-    price,
-    search,
+    Trust,
+    choose,
 )
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.parts import ready
@@ -213,6 +212,9 @@ class LqrPlanner:
         grid, spread = self.options.search, self.options.spread
         points = (*grid.coarse, self.options.push_off.points)[: 4 if self._pushes else 3]
         self._grid = Grid(np.array(points), grid.fine, grid.rounds, *spread, grid.narrowing)
+        o = self.options
+        settled = o.push_off.settled_price if self._pushes else np.inf
+        self._trust = Trust(o.trusted_price, settled)
         self._settle_on(gait)
 
     def _settle_on(self, gait: WalkingGait) -> None:
@@ -313,14 +315,6 @@ class LqrPlanner:
         nominal = nominal and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
 
-    def _approaches(self, law: Law, z: Array, after: Array) -> bool:
-        """Whether a step of the linear law comes nearer to where it leads, or is there."""
-        if not self._pushes:
-            return True
-        before, then = z - law.target, after - law.target
-        left = float(then @ law.cost @ then)
-        return left <= max(float(before @ law.cost @ before), self.options.push_off.settled_price)
-
     def price(self, z: Array) -> float:
         """See :meth:`~.planner.PricingPlanner.price`: with the step after the next."""
         return self._best(self._law, z)[2]
@@ -328,12 +322,8 @@ class LqrPlanner:
     def _best(self, law: Law, z: Array) -> tuple[Array, Array, float, bool]:
         """Controls, where they lead, their price, and whether they are the linear law's."""
         s, u, first = self._scratch, np.empty(len(law.slots)), np.empty(3)
-        linear(law, z, u)
-        cost = price(law, True, s, z, u, np.inf, first)
-        trusted = cost < self.options.trusted_price and self._approaches(law, z, first)
-        if not trusted:
-            cost = search(law, self._grid, s, z, u, first)
-        return u, first, cost, trusted
+        cost, own = choose(law, self._grid, self._trust, s, z, u, first)
+        return u, first, cost, own
 
     def land(
         self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import compiled
+from template_control.compiled import callee, compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
-from template_control.slip.maps.section_map import RESULTS, section_map
+from template_control.slip.maps.section_map import RESULTS, one_stride
 
 Array = NDArray[np.float64]
 
@@ -86,14 +86,26 @@ class Law(NamedTuple):
     kernel: Kernel
 
 
-@compiled
+class Trust(NamedTuple):
+    """When a linear law's own step is taken without a search.
+
+    Attributes:
+        price: its price on the exact map is below this.
+        settled: cost-to-go up to which it may lead further away from the law's target.
+    """
+
+    price: float
+    settled: float
+
+
+@callee
 def _copy(source: Array, target: Array) -> None:
     """A slice would take Numba seconds to compile: it prepares what to say of wrong shapes."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
 
-@compiled
+@callee
 def bounded(law: Law, z: Array, u: Array) -> None:
     """Clip controls in place to what is admissible at a VLO state.
 
@@ -114,7 +126,7 @@ def bounded(law: Law, z: Array, u: Array) -> None:
         u[0] = min(u[0], np.arcsin(min(max(later / length, 0.0), 1.0)))
 
 
-@compiled
+@callee
 def linear(law: Law, z: Array, u: Array) -> None:
     """Write the law's controls, within their bounds, into ``u``.
 
@@ -130,7 +142,7 @@ def linear(law: Law, z: Array, u: Array) -> None:
     bounded(law, z, u)
 
 
-@compiled
+@callee
 def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
     """Take one walking step of the template, and add the robot's offset to where it ends.
 
@@ -150,24 +162,25 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, z_next: Array) -
         controls[law.slots[i]] = u[i] if i == 0 else u[i] * law.stiffness
     result = np.empty(RESULTS)
     if exact:
-        outcome = section_map(law.kernel, None, z, controls, s, result)
+        outcome = one_stride(law.kernel, None, z, controls, s, result)
     else:
-        outcome = section_map(law.kernel, _FAST, z, controls, s, result)
+        outcome = one_stride(law.kernel, _FAST, z, controls, s, result)
     for i in range(3):
         z_next[i] = result[i] + law.offset[i]
     return outcome
 
 
-@compiled
-def _cost_to_go(law: Law, z: Array) -> float:
+@callee
+def _cost_to_go(target: Array, cost: Array, z: Array) -> float:
+    """Of the whole :class:`Law` a callee would take longer to compile: it has 32 parts."""
     total = 0.0
     for i in range(3):
         for j in range(3):
-            total += (z[i] - law.target[i]) * law.cost[i, j] * (z[j] - law.target[j])
+            total += (z[i] - target[i]) * cost[i, j] * (z[j] - target[j])
     return total
 
 
-@compiled
+@callee
 def price(
     law: Law, exact: bool, s: Scratch, z: Array, u: Array, limit: float, first: Array
 ) -> float:
@@ -185,7 +198,7 @@ def price(
     second, u2 = np.empty(3), np.empty(u.shape[0])
     if step(law, exact, s, z, u, first) != 0:
         return 2.0 * FALL_PRICE
-    here = _cost_to_go(law, first)
+    here = _cost_to_go(law.target, law.cost, first)
     share = law.first_weight * here
     if share >= limit:
         return share
@@ -200,11 +213,11 @@ def price(
             _copy(law.second_steps[i], u2)
             bounded(law, first, u2)
         if step(law, exact, s, first, u2, second) == 0:
-            best = min(best, _cost_to_go(law, second) + share)
+            best = min(best, _cost_to_go(law.target, law.cost, second) + share)
     return best
 
 
-@compiled
+@callee
 def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
     """Point ``i`` of the grid over all bounds into ``u`` (c,); the last control varies first."""
     for j in range(u.shape[0] - 1, -1, -1):
@@ -214,7 +227,7 @@ def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
         i //= count
 
 
-@compiled
+@callee
 def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
     """Point ``i`` of a grid about ``centre`` (c,) into ``u`` (c,).
 
@@ -230,7 +243,7 @@ def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Arr
         u[1 + beside // 2 * 2] += (2 * (beside % 2) - 1) * widths[1]
 
 
-@compiled
+@callee
 def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array) -> float:
     """Improve ``best`` (c,) in place: a coarse grid over all bounds, then finer ones about it.
 
@@ -272,3 +285,33 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
         if level > 0:
             widths = grid.narrowing * widths[0], grid.narrowing * widths[1]
     return price(law, _ON_EXACT, s, z, best, np.inf, first)
+
+
+@compiled
+def choose(
+    law: Law, grid: Grid, trust: Trust, s: Scratch, z: Array, u: Array, first: Array
+) -> tuple[float, bool]:
+    """The law's controls, or better ones where they cost too much.
+
+    One function for both: compiled code of the maps is long, and each function that Python
+    calls has one of its own.
+
+    Args:
+        law: says u, and what judges it.
+        grid: what to try else.
+        trust: when the law's own step is taken.
+        s: overwritten.
+        z: (3,) VLO state.
+        u: (c,) overwritten with the controls: alpha [rad], stiffnesses/k0.
+        first: (3,) overwritten with the state after the step.
+
+    Returns:
+        The price of ``u``; whether it is the law's.
+    """
+    linear(law, z, u)
+    cost = price(law, _ON_EXACT, s, z, u, np.inf, first)
+    before = _cost_to_go(law.target, law.cost, z)
+    after = _cost_to_go(law.target, law.cost, first)
+    if cost < trust.price and after <= max(before, trust.settled):
+        return cost, True
+    return search(law, grid, s, z, u, first), False

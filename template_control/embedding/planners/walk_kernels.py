@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.embedding.planners.gauss_newton import improve
-from template_control.embedding.planners.step_search import Grid, Law, linear, price, search
+from template_control.embedding.planners.step_search import Grid, Law, Trust, choose
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.swing_foot import quintic_step
 from template_control.embedding.references.template_path import LOCATE
@@ -99,9 +99,8 @@ def step_search() -> None:
         kernel=stride_kernel(_TEMPLATE, "w"),
     )
     scratch, u, first = new_scratch(), np.ones(3), np.empty(3)
-    linear(law, _STATE, u)
-    price(law, True, scratch, _STATE, u, np.inf, first)
-    search(law, Grid(np.ones(3, np.int64), (2, 2), 1, 0.1, 0.1, 0.4), scratch, _STATE, u, first)
+    grid = Grid(np.ones(3, np.int64), (2, 2), 1, 0.1, 0.1, 0.4)
+    choose(law, grid, Trust(0.0, 0.0), scratch, _STATE, u, first)
 
 
 def references() -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
-from template_control.compiled import compiled
+from template_control.compiled import callee, compiled
 from template_control.embedding.phases import Clock
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.stride import Stride
@@ -29,6 +29,7 @@ from template_control.slip.similarity import TIME, tuned
 Array = NDArray[np.float64]
 
 _NEWTON = 12
+_X, _Y = np.int64(0), np.int64(1)  # Numba would compile once for each literal int
 
 
 @dataclass(frozen=True)
@@ -183,7 +184,7 @@ def _landings(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[Landi
     return found.get(Leg.REAR, never), found.get(Leg.FRONT, never)
 
 
-@compiled
+@callee
 def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     """Value, first and second derivative at ``t`` into out[first], out[first+2], ..."""
     p = d = dd = 0.0
@@ -194,7 +195,7 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     out[first], out[first + 2], out[first + 4] = p, d, 2.0 * dd
 
 
-@compiled
+@callee
 def sample(coefficients: Array, meta: Array, look: Array, time: float, out: Array) -> int:
     """Write the path at ``time`` into out (6,): x from the toe, y, and their two derivatives.
 
@@ -211,8 +212,8 @@ def sample(coefficients: Array, meta: Array, look: Array, time: float, out: Arra
         row += 1
     # Past either end the path goes on along its last polynomial for a moment, then stops.
     local = min(max(time - meta[row, 0], -look[1]), meta[row, 1] + look[1])
-    _polynomial(coefficients[0, row], local, out, 0)
-    _polynomial(coefficients[1, row], local, out, 1)
+    _polynomial(coefficients[0, row], local, out, _X)
+    _polynomial(coefficients[1, row], local, out, _Y)
     out[0] -= look[0]
     return row
 

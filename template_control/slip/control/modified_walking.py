@@ -15,7 +15,7 @@ from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, Model, model_of, stride_kernel
-from template_control.slip.maps.section_map import RESULTS, closed_form, section_map
+from template_control.slip.maps.section_map import RESULTS, closed_form, one_stride
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -111,7 +111,7 @@ def modified_step(
     Args:
         aim: the VLO state wanted, and the bounds.
         controls: (NUM_SLOTS,) touchdown angle and kappa_1; kappa_2 is overwritten.
-        The rest as in :func:`~template_control.slip.maps.section_map.section_map`.
+        The rest as in :func:`~template_control.slip.maps.section_map.one_stride`.
 
     Returns:
         The Outcome's value.
@@ -119,7 +119,7 @@ def modified_step(
     stiffness_range = aim.stiffness_range
     # The first pass finds the virtual bottom, which kappa_2 does not influence.
     controls[_K_SD] = controls[_K_SC]
-    outcome = section_map(kernel, kind, z, controls, scratch, result)
+    outcome = one_stride(kernel, kind, z, controls, scratch, result)
     rear, front = result[4], result[5]
     if not np.isfinite(rear.real):
         return outcome
@@ -129,7 +129,7 @@ def modified_step(
     elif wanted.real > stiffness_range[1]:
         wanted = stiffness_range[1] + 0.0 * wanted
     controls[_K_SD] = wanted
-    return section_map(kernel, kind, z, controls, scratch, result)
+    return one_stride(kernel, kind, z, controls, scratch, result)
 
 
 @compiled

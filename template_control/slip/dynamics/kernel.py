@@ -33,6 +33,7 @@ MAX_SEGMENTS = 96
 MAX_EVENTS = 16
 _SUBSTEPS = 4
 _EVENT_TIME = 1e-14  # [s]
+_EVERY = np.bool_(True)  # Numba would compile the stride once more for a literal True
 
 
 class Scratch(NamedTuple):
@@ -122,7 +123,7 @@ def note_bottom(event: int, state: Array, toes: Array, bottom: Array) -> None:
             bottom[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
 
 
-@entry
+@inner
 def run_stride(
     kernel: Kernel,
     state: Array,
@@ -197,3 +198,18 @@ def run_stride(
         node = target
         entered = True
     return _TIMEOUT, node, segments, event_count, time
+
+
+@entry
+def record_stride(
+    kernel: Kernel, state: Array, toes: Array, controls: Array, scratch: Scratch
+) -> tuple[int, int, int, int, float]:
+    """:func:`run_stride` for Python, with every segment and event.
+
+    Args:
+        The rest as in :func:`run_stride`, all real.
+
+    Returns:
+        As :func:`run_stride`.
+    """
+    return run_stride(kernel, state, toes, controls, _EVERY, scratch)

@@ -2,17 +2,18 @@
 
 Three kinds: ``SERIES`` (the exact kernel's Taylor polynomials), ``STANCE`` (the closed form
 (11) about a pivot) and ``FLIGHT`` (10). Compiled code gives the kind as one of these
-constants, an argument of its own: Numba then compiles each kind without the others' branches.
+constants, an argument of its own, and Numba compiles that kind alone.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
-from template_control.compiled import inner
+from template_control.compiled import inner_by_type
 
 Array = NDArray[np.float64]
 
@@ -35,7 +36,48 @@ class Path(NamedTuple):
     b: Array
 
 
-@inner
+def _series(kind: int, path: Path, t: float, out: Array) -> None:
+    a, b = path
+    x = y = u = v = ax = ay = 0.0 * a[0]
+    for n in range(a.shape[0] - 1, -1, -1):
+        ax = ax * t + u
+        ay = ay * t + v
+        u = u * t + x
+        v = v * t + y
+        x = x * t + a[n]
+        y = y * t + b[n]
+    out[0], out[1], out[2], out[3], out[4], out[5] = x, y, u, v, 2.0 * ax, 2.0 * ay
+
+
+def _stance(kind: int, path: Path, t: float, out: Array) -> None:
+    a = path.a
+    w, swing = a[5], a[7]
+    s, c = np.sin(w * t), np.cos(w * t)
+    ds, dc = a[2] * s + a[3] * c, a[2] * c - a[3] * s
+    r = a[1] + (a[8] + a[9] * t) * t + ds
+    dr = a[8] + 2.0 * a[9] * t + w * dc
+    ddr = 2.0 * a[9] - w * w * ds
+    theta = a[4] + (a[6] + (a[10] + a[11] * t) * t) * t + swing * dc
+    rate = a[6] + (2.0 * a[10] + 3.0 * a[11] * t) * t - swing * w * ds
+    curve = 2.0 * a[10] + 6.0 * a[11] * t - swing * w * w * dc
+    s, c = np.sin(theta), np.cos(theta)
+    radial, tangential = ddr - r * rate * rate, 2.0 * dr * rate + r * curve
+    out[0], out[1] = a[0] + r * c, r * s
+    out[2], out[3] = dr * c - r * rate * s, dr * s + r * rate * c
+    out[4] = radial * c - tangential * s
+    out[5] = radial * s + tangential * c
+
+
+def _flight(kind: int, path: Path, t: float, out: Array) -> None:
+    a = path.a
+    out[0], out[1] = a[0] + a[2] * t, a[1] + (a[3] - 0.5 * a[4] * t) * t
+    out[2], out[3] = a[2] + 0.0 * t, a[3] - a[4] * t
+    out[4], out[5] = 0.0 * t, -a[4] + 0.0 * t
+
+
+_BY_KIND = (_series, _stance, _flight)
+
+
 def sample(kind: int, path: Path, t: float, out: Array) -> None:
     """Write x, y and their first two derivatives at ``t`` [s] into ``out`` (6,).
 
@@ -45,34 +87,10 @@ def sample(kind: int, path: Path, t: float, out: Array) -> None:
         t: since the start of the path [s].
         out: overwritten.
     """
-    a, b = path
-    if kind == SERIES:
-        x = y = u = v = ax = ay = 0.0 * a[0]
-        for n in range(a.shape[0] - 1, -1, -1):
-            ax = ax * t + u
-            ay = ay * t + v
-            u = u * t + x
-            v = v * t + y
-            x = x * t + a[n]
-            y = y * t + b[n]
-        out[0], out[1], out[2], out[3], out[4], out[5] = x, y, u, v, 2.0 * ax, 2.0 * ay
-    elif kind == STANCE:
-        w, swing = a[5], a[7]
-        s, c = np.sin(w * t), np.cos(w * t)
-        ds, dc = a[2] * s + a[3] * c, a[2] * c - a[3] * s
-        r = a[1] + (a[8] + a[9] * t) * t + ds
-        dr = a[8] + 2.0 * a[9] * t + w * dc
-        ddr = 2.0 * a[9] - w * w * ds
-        theta = a[4] + (a[6] + (a[10] + a[11] * t) * t) * t + swing * dc
-        rate = a[6] + (2.0 * a[10] + 3.0 * a[11] * t) * t - swing * w * ds
-        curve = 2.0 * a[10] + 6.0 * a[11] * t - swing * w * w * dc
-        s, c = np.sin(theta), np.cos(theta)
-        radial, tangential = ddr - r * rate * rate, 2.0 * dr * rate + r * curve
-        out[0], out[1] = a[0] + r * c, r * s
-        out[2], out[3] = dr * c - r * rate * s, dr * s + r * rate * c
-        out[4] = radial * c - tangential * s
-        out[5] = radial * s + tangential * c
-    else:
-        out[0], out[1] = a[0] + a[2] * t, a[1] + (a[3] - 0.5 * a[4] * t) * t
-        out[2], out[3] = a[2] + 0.0 * t, a[3] - a[4] * t
-        out[4], out[5] = 0.0 * t, -a[4] + 0.0 * t
+    _BY_KIND[kind](kind, path, t, out)
+
+
+@inner_by_type(sample)
+def _kind(kind: Any, path: Any, t: Any, out: Any) -> Any:
+    """That of the literal ``kind``: Numba would compile the branches of all of them."""
+    return _BY_KIND[kind.literal_value] if isinstance(kind, types.IntegerLiteral) else None

@@ -15,7 +15,7 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset, Slot
-from template_control.slip.dynamics.kernel import new_scratch, run_stride
+from template_control.slip.dynamics.kernel import new_scratch, record_stride
 from template_control.slip.dynamics.model import Kernel, kernel_model
 from template_control.slip.parameters import SlipParameters
 
@@ -221,12 +221,11 @@ class StrideSimulator:
         w, names = self._scratch, self._names
         x = finite("state", state, 4)
         c = finite("toes", toes, 2)
-        outcome, node, segments, events, duration = run_stride(
+        outcome, node, segments, events, duration = record_stride(
             self._kernels[start],
             x,
             c,
             finite("controls", u, NUM_SLOTS),
-            True,
             w,
         )
         return Stride(

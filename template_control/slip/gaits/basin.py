@@ -20,7 +20,7 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.section import VLO
-from template_control.slip.maps.section_map import RESULTS, section_map
+from template_control.slip.maps.section_map import RESULTS, one_stride
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ def _steps(
     """
     early = middle = late = 0.0
     for step in range(limit):
-        if section_map(kernel, None, z, controls, scratch, result) != _SECTION:
+        if one_stride(kernel, None, z, controls, scratch, result) != _SECTION:
             return step, False
         for i in range(3):
             z[i] = result[i]

@@ -6,10 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.extending import overload
 from numpy.typing import NDArray
 
-from template_control.compiled import compiled, entry
+from template_control.compiled import compiled, entry, inner, inner_by_type
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.dynamics.closed_form import closed_form_stride
 from template_control.slip.dynamics.kernel import Scratch, run_stride
@@ -55,7 +54,7 @@ def _stride(
     return int(closed_form_stride(kernel, kind, state, toes, controls, scratch))
 
 
-@overload(_stride)
+@inner_by_type(_stride)
 def _branch(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratch: Any) -> Any:
     """The branch of :func:`_stride` that the type of ``kind`` takes: Numba would compile both."""
 
@@ -68,8 +67,8 @@ def _branch(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratc
     return exact if isinstance(kind, types.NoneType) else closed
 
 
-@entry
-def section_map(
+@inner
+def one_stride(
     kernel: Kernel,
     kind: int | None,
     z: Array,
@@ -99,6 +98,23 @@ def section_map(
     return outcome
 
 
+@entry
+def section_map(
+    kernel: Kernel,
+    kind: int | None,
+    z: Array,
+    controls: Array,
+    scratch: Scratch,
+    result: Array,
+) -> int:
+    """:func:`one_stride` for Python; compiled functions call that.
+
+    Args:
+        The rest as in :func:`one_stride`.
+    """
+    return one_stride(kernel, kind, z, controls, scratch, result)
+
+
 @compiled
 def map_many(
     kernel: Kernel,
@@ -109,17 +125,17 @@ def map_many(
     result: Array,
     outcome: IntArray,
 ) -> None:
-    """As :func:`section_map`, stride by stride.
+    """As :func:`one_stride`, stride by stride.
 
     Args:
-        kernel, kind, scratch: as for :func:`section_map`.
+        kernel, kind, scratch: as for :func:`one_stride`.
         z: (n, 3) states at the section.
         controls: (n, NUM_SLOTS) u of each stride.
         result: (n, RESULTS) overwritten.
         outcome: (n,) overwritten with the Outcomes' values.
     """
     for i in range(z.shape[0]):
-        outcome[i] = section_map(kernel, kind, z[i], controls[i], scratch, result[i])
+        outcome[i] = one_stride(kernel, kind, z[i], controls[i], scratch, result[i])
 
 
 @compiled
@@ -132,7 +148,7 @@ def section_jacobian(
     scratch: Scratch,
     found: Derivatives,
 ) -> int:
-    """:func:`section_map` with its derivatives, exact to rounding, by complex steps.
+    """:func:`one_stride` with its derivatives, exact to rounding, by complex steps.
 
     The imaginary part of each event's time is the derivative that the saltation matrix
     accounts for; nothing is differenced.
@@ -141,7 +157,7 @@ def section_jacobian(
         columns: (c,) what to differentiate by: 0 to 2 the state, 3 + slot the controls.
         scratch: complex, from ``new_scratch(complex)``.
         found: overwritten.
-        The rest as in :func:`section_map`.
+        The rest as in :func:`one_stride`.
     """
     result, jacobian = found
     zc, uc = np.empty(z.shape[0], np.complex128), np.empty(controls.shape[0], np.complex128)
@@ -159,7 +175,7 @@ def section_jacobian(
             zc[j] += 1j * h
         else:
             uc[j - 3] += 1j * h
-        outcome = section_map(kernel, kind, zc, uc, scratch, out)
+        outcome = one_stride(kernel, kind, zc, uc, scratch, out)
         if j < 3:
             zc[j] = z[j]
         else:
