@@ -310,9 +310,12 @@ class LqrPlanner:
         u, first = np.empty(len(slots)), np.empty(3)
         linear(law, z, u)
         cost = price(law, True, s, z, u, np.inf, first)
-        nominal = cost < self.options.trusted_price and self._approaches(law, z, first)
-        if not nominal:
-            cost = search(law, self._grid, s, z, u, first)
+        nominal = cost < self.options.trusted_price
+        if not (nominal and self._approaches(law, z, first)):
+            other, end = u.copy(), first.copy()
+            found = search(law, self._grid, s, z, other, end)
+            if not nominal or found < cost:
+                u, first, cost, nominal = other, end, found, False
         controls = self.gait.controls.copy()
         controls[slots] = u * units
         nominal = nominal and reachable
