@@ -11,6 +11,7 @@ from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.by_speed.family_cost import stance_figures
 from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
 from template_control.slip.gaits.mean_speed import gait_for_speed
@@ -31,7 +32,8 @@ _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it s
 _SHORTEST = 0.8  # of l0, at the bottom: shorter, and the knees come to their stops
 _HEIGHTS = np.linspace(0.9, 1.3, 161)  # over l0, that are tried
 _WALKED = (0.0957, 0.463)  # over sqrt(g l0): 0.30 and 1.45 m/s; bolt fell with 0.08 and 0.48
-_SWING_TORQUE = 0.55  # of a hip's limit: rabbit walked with 0.51, and fell with 0.63
+_SWING_TORQUE = 0.5  # of a hip's limit: rabbit walked with 0.49, and 0.06 m/s too slow with 0.55
+_STANCE_TORQUE = 0.73  # of a knee's limit: human walked with 0.72, and fell with 0.79
 _UNEVEN = 0.42  # of the speed at VLO: rabbit walked with 0.41, and fell with 0.46
 _EVERY = 3  # link of the family's chains is looked at
 _ROUNDING = 1e-6  # of a centimetre per second
@@ -93,7 +95,8 @@ def walking_speeds(robot: Biped, torque_scale: Positive = 1.0) -> tuple[float, f
     """Slowest and fastest mean speed that a robot walks at [m/s], to a centimetre per second.
 
     They are those at which a robot with light legs and strong motors walked, without the fast ones
-    whose swing takes most of a hip's torque, and without the slow ones in which the swing of heavy
+    whose swing takes most of a hip's torque or whose stance most of a knee's, and without the slow
+    ones in which the swing of heavy
     legs makes the CoM's speed uneven: the template's legs weigh nothing. The slowest is as far
     above these as that speed varies.
 
@@ -112,17 +115,21 @@ def walking_speeds(robot: Biped, torque_scale: Positive = 1.0) -> tuple[float, f
     for chain in family.chains:
         for speed in chain.vlo_speed[::_EVERY]:
             gait = chain.gait(p, unit * float(speed))
-            swings.append((gait.mean_speed, gait.vlo[0], *_swing(robot, gait)))
+            uneven, hip = _swing(robot, gait)
+            share = max(hip / _SWING_TORQUE, _stance(robot, gait) / _STANCE_TORQUE)
+            swings.append((gait.mean_speed, gait.vlo[0], uneven, share))
     mean, vlo, uneven, share = np.array(swings).T
     heavy = uneven > _UNEVEN * vlo
     low = float(np.max((mean + uneven)[heavy], initial=slowest))
-    hasty = np.flatnonzero(share > _SWING_TORQUE * torque_scale)
+    hasty = np.flatnonzero(share > torque_scale)
     if len(hasty) and hasty[0] > 0:
         pair = slice(hasty[0] - 1, hasty[0] + 1)
-        last = float(np.interp(_SWING_TORQUE * torque_scale, share[pair], mean[pair]))
+        last = float(np.interp(torque_scale, share[pair], mean[pair]))
         fastest = min(fastest, last)
     if low >= fastest or (len(hasty) and hasty[0] == 0):
-        raise GaitError(f"{robot.name} walks at no speed: its legs are too heavy for its hips")
+        raise GaitError(
+            f"{robot.name} walks at no speed: its legs are too heavy or its motors too weak"
+        )
     low, high = 100.0 * low - _ROUNDING, 100.0 * fastest + _ROUNDING
     return float(np.ceil(low)) / 100.0, float(np.floor(high)) / 100.0
 
@@ -172,6 +179,13 @@ def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
     momentum = abs(float(robot.angular_momentum_jacobian[hip])) * _QUINTIC_SPEED * angle / time
     torque = float(robot.mass_matrix[hip, hip]) * _QUINTIC_ACCELERATION * angle / time**2
     return float(momentum / (p.mass * gait.vlo[1])), float(torque / robot.torque_limit[joint])
+
+
+def _stance(robot: Biped, gait: WalkingGait) -> float:
+    """The largest knee torque over its limit, of a leg without mass that pushes as the spring."""
+    p = gait.parameters
+    torque = stance_figures(gait)[0] * p.mass * p.gravity * p.rest_length
+    return torque / min(float(robot.torque_limit[leg[-1]]) for leg in robot.legs)
 
 
 def knee_torque(robot: Biped, gait: RunningGait) -> float:

@@ -310,8 +310,16 @@ def choose(
     """
     linear(law, z, u)
     cost = price(law, _ON_EXACT, s, z, u, np.inf, first)
-    before = _cost_to_go(law.target, law.cost, z)
-    after = _cost_to_go(law.target, law.cost, first)
-    if cost < trust.price and after <= max(before, trust.settled):
+    trusted = cost < trust.price
+    if trusted:
+        left = _cost_to_go(law.target, law.cost, first)
+        if left <= max(_cost_to_go(law.target, law.cost, z), trust.settled):
+            return cost, True
+    other, end = np.empty(u.shape[0]), np.empty(3)
+    _copy(u, other)
+    found = search(law, grid, s, z, other, end)
+    if trusted and cost <= found:
         return cost, True
-    return search(law, grid, s, z, u, first), False
+    _copy(other, u)
+    _copy(end, first)
+    return found, False

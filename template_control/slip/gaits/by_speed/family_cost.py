@@ -97,7 +97,7 @@ def gait_figures(gait: WalkingGait, weights: FamilyCost) -> Figures:
         raise GaitError(f"no control holds {gait!r}: give another gait")
     passive = float(np.abs(np.linalg.eigvals(a)).max())
     authority = float(np.linalg.svd(b)[1][2])
-    torque, double_stance = _motion(gait, weights.leg)
+    torque, double_stance = stance_figures(gait, weights.leg)
     suited = float(np.interp(gait.mean_speed, weights.speeds, weights.lengths))
     cost = (
         weights.control * float(np.trace(ahead @ _ERRORS))
@@ -129,11 +129,15 @@ def _controlled(a: Array, b: Array) -> tuple[Array, float]:
     return ahead, float(np.abs(np.linalg.eigvals(a - b @ gain)).max())
 
 
-def _motion(gait: WalkingGait, leg: float) -> tuple[float, float]:
+def stance_figures(gait: WalkingGait, leg: float = FamilyCost.leg) -> tuple[float, float]:
     """Largest knee torque over m g l0, and the share of double stance.
 
     A leg of two equal halves that pushes with F has the torque F times the knee's distance from
     the line of the push.
+
+    Args:
+        gait: with push-off.
+        leg: length of the robot's leg, from the CoM on, over l0.
     """
     p = gait.parameters
     stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
