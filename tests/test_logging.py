@@ -49,15 +49,25 @@ def test_failures_of_the_qp_in_a_row_are_told_once(weak_walk):
     assert all(m.levelno == logging.WARNING for m in told)
 
 
-def test_every_section_is_told(robot, default_gait, caplog):
-    options = tc.SimulationOptions(steps=4, pushes=(tc.Push(-60.0, step=1),))
+def told_of(impulse, robot, gait, caplog):
+    """What is told of a walk that is pushed, and its record."""
+    options = tc.SimulationOptions(steps=4, pushes=(tc.Push(impulse, step=1),))
     with caplog.at_level(logging.DEBUG, "template_control"):
-        record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
-    told = [m.getMessage() for m in caplog.records if m.levelno == logging.DEBUG]
-    assert sum("wanted" in text for text in told) == record.steps
+        record = tc.simulate(robot, tc.LqrPlanner(gait), options)
+    return record, caplog.records
+
+
+def test_every_section_is_told(robot, default_gait, caplog):
+    record, told = told_of(-40.0, robot, default_gait, caplog)
+    texts = [m.getMessage() for m in told if m.levelno == logging.DEBUG]
+    assert sum("wanted" in text for text in texts) == record.steps == 4
     # What a section decided; a plan between two sections may replace it in the record.
-    (refused,) = [m for m in caplog.records if "no stride of the template" in m.getMessage()]
-    assert refused.levelno == logging.WARNING
-    left = [m for m in caplog.records if "left its own law" in m.getMessage()]
+    left = [m for m in told if "left its own law" in m.getMessage()]
     assert len(left) >= 1
     assert all(m.levelno == logging.INFO for m in left)
+
+
+def test_a_stride_that_the_template_cannot_make_is_told(robot, default_gait, caplog):
+    _, told = told_of(-60.0, robot, default_gait, caplog)
+    (refused,) = [m for m in told if "no stride of the template" in m.getMessage()]
+    assert refused.levelno == logging.WARNING
