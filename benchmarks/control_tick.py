@@ -20,8 +20,8 @@ from rich.table import Table
 
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.options import FreeOptions
-from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
+from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.robot_template import template_for
 from template_control.plant.bullet import BulletPlant, PlantOptions

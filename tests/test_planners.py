@@ -12,8 +12,9 @@ from template_control.embedding.learners.momentum_trim import (
     TrimOptions,
     uncontrolled,
 )
-from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
-from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.walking.lqr_options import LqrOptions
+from template_control.embedding.planners.walking.modified import ModifiedPlanner
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Decision, LandingPlanner, Planner
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.planners.transition import (
@@ -16,6 +15,7 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
+from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed

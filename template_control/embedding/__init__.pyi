@@ -17,11 +17,6 @@ from .phases import PHASES as PHASES
 from .phases import Clock as Clock
 from .phases import PhaseControl as PhaseControl
 from .planners.default import default_planners as default_planners
-from .planners.lqr import LqrOptions as LqrOptions
-from .planners.lqr import LqrPlanner as LqrPlanner
-from .planners.lqr import PushOffOptions as PushOffOptions
-from .planners.modified import ModifiedOptions as ModifiedOptions
-from .planners.modified import ModifiedPlanner as ModifiedPlanner
 from .planners.planner import BreakingPlanner as BreakingPlanner
 from .planners.planner import CurvePlanner as CurvePlanner
 from .planners.planner import Decision as Decision
@@ -33,6 +28,11 @@ from .planners.running import RunningOptions as RunningOptions
 from .planners.running import RunningPlanner as RunningPlanner
 from .planners.transition import TransitionOptions as TransitionOptions
 from .planners.transition import TransitionPlanner as TransitionPlanner
+from .planners.walking.lqr import LqrPlanner as LqrPlanner
+from .planners.walking.lqr_options import LqrOptions as LqrOptions
+from .planners.walking.lqr_options import PushOffOptions as PushOffOptions
+from .planners.walking.modified import ModifiedOptions as ModifiedOptions
+from .planners.walking.modified import ModifiedPlanner as ModifiedPlanner
 from .planning.replan_options import ReplanOptions as ReplanOptions
 from .references.apex_pose import ApexStart as ApexStart
 from .references.apex_pose import apex_pose as apex_pose

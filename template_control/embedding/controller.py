@@ -27,7 +27,7 @@ from template_control.embedding.learners.momentum_trim import MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import Clock
 from template_control.embedding.planners.planner import Planner, Planners
-from template_control.embedding.planners.walk_kernels import CONTROL
+from template_control.embedding.planners.walking.walk_kernels import CONTROL
 from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.rolling import rolled

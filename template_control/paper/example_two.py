@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from template_control.embedding.guards import GuardOptions
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner
+from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.walking.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.robot_template import paper_gait, template_for
 from template_control.paper.example_two_figures import (
     Liftoff,

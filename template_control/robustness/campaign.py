@@ -12,8 +12,8 @@ from typing import Any, Literal, NamedTuple
 from template_control import settings
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index
-from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.running import RunningOptions
+from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.errors import SweepError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from template_control.cli.options.ranges import check_ranges
 from template_control.embedding.ahead.options import AheadOptions
-from template_control.embedding.planners.lqr import LqrOptions
-from template_control.embedding.planners.modified import ModifiedOptions
+from template_control.embedding.planners.walking.lqr_options import LqrOptions
+from template_control.embedding.planners.walking.modified import ModifiedOptions
 from template_control.errors import ParameterError
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.planner import OwnPlanner, PlannerChoice

@@ -23,7 +23,7 @@ from template_control.embedding.ahead.gait_row import (
     gait_row,
 )
 from template_control.embedding.ahead.options import AheadOptions
-from template_control.embedding.planners.lqr import settling_map
+from template_control.embedding.planners.walking.lqr import settling_map
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.by_speed.speed_family import Chain, walking_by_speed

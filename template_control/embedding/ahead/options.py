@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Count, Positive, Range, Share
-from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.slip.similarity import LENGTH, SPEED, tuned
 
 MOST_STEPS = 6

@@ -29,9 +29,9 @@ from template_control.embedding.ahead.gait_table import (
 from template_control.embedding.ahead.look_ahead import look_ahead
 from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.ahead.prospect import Aim, Plan, Prospect, Workspace
-from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.embedding.planners.walk_kernels import WALK
+from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.walking.walk_kernels import WALK
 from template_control.parts import ready
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.dynamics.kernel import new_scratch

@@ -10,7 +10,7 @@ from template_control.checks.ranges import Positive
 from template_control.embedding.free.phases import FREE_PHASES
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PhaseControl
-from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.lateral.options import LateralOptions

@@ -8,7 +8,6 @@ import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.embedding.ahead.planner import AheadPlanner
-from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
 from template_control.embedding.planners.transition import (
@@ -16,6 +15,7 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
+from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.standing.default import gaits_by_speed, standing_planners
 from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.gaits.gait import Gait

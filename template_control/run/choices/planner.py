@@ -11,10 +11,10 @@ from typing import ClassVar
 
 from template_control.checks.checked import Checked
 from template_control.embedding.ahead.options import AheadOptions
-from template_control.embedding.planners.lqr import LqrOptions
-from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.running import RunningOptions
+from template_control.embedding.planners.walking.lqr_options import LqrOptions
+from template_control.embedding.planners.walking.modified import ModifiedOptions
 from template_control.errors import ParameterError
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
