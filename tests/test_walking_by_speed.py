@@ -156,14 +156,18 @@ def test_the_library_s_family_is_what_the_search_makes():
 
 
 @pytest.mark.slow(seconds=15)
-@pytest.mark.parametrize(("name", "speed"), [("human", 0.4), ("rabbit", 0.62)])
-def test_robots_walk_where_they_could_not(name, speed):
+@pytest.mark.parametrize(
+    # Near the gap of the family what human adds to a step costs 9 mm of height.
+    ("name", "speed", "height"),
+    [("human", 0.4, 0.01), ("rabbit", 0.62, 0.003)],
+)
+def test_robots_walk_where_they_could_not(name, speed, height):
     robot = tc.load_robot(name)
     gait = tc.gait_for_speed(tc.template_for(robot), speed)
     record = tc.simulate(robot, LqrPlanner(gait), tc.SimulationOptions(steps=30, record_every=5))
     assert (record.steps, record.fell) == (30, False)
     last = record.section_state[-10:].mean(axis=0) - gait.vlo
-    assert np.all(np.abs(last) < [0.02, 0.003, 0.04])
+    assert np.all(np.abs(last) < [0.02, height, 0.04])
 
 
 def test_a_robot_s_range_is_its_own_and_the_rest_is_refused(capsys, tmp_path):

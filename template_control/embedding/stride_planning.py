@@ -230,7 +230,11 @@ class StridePlanning(PlannedPath):
             free = free_controls(self.automaton, node)
             nominal, ahead = self.planner.gait.controls, self._rest.ahead(node, sensed)
             target = report.target[: len(report.goal.target)]
-            price = self.planner.price if isinstance(self.planner, PricingPlanner) else None
+            # After a step up the end nearest to the gait is the best: three steps later the walk is
+            # back. The cheapest one goes on with a stride of half the speed.
+            planner = self.planner
+            lower = height < 0.0
+            price = planner.price if lower and isinstance(planner, PricingPlanner) else None
             decision = choose_legs(ahead, report.decision, target, free, nominal, o, price)
             self.reports[-1] = replace(report, decision=decision)
         return self.follow(node, sensed, now)

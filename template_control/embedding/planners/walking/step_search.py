@@ -311,14 +311,14 @@ def choose(
     linear(law, z, u)
     cost = price(law, _ON_EXACT, s, z, u, np.inf, first)
     trusted = cost < trust.price
-    if trusted:
-        left = _cost_to_go(law.target, law.cost, first)
-        if left <= max(_cost_to_go(law.target, law.cost, z), trust.settled):
-            return cost, True
+    left = _cost_to_go(law.target, law.cost, first)
+    if trusted and left <= max(_cost_to_go(law.target, law.cost, z), trust.settled):
+        return cost, True
     other, end = np.empty(u.shape[0]), np.empty(3)
     _copy(u, other)
     found = search(law, grid, s, z, other, end)
-    if trusted and cost <= found:
+    if trusted and (cost <= found or left <= _cost_to_go(law.target, law.cost, end)):
+        # What is found must come nearer, and not only be cheaper in the end.
         return cost, True
     _copy(other, u)
     _copy(end, first)

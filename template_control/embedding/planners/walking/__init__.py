@@ -1,0 +1,1 @@
+"""Planners of walking steps, from VLO to VLO."""
