@@ -66,9 +66,7 @@ class Sensing:
         self.now.feet = self._feet.of
         self.ground = self._height(self._feet.landed) if stands else 0.0
 
-    def read(
-        self, contact: NDArray[np.bool_], stands: bool, momentum: bool, rolls: bool = False
-    ) -> None:
+    def read(self, contact: NDArray[np.bool_], stands: bool, momentum: bool, rolls: bool) -> None:
         """Read the state of this tick.
 
         Args:
@@ -104,7 +102,7 @@ class Sensing:
         """Reckon with the speed that the next tick has in ``dt`` if nothing hits the robot."""
         self.unhit[:] = self.now.state[2:] + self.now.acceleration * dt
 
-    def take_roles(self, rolls: bool = False) -> None:
+    def take_roles(self, rolls: bool) -> None:
         """The feet have changed their roles, or one of them has lifted off.
 
         Args:

@@ -6,11 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.embedding.ahead.gait_row import (
-    CONTROL,
-    CONTROLS,
-    GAIN,
-)
+from template_control.embedding.ahead.gait_row import CONTROL, CONTROLS, GAIN
 from template_control.embedding.ahead.plan_cost import (
     PER_STEP,
     STATES,
@@ -22,10 +18,7 @@ from template_control.embedding.ahead.plan_cost import (
 from template_control.embedding.ahead.prospect import Aim, Plan, Prospect, Workspace
 from template_control.embedding.planners.gauss_newton import bounded_step
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.maps.section_map import (
-    RESULTS,
-    one_stride,
-)
+from template_control.slip.maps.section_map import RESULTS, one_stride
 
 Array = NDArray[np.float64]
 

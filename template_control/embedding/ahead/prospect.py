@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.ahead.gait_row import (
-    GaitTable,
-)
+from template_control.embedding.ahead.gait_row import GaitTable
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
 

@@ -8,14 +8,19 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
 from template_control.run.kinds.free_record import FreeRecord
 from template_control.storage import replacing
+from template_control.view.replay.film_picture import (
+    LEGS,
+    WIDTH,
+    empty_picture,
+    force_artist,
+    keep_layout,
+    named,
+)
 from template_control.view.replay.playback import (
     Playback,
     carrying,
@@ -26,12 +31,10 @@ from template_control.view.replay.playback import (
     template_legs,
 )
 from template_control.view.replay.space_film import SpaceStage
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text
+from template_control.view.style import COM, TEMPLATE, TRUNK
 
 Array = NDArray[np.float64]
 
-_LEGS = (LEFT, RIGHT)
-_WIDTH = 2.6  # of the picture, in rest lengths
 _MOST_GIF_FRAMES = 1000  # a GIF is held in memory until its last frame
 
 
@@ -46,10 +49,8 @@ class _Stage:
         self.toes, self.loaded = template_legs(record)
         self.arrows, self.on = force_arrows(record), carrying(record)
         self.spring = spring(0.03 * length)
-        self.figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-        FigureCanvasAgg(self.figure)
-        axes: Axes = self.figure.subplots()
-        self.axes, self.half = axes, 0.5 * _WIDTH * length
+        self.figure, axes = empty_picture()
+        self.axes, self.half = axes, 0.5 * WIDTH * length
         axes.set_aspect("equal")
         self.ground = record.ground
         ends = record.com[rows, 0].min() - self.half, record.com[rows, 0].max() + self.half
@@ -62,30 +63,20 @@ class _Stage:
         stood = footholds(record)
         self.foothold_time = [np.array([f.time for f in stood if f.foot == i]) for i in (0, 1)]
         self.foothold_x = [np.array([f.x for f in stood if f.foot == i]) for i in (0, 1)]
-        self.marks = [axes.plot([], [], "^", color=c, markersize=5)[0] for c in _LEGS]
+        self.marks = [axes.plot([], [], "^", color=c, markersize=5)[0] for c in LEGS]
         self.trunk = axes.plot([], [], color=TRUNK, linewidth=7, solid_capstyle="round")[0]
         self.legs = [
             axes.plot([], [], color=c, linewidth=4, solid_capstyle="round", alpha=0.85)[0]
-            for c in _LEGS
+            for c in LEGS
         ]
         self.trail = axes.plot([], [], color=COM, linewidth=1.2)[0]
         self.com = axes.plot([], [], "o", color=COM, markersize=7, label="CoM")[0]
         self.springs = [axes.plot([], [], color=TEMPLATE, linewidth=1.1)[0] for _ in (0, 1)]
         self.template = axes.plot([], [], "o", color=TEMPLATE, markersize=3, label="template")[0]
-        self.forces = axes.quiver(
-            [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], color=_LEGS, angles="xy",
-            scale_units="xy", scale=1.0, width=0.007, zorder=5,
-        )  # fmt: skip
-        for color, name in ((LEFT, "left"), (RIGHT, "right")):
-            axes.plot([], [], color=color, linewidth=4, label=f"{name} leg, its ground force")
-        axes.legend(loc="upper left", fontsize=7, frameon=False)
-        self.title = axes.set_title(" ", fontsize=9, loc="right")
-        axes.set_title(as_text(record.metadata["robot"]), fontsize=9, loc="left")
-
-        # Once: a layout that follows the tick labels would make the picture tremble.
+        self.forces = force_artist(axes, 5)
+        self.title = named(axes, record.metadata["robot"])
         self.show(0)
-        self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")
+        keep_layout(self.figure)
 
     def show(self, frame: int) -> None:
         record, rows = self.playback.record, self.playback.rows

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from template_control.run.record import Record
+from template_control.view.replay.film_picture import (
+    LEGS,
+    WIDTH,
+    empty_picture,
+    force_artist,
+    keep_layout,
+    named,
+)
 from template_control.view.replay.playback import Playback, coil, spring, template_legs
 from template_control.view.replay.replay_space import in_space
 from template_control.view.replay.robot_visuals import model_of
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text
+from template_control.view.style import COM, TEMPLATE, TRUNK
 
 Array = NDArray[np.float64]
 
-_LEGS = (LEFT, RIGHT)
-_WIDTH = 2.6  # of the picture, in rest lengths
 _BELOW = 0.22  # share of the picture's height under the ground beneath the CoM
 _AROUND = 3.0  # rest lengths of ground that are drawn beside the path
 _ASIDE, _ABOVE = np.radians(-25.0), np.radians(18.0)  # the camera's, from a view from the right
@@ -63,19 +66,17 @@ class SpaceStage:
         length = m["template"]["rest_length"]
         _, self._loaded = template_legs(record)
         self._spring = spring(0.03 * length)
-        self.figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-        FigureCanvasAgg(self.figure)
-        axes: Axes = self.figure.subplots()
-        self._axes, self._half = axes, 0.5 * _WIDTH * length
+        self.figure, axes = empty_picture()
+        self._axes, self._half = axes, 0.5 * WIDTH * length
         axes.set(xticks=[], yticks=[])
         axes.set_aspect("equal", adjustable="box")
         axes.add_collection(LineCollection(self._ground(length), colors="0.82", linewidths=0.8))
         self._trail = axes.plot([], [], color=COM, linewidth=1.2)[0]
-        self._marks = [axes.plot([], [], "^", color=c, markersize=5)[0] for c in _LEGS]
+        self._marks = [axes.plot([], [], "^", color=c, markersize=5)[0] for c in LEGS]
         # The left leg is behind the trunk, the right one before it.
         self.legs = [
             axes.plot([], [], color=c, linewidth=4, solid_capstyle="round", zorder=order)[0]
-            for c, order in zip(_LEGS, (2, 4), strict=True)
+            for c, order in zip(LEGS, (2, 4), strict=True)
         ]
         self._trunk = Polygon(np.zeros((4, 2)), color=TRUNK, linewidth=3, alpha=0.55, zorder=3)
         axes.add_patch(self._trunk)
@@ -85,18 +86,10 @@ class SpaceStage:
         self._template = axes.plot(
             [], [], "o", color=TEMPLATE, markersize=3, label="template", zorder=7
         )[0]
-        self._forces = axes.quiver(
-            [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], color=_LEGS, angles="xy",
-            scale_units="xy", scale=1.0, width=0.007, zorder=8,
-        )  # fmt: skip
-        for color, name in ((LEFT, "left"), (RIGHT, "right")):
-            axes.plot([], [], color=color, linewidth=4, label=f"{name} leg, its ground force")
-        axes.legend(loc="upper left", fontsize=7, frameon=False)
-        self._title = axes.set_title(" ", fontsize=9, loc="right")
-        axes.set_title(as_text(m["robot"]), fontsize=9, loc="left")
+        self._forces = force_artist(axes, 8)
+        self._title = named(axes, m["robot"])
         self.show(0)
-        self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")
+        keep_layout(self.figure)
 
     def _ground(self, length: float) -> list[Array]:
         """A net of lines on the ground around the path, one every rest length."""
