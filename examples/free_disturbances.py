@@ -4,9 +4,9 @@
 
 Levels are those of the reference template (80 kg, 1 m), scaled to the robot: 10 N s in eight
 directions at some phases of a step, friction 0.5, masses 10 % off, 1 mrad of noise, 2 ms of delay,
-and steps of the ground of 1 % of l0 at random places. The controller is told of none of them. A
-trial ends 16 steps after its push or step of the ground. It is back on its gait if its last five
-steps are within 2 % of it in speed and height.
+both of them, and steps of the ground of 1 % of l0 at random places. The controller is told of none
+of them. A trial ends 16 steps after its push or step of the ground. It is back on its gait if its
+last five steps are within 2 % of it in speed and height.
 """
 
 import argparse
@@ -48,6 +48,8 @@ def trials(
     grain = tc.PlantOptions().time_step
     delay = grain * max(1, round(DELAY * scale.time / grain))
     yield f"delay {1e3 * delay:.3g} ms", tc.SimulationOptions(steps=steps, delay=delay)
+    both = tc.SimulationOptions(steps=steps, sensors=sensors, delay=delay)
+    yield f"noise {1e3 * NOISE:g} mrad and delay {1e3 * delay:.3g} ms", both
     lot = np.random.default_rng(7)
     for sign in (1.0, -1.0):
         for x in lot.uniform(BEFORE, BEFORE + 1.0, places) * gait.step_length:

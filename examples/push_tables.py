@@ -1,10 +1,11 @@
 """What pushes, unseen steps of the ground and another mass do to a robot: counts, a line a row.
 
-    python examples/push_tables.py [--row "run, five-link" ...] [--results push_tables.jsonl]
-        [--processes 1]
+    python examples/push_tables.py [--row "run, five-link" ...] [--trial 7 ...]
+        [--results push_tables.jsonl] [--processes 1]
 
 Every trial is a run of its own from its start, the same at every call. The results are kept as
-they come; the same line goes on from there.
+they come; the same line goes on from there. ``--trial`` repeats single trials of the rows, by the
+number that is printed where they fall.
 """
 
 import argparse
@@ -66,9 +67,9 @@ class Row:
     trials: tuple[dict[str, float], ...]
 
 
-def pushes(*impulses: float) -> tuple[dict[str, float], ...]:
-    """Each impulse at ten phases of the stride [N s]."""
-    return tuple({"impulse": j, "phase": i / 10} for j in impulses for i in range(10))
+def pushes(*impulses: float, phases: int = 10) -> tuple[dict[str, float], ...]:
+    """Each impulse at phases all over the stride [N s]."""
+    return tuple({"impulse": j, "phase": i / phases} for j in impulses for i in range(phases))
 
 
 EDGES = tuple({"height": h, "place": p} for h in (0.03, -0.03) for p in (0.1, 0.3, 0.5, 0.7, 0.9))
@@ -85,6 +86,8 @@ ROWS = {
     "catch, runner, 80": Row("walk", "runner", pushes(80.0)),
     "catch, five-link, 60": Row("walk", "five-link", pushes(60.0)),
     "catch, five-link, 80": Row("walk", "five-link", pushes(80.0)),
+    "hard, five-link, 35": Row("walk", "five-link", pushes(35.0, phases=20)),
+    "hard, five-link, -50": Row("walk", "five-link", pushes(-50.0, phases=20)),
     **{
         f"walk at {v}": Row(f"at {v}", "five-link", pushes(15.0, -15.0))
         for v in (0.4, 0.6, 0.8, 1.0, 1.2, 1.4)
@@ -182,6 +185,7 @@ def main() -> None:
     """Run the trials, print what fell and the table."""
     parser = argparse.ArgumentParser(description="What pushes do to a robot that runs.")
     parser.add_argument("--row", action="append", choices=tuple(ROWS), help="all if none")
+    parser.add_argument("--trial", action="append", type=int, help="its number in the row; all")
     parser.add_argument("--results", default=None)
     parser.add_argument("--processes", type=int, default=1)
     chosen = parser.parse_args()
@@ -189,15 +193,21 @@ def main() -> None:
     with ProcessPoolExecutor(chosen.processes) as executor:
         for name in chosen.row or ROWS:
             row = ROWS[name]
-            items = [{"robot": row.robot, "way": row.way, "disturbance": d} for d in row.trials]
+            numbers = chosen.trial or range(len(row.trials))
+            if not set(numbers) <= set(range(len(row.trials))):
+                parser.error(f"the trials of {name} are 0 to {len(row.trials) - 1}")
+            trials = [row.trials[i] for i in numbers]
+            items = [{"robot": row.robot, "way": row.way, "disturbance": d} for d in trials]
             path = f"{chosen.results}.{name.replace(', ', '-').replace(' ', '-')}"
             found = sweep(
                 trial, items, path if chosen.results else None, executor,
                 options=SweepOptions(progress=False),
             )  # fmt: skip
-            for item, result, error in zip(found.items, found.results, found.errors, strict=True):
+            for i, d, result, error in zip(
+                numbers, trials, found.results, found.errors, strict=True
+            ):
                 if error is not None or result["fell"]:
-                    print(f"{name}, {item['disturbance']}: {error or result['why']}")
+                    print(f"{name}, trial {i}, {d}: {error or result['why']}", flush=True)
             lines.append(told(name, list(found.results)))
             print(lines[-1], flush=True)
     print(

@@ -118,7 +118,7 @@ def targets(folder):
         tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.MujocoOptions, tc.PlantOptions,
         tc.SensorOptions, tc.Terrain,
         tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
-        embedding.LoadOptions,
+        embedding.FrictionOptions, embedding.LoadOptions,
         embedding.AheadOptions, embedding.RehearsalOptions,
         embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
         embedding.RunningOptions, embedding.StandingOptions, slip.PaceOptions,

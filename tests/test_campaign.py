@@ -14,7 +14,15 @@ from template_control import settings
 from template_control.cli.main import main
 from template_control.cli.trials import campaign as command
 from template_control.errors import ParameterError
-from template_control.robustness import Campaign, Conditions, Draw, Mix, Trial, first_wrong
+from template_control.robustness import (
+    FREE_MIX,
+    Campaign,
+    Conditions,
+    Draw,
+    Mix,
+    Trial,
+    first_wrong,
+)
 from template_control.run.choices.robot import RobotChoice
 from template_control.run.config import RunConfig
 from template_control.run.record import Record
@@ -105,6 +113,25 @@ def test_a_small_robot_is_disturbed_as_a_small_one():
     assert push.impulse == pytest.approx(draw.push * p.mass / 80.0 * length / time)
     assert push.duration == pytest.approx(0.1 * time)
     assert config.simulation.delay <= draw.delay * time + 0.5e-3
+
+
+def test_a_free_robot_is_pushed_from_all_sides(tmp_path):
+    conditions = Conditions(RobotChoice("bolt", free=True), mix=FREE_MIX, seed=2)
+    config, _ = conditions.trial(1)
+    draw = conditions.draw(1)
+    (push,) = config.simulation.pushes
+    assert push.direction == pytest.approx(np.radians(draw.direction))
+    assert config.robot.free
+    assert RunConfig.load(config.save(tmp_path / "trial.toml")) == config
+    directions = [FREE_MIX.draw(seed).direction for seed in range(200)]
+    assert min(directions) < -170.0
+    assert max(directions) > 170.0
+    # Without directions the other numbers are drawn as they always were.
+    planar = replace(FREE_MIX, direction=(0.0, 0.0)).draw(7)
+    assert replace(FREE_MIX.draw(7), direction=0.0) == planar
+    assert FREE_MIX.times(2.0).direction == FREE_MIX.direction
+    with pytest.raises(ParameterError, match=r"Mix.direction .* five-link is held"):
+        Conditions(mix=FREE_MIX)
 
 
 def test_shares_and_figure_of_a_campaign():

@@ -81,7 +81,7 @@ def test_it_runs_until_it_is_slow_and_walks_on():
 
 
 def test_only_a_walk_that_is_much_too_fast_is_caught():
-    route = catching(excess=0.42)
+    route = catching(excess=0.42, fast=9.0)
     walk = route.next(VLO, WALK.vlo, 0.0)
     slowest, fastest = running_speeds(P)
     assert route.instead(walk, 2.0, 0.41) is None
@@ -92,6 +92,15 @@ def test_only_a_walk_that_is_much_too_fast_is_caught():
     route.take(route.instead(walk, 2.0, 0.9))
     assert route.instead(changing, 2.0, 0.0).stride == "wr", "pushed again, it aims again"
     assert route.instead(replace(walk, stride="r"), 2.0, 0.9) is None
+
+
+def test_a_walk_that_is_about_to_take_off_is_caught():
+    route = catching(excess=0.42, fast=1.49)
+    walk = route.next(VLO, WALK.vlo, 0.0)
+    left = 1.49 - float(walk.target[0])
+    assert 0.3 < left < 0.42
+    assert route.instead(walk, 1.6, left - 0.01) is None
+    assert route.instead(walk, 1.6, left + 0.01).stride == "wr"
 
 
 def test_a_scenario_goes_on_after_the_catch():
@@ -210,7 +219,7 @@ def test_a_robot_that_is_pushed_too_hard_runs_and_walks_on(name, phase):
     found = kinds(record)
     runs = found.count("r")
     walks = len(found) - runs - 2
-    assert found == ["w"] * 3 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * (walks - 3)
+    assert found == ["wp"] * 3 + ["wr"] + ["r"] * runs + ["rw"] + ["wp"] * (walks - 3)
     assert runs >= 4
     assert walks > 5
     assert np.all(np.abs(record.torque) <= record.metadata["torque_limit"])
@@ -246,6 +255,6 @@ def test_the_command_says_no_and_counts_strides(tmp_path, capsys):
     arguments = ["walk", "--push", "60@2:0.4", "--steps", "5", "--no-figures", "--json"]
     assert main([*arguments, "--output", str(tmp_path / "caught")]) == 0
     figures = json.loads(capsys.readouterr().out)
-    assert figures["strides"] == {"walking": 2, "walk to run": 1, "running": 2}
+    assert figures["strides"] == {"walking with push-off": 2, "walk to run": 1, "running": 2}
     assert main([*arguments, "--no-catch", "--output", str(tmp_path / "not")]) in (0, 1)
-    assert set(json.loads(capsys.readouterr().out)["strides"]) == {"walking"}
+    assert set(json.loads(capsys.readouterr().out)["strides"]) == {"walking with push-off"}

@@ -93,7 +93,7 @@ def test_a_function_checks_its_arguments():
 OPTIONS = [
     tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
     tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
-    embedding.LoadOptions,
+    embedding.FrictionOptions, embedding.LoadOptions,
     embedding.AheadOptions, embedding.RehearsalOptions,
     embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
     embedding.RunningOptions, TransitionOptions, run.GaitChoice,

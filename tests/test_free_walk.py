@@ -54,6 +54,19 @@ def test_bolt_walks_free(straight):
         assert angle["lower"] < angle["least"] < angle["most"] < angle["upper"]
 
 
+@pytest.mark.slow(seconds=15)
+def test_bolt_walks_slowly_too():
+    """It fell at step 18 while the search priced no controls, and trusted the closed form."""
+    robot = load_free_robot("bolt")
+    gait = tc.gait_for_speed(tc.template_for(robot), 0.4)
+    planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
+    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=40, course=tc.Course()))
+    assert (record.steps, record.fell) == (40, False)
+    assert record.metadata["summary"]["qp_failures"] == 0
+    last = record.section_state[-10:].mean(axis=0) - gait.vlo
+    assert np.all(np.abs(last) < [0.008, 0.003, 0.02])
+
+
 @pytest.mark.slow(seconds=1)
 def test_the_planar_part_is_the_view_of_the_space(straight):
     record, _ = straight

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from template_control.embedding.free.options import FreeOptions
 from template_control.errors import ParameterError
 from template_control.robot.free.start import FreePose, free_state_in
 from template_control.robot.library import load_free_robot, load_robot
@@ -15,11 +16,16 @@ from template_control.whole_body.foot_task import FootTask
 from template_control.whole_body.free.orientation_task import OrientationTask
 from template_control.whole_body.free.side_foot_task import SideFootTask
 from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
-from template_control.whole_body.task import DESIRED, TaskStack
+from template_control.whole_body.task import DESIRED, WEIGHT, TaskStack
 from template_control.whole_body.wanted import Wanted
 
 FRICTION = 0.6
-OPTIONS = QpOptions(friction=FRICTION, friction_margin=1.0)
+OPTIONS = QpOptions(
+    friction=FRICTION,
+    friction_margin=1.0,
+    stop_share=FreeOptions().stop_share,
+    stop_horizon=FreeOptions().stop_horizon,
+)
 TASKS = {
     0: (OrientationTask(), FootTask(Leg.REAR), SideFootTask(Leg.REAR)),
     1: (ComTask((0.01, 10.0)), OrientationTask(), FootTask(), SideFootTask()),
@@ -42,6 +48,33 @@ def standing(robot, rng):
         feet_velocity=rng.normal(0.0, 0.05, (2, 3)),
     )
     return free_state_in(robot, pose)
+
+
+def turning(robot, angle, speed, **options):
+    """Acceleration of a knee in the air that is asked for 1000 rad/s^2 upwards [rad/s^2]."""
+    q, v = robot.neutral(), np.zeros(robot.nv)
+    q[9], v[8] = angle, speed
+    robot.update(q, v)
+    tasks = TaskStack((SideFootTask(Leg.REAR),), robot.nv)
+    tasks.table[0, 8], tasks.table[0, robot.nv + DESIRED] = 1.0, 1000.0
+    tasks.table[0, robot.nv + WEIGHT] = 1.0
+    s = WholeBodyQp(robot, replace(OPTIONS, **options)).solve(
+        tasks, Stance((), np.zeros(0), np.zeros(0))
+    )
+    assert s.solved
+    return s.acceleration[8]
+
+
+def test_a_joint_near_an_end_of_its_range_brakes(bolt):
+    end, horizon = bolt.joint_range[2, 1], OPTIONS.stop_horizon
+    assert end == pytest.approx(3.4)
+    assert turning(bolt, 1.0, 5.0) == pytest.approx(1000.0, rel=0.01)
+    for left in (0.2, 0.0, -0.1):
+        bound = (left / horizon - 5.0) / OPTIONS.speed_horizon
+        assert turning(bolt, end - left, 5.0) == pytest.approx(bound, abs=0.5)
+    # A longer horizon brakes earlier, and away from the end nothing is bounded.
+    assert turning(bolt, end - 0.5, 5.0, stop_horizon=0.2) < -400.0
+    assert turning(bolt, end - 0.2, -5.0, torque_scale=2.0) > 900.0
 
 
 def solve(robot, rng, feet, qp, scale):

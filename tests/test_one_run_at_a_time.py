@@ -18,15 +18,15 @@ OPTIONS = tc.SimulationOptions(steps=3, record_every=10)
 
 
 @pytest.mark.parametrize("kind", [tc.LqrPlanner, tc.ModifiedPlanner])
-def test_a_planner_forgets_the_gaits_of_an_earlier_run(kind, default_gait):
-    planner, fresh = kind(default_gait), kind(default_gait)
-    z = default_gait.vlo * [1.01, 1.0, 1.0]
+def test_a_planner_forgets_the_gaits_of_an_earlier_run(kind, gait):
+    planner, fresh = kind(gait), kind(gait)
+    z = gait.vlo * [1.01, 1.0, 1.0]
     first = planner.decide(z)
-    other = walking_gait(default_gait.parameters, 0.95)
+    other = walking_gait(gait.parameters, 0.95)
     planner.observe(planner.decide(z, other.vlo), other.vlo + 0.01)
     assert planner.gait.vlo[0] == pytest.approx(0.95)
     planner.reset()
-    assert planner.gait is default_gait
+    assert planner.gait is gait
     for again in (planner.decide(z), fresh.decide(z)):
         np.testing.assert_array_equal(again.controls, first.controls)
         np.testing.assert_array_equal(again.predicted, first.predicted)

@@ -19,6 +19,7 @@ from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.stride_planning import StridePlanning
+from template_control.embedding.touchdown import angle_later
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
@@ -69,7 +70,7 @@ def test_planner_answers_for_every_state(brisk_gait, speed, height, vertical):
 @pytest.mark.parametrize("z", [[1.18, 0.927, -0.14], [1.3, 0.94, -0.4], [1.37, 0.948, -0.39]])
 def test_a_foot_can_be_given_time_until_touchdown(gait, z):
     earliest, times = 0.03, []
-    for options in (LqrOptions(), LqrOptions(earliest_touchdown=earliest)):
+    for options in (LqrOptions(earliest_touchdown=t) for t in (0.0, earliest)):
         decision = LqrPlanner(gait, options).decide(np.array(z))
         assert decision.feasible
         stride = simulate_stride(P, STRIDE_START["w"], VLO.state(z), decision.controls)
@@ -178,12 +179,39 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
     disturbed = simulate_stride(P, node.name, VLO.state(z), u)
     assume(later < disturbed.time_of(Event.TOUCHDOWN))
     sensed.state[:] = disturbed.sample(later)[0][:4]
-    change = ReplanOptions().agility * (planning.due(Event.TOUCHDOWN) - later) ** 2
+    o, left = ReplanOptions(), planning.due(Event.TOUCHDOWN) - later
+    change = o.agility * left**2
+    # The foot needs some time until it is down, if it had so much.
+    soonest = max(min(left, o.soonest, o.soonest_share * gait.step_duration), 0.002)
+    most = min(u[0] + change, angle_later(sensed, P, u[Slot.K_SC], soonest))
     planning.reconsider(node, sensed, later, later)
-    expected = LqrPlanner(gait).decide(z, angles=(u[0] - change, u[0] + change)).controls
+    expected = LqrPlanner(gait).decide(z, angles=(min(u[0] - change, most), most)).controls
     np.testing.assert_allclose(planning.reports[0].decision.controls, expected, rtol=1e-6)
-    assert abs(planning.reports[0].decision.controls[0] - u[0]) <= change * (1 + 1e-12)
+    assert planning.due(Event.TOUCHDOWN) >= 0.9 * soonest
     assert len(planning.reports) == 1
+
+
+@pytest.mark.parametrize("time", [0.0, 0.02, 0.06])
+def test_a_leg_at_a_later_angle_lands_then(gait, time):
+    node = STRIDE_START["w"]
+    early = simulate_stride(P, node, VLO.state(gait.vlo), gait.controls).sample(0.05)[0][:4]
+    sensed, u = Sensed(early, np.zeros(2)), gait.controls.copy()
+    u[Slot.TOUCHDOWN_ANGLE] = angle_later(sensed, P, u[Slot.K_SC], time) - 1e-9
+    landed = simulate_stride(P, node, early, u).time_of(Event.TOUCHDOWN)
+    assert landed == pytest.approx(time, abs=1e-6 + 2.0 * time**2), "the series ends there"
+
+
+def test_a_step_is_not_planned_anew_with_a_touchdown_that_is_over(gait):
+    """The template's foot cannot land below the ground: it would never, and the robot's stay up."""
+    node, planning = AUTOMATON.node(STRIDE_START["w"]), planned(gait)
+    sensed = Sensed(VLO.state(gait.vlo), np.zeros(2))
+    planning.decide(VLO, sensed, 0.0, NOTHING)
+    touchdown = planning.due(Event.TOUCHDOWN)
+    u = planning.reports[0].decision.controls
+    landing = simulate_stride(P, node.name, sensed.state, u).sample(touchdown - 1e-6)[0][:4]
+    sensed.state[:] = landing + [0.0, -0.004, 0.15, 0.0]
+    planning.reconsider(node, sensed, touchdown, touchdown)
+    assert 0.0 <= planning.due(Event.TOUCHDOWN) < 0.005
 
 
 def test_surprise_is_a_large_deviation_some_time_after_the_last_plan(gait):

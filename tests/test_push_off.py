@@ -91,6 +91,33 @@ def test_the_planner_completes_steps_far_from_the_gait(pushing):
         np.testing.assert_allclose(step.step(z, decision.controls)[0], decision.predicted)
 
 
+@pytest.mark.parametrize(
+    "slow", [(0.405, 0.985, 0.021), (0.515, 0.975, -0.089), (0.363, 0.977, 0.214)]
+)
+def test_the_search_takes_no_step_that_only_the_closed_form_completes(pushing, slow):
+    planner = LqrPlanner(pushing)
+    decision = planner.decide(np.array(slow))
+    end, outcome = ReturnMap(P, "wp").step(np.array(slow), decision.controls)
+    assert outcome is Outcome.SECTION
+    np.testing.assert_allclose(end, decision.predicted, atol=1e-9)
+    assert planner.price(np.array(slow)) < 5.0
+
+
+def test_the_search_does_not_bend_legs_for_nothing(pushing):
+    """Without a price of controls it found legs of half the stiffness here, which sink."""
+    decision = LqrPlanner(pushing).decide(pushing.vlo + [-0.042, 0.002, -0.113])
+    assert decision.feasible
+    stiff = decision.controls[[Slot.K_SC, Slot.K_SD, Slot.K_PUSH]]
+    assert np.all(np.abs(stiff / K0 - 1.0) < 0.3)
+
+
+def test_no_step_begins_in_flight(pushing):
+    """There the template's leg would pull at the ground."""
+    planner = LqrPlanner(pushing)
+    steps = [planner.decide(np.array([1.1, height, 0.4])) for height in (0.98, 1.007)]
+    assert [step.feasible for step in steps] == [True, False]
+
+
 def test_the_paper_s_planner_walks_without_it(pushing):
     planner = ModifiedPlanner(pushing)
     assert planner.gait.stride == "w"

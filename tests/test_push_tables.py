@@ -21,8 +21,11 @@ def test_every_row_has_both_signs_and_all_phases(script):
         if "impulse" not in row.trials[0]:
             continue
         by_impulse = {d["impulse"] for d in row.trials}
-        assert name.startswith("catch") or {-j for j in by_impulse} == by_impulse
-        assert len(row.trials) == 10 * len(by_impulse)
+        hard = name.startswith(("catch", "hard"))
+        assert hard or {-j for j in by_impulse} == by_impulse
+        phases = 20 if name.startswith("hard") else 10
+        assert len({d["phase"] for d in row.trials}) == phases
+        assert len(row.trials) == phases * len(by_impulse)
 
 
 def test_strides_until_a_run_is_back(script):

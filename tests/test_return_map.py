@@ -173,9 +173,11 @@ def test_momentum_changes_are_the_integrals_they_stand_for():
     mean_r = quad(lambda s: polar(s)[0], 0.0, t)[0] / t
     ends = np.cos(polar(0.0)[1]) + np.cos(polar(t)[1])
     gravity = -0.5 * t * P.gravity * mean_r * ends
-    assert momentum_changes(a, t, P.gravity, 0.0) == pytest.approx(gravity, rel=1e-10)
+    assert momentum_changes(a, t, (P.gravity, 0.0), 0.0) == pytest.approx(gravity, rel=1e-10)
     torsion = 7.0 * quad(lambda s: np.pi / 2 - polar(s)[1], 0.0, t)[0]
-    assert momentum_changes(a, t, P.gravity, 7.0) - gravity == pytest.approx(torsion, rel=1e-9)
+    assert momentum_changes(a, t, (P.gravity, 0.0), 7.0) - gravity == pytest.approx(
+        torsion, rel=1e-9
+    )
 
 
 def test_error_study_meets_its_targets():

@@ -1,12 +1,15 @@
 """The running planner: what it chooses on the template, its bounds, and what it learns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from template_control.embedding.planners.planner import Planner
-from template_control.embedding.planners.running import RunningOptions, RunningPlanner
+from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
+from template_control.embedding.planners.within_reach import solve_within_reach
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.return_map import ReturnMap
@@ -120,3 +123,32 @@ def test_templates_of_all_sizes_are_planned_alike(planner, gait):
     other_unit = small.mass * small.gravity / small.rest_length
     np.testing.assert_allclose(v[0], u[0], rtol=1e-6)
     np.testing.assert_allclose(v[1:3] / other_unit, u[1:3] / unit, rtol=1e-5)
+
+
+@pytest.mark.parametrize("options", [AGILE, replace(AGILE, brake=None, rounds=4)])
+@pytest.mark.parametrize("speed", [3.2, 2.7, 2.5, 2.25])
+def test_a_run_that_is_too_fast_slows_down_whatever_it_is_asked_for(options, speed):
+    z, target = np.array([speed, 0.971]), running_gait(P, max(speed - 0.6, 1.9)).apex
+    decision = RunningPlanner(running_gait(P, 1.5), options).decide(z, target)
+    end, outcome = ReturnMap(P, "r").step(z, decision.controls)
+    assert outcome is Outcome.SECTION
+    assert end[0] - speed < -0.12, "the great change that is asked for made it 0.05 m/s once"
+    assert abs(end[1] - 0.975) < 0.01
+
+
+def test_of_the_strides_that_aim_at_less_the_nearest_is_taken():
+    asked = []
+
+    def solve(goal):
+        asked.append(round(goal[0], 9))
+        made = 0.1 if goal[0] > 3.3 else goal[0] - 3.0
+        return np.array([goal[0]]), np.array([3.0 + made, goal[1]])
+
+    z, aim = np.array([3.0, 0.97]), np.array([3.4, 0.97])
+    _, end = solve_within_reach(solve, z, aim, 0.1)
+    assert asked == [3.4, 3.28]
+    assert end[0] == pytest.approx(3.28)
+    asked.clear()
+    assert solve_within_reach(solve, z, aim, 0.35)[1][0] == pytest.approx(3.1)
+    assert solve_within_reach(lambda goal: (goal, None), z, aim, 0.1)[1] is None
+    assert asked == [3.4]

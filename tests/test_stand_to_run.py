@@ -28,7 +28,9 @@ def test_a_robot_stands_runs_and_stands_again(example, name, engine, top):
     assert (m["fall_reason"], m["arrived"]) == ("", True)
     kinds = [m["strides"][i] for i in record.stride[:-1]]
     order = [kind for i, kind in enumerate(kinds) if i == 0 or kind != kinds[i - 1]]
-    assert order == ["s", "sw", "ww", "w", "wr", "r", "rw", "w", "ww", "ws", "sf", "s"]
+    assert order[:8] == ["s", "sw", "ww", "w", "wr", "r", "rw", "w"]
+    assert order[-4:] == ["ww", "ws", "sf", "s"]
+    assert set(order[8:-4]) <= {"ww", "w"}, "it slows down in as many steps as it takes"
     speed = record.section_state[:, 0]
     assert speed.max() == pytest.approx(top, abs=0.05)
     error = speed[1:] - record.section_target[:-1, 0]

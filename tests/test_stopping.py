@@ -106,6 +106,45 @@ with workers(2) as pool:
     wait_until(lambda: not group(process.pid), allowed())
 
 
+DEAF = {
+    "callback": "ctypes.CFUNCTYPE(None)(stop)()",
+    "finaliser": "Dying()",
+    "fork": "os.register_at_fork(after_in_parent=stop); os.fork() or os._exit(0)",
+}
+
+
+@pytest.mark.parametrize("deaf", DEAF)
+def test_an_interrupt_that_python_swallows_comes_again(deaf):
+    code = f"""
+import ctypes, os, signal, sys, time, types
+from template_control.cli import main
+def stop():
+    os.kill(os.getpid(), signal.SIGTERM)
+    for _ in range(1000): pass
+class Dying:
+    def __del__(self): stop()
+def run(_):
+    {DEAF[deaf]}
+    print("swallowed", flush=True)
+    time.sleep(60.0)
+stub = types.ModuleType("stub")
+stub.add_options, stub.run = lambda parser: None, run
+sys.modules["stub"] = stub
+main._COMMANDS["walk"] = main._Command("stub", "")
+sys.argv = ["template-control", "walk"]
+sys.exit(main.main())
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "swallowed\n"
+    sent = time.monotonic()
+    _, told = process.communicate(timeout=50)
+    assert time.monotonic() - sent < allowed()
+    assert process.returncode == 130
+    assert told == "template-control: interrupted, nothing is kept\n"
+
+
 def catches(pid, number):
     """Whether a process has a handler of its own for a signal."""
     status = Path(f"/proc/{pid}/status").read_text()

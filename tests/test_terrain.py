@@ -302,8 +302,8 @@ def test_options_keep_their_terrain_in_a_file():
 
 @pytest.fixture(scope="module")
 def up_the_slope(default_gait):
-    ground = Terrain.slope(np.radians(1.0), start=0.7)
-    options = tc.SimulationOptions(steps=4, plant=tc.PlantOptions(terrain=ground))
+    ground = Terrain.slope(np.radians(4.0), start=0.7)
+    options = tc.SimulationOptions(steps=5, plant=tc.PlantOptions(terrain=ground))
     return tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(default_gait), options)
 
 
@@ -311,7 +311,7 @@ def test_feet_stand_on_the_slope(up_the_slope):
     record = up_the_slope
     assert not record.fell
     ground = record.ground
-    assert ground == Terrain.slope(np.radians(1.0), start=0.7)
+    assert ground == Terrain.slope(np.radians(4.0), start=0.7)
     at = np.searchsorted(record.time, record.section_time)[1:-1]
     for x, y in record.foot[at, record.rear[at]].tolist():
         seen = ground.closest(x, y + 0.01)

@@ -90,9 +90,9 @@ def landing(gait, height):
     return ahead
 
 
-def test_legs_push_longer_after_a_step_up(default_gait):
+def test_legs_push_longer_after_a_step_up(gait):
     """The template steps on ground 3 cm higher, with its leg that much shorter."""
-    gait, ahead = default_gait, landing(default_gait, 0.03)
+    ahead = landing(gait, 0.03)
 
     def surprise(end):
         return np.abs((end - gait.vlo) / UnexpectedGroundOptions().tolerance).max()
@@ -110,9 +110,9 @@ def test_legs_push_longer_after_a_step_up(default_gait):
     assert np.all((k >= 0.5) & (k <= 2.0))
 
 
-def test_after_a_step_down_the_legs_lead_where_the_next_step_can_brake(default_gait):
+def test_after_a_step_down_the_legs_lead_where_the_next_step_can_brake(gait):
     """The end that looks nearest to the gait is not the one from which a step brakes best."""
-    gait, ahead = default_gait, landing(default_gait, -0.03)
+    ahead = landing(gait, -0.03)
     planner, options = tc.LqrPlanner(gait), UnexpectedGroundOptions()
     decision = Decision(gait.controls, gait.vlo, True, True, True)
     free = [Slot.K_SC, Slot.K_SD]

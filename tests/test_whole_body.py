@@ -175,6 +175,28 @@ def test_a_joint_near_its_limit_gains_at_most_the_rest_in_the_horizon(robot):
         assert bounded == pytest.approx(bound, abs=0.1)
 
 
+def straightening(robot, options, knee):
+    """In the air, a fast knee is asked to go straight; its acceleration [rad/s^2]."""
+    q, v = standing(np.random.default_rng(7))
+    q[4], v[4] = knee, -15.0
+    robot.update(q, v)
+    tasks = TaskStack((PostureTask(),), 7)
+    tasks.table[0, 4], tasks.table[0, 7 + DESIRED] = 1.0, -100.0
+    s = WholeBodyQp(robot, options).solve(tasks, Stance((), np.zeros(0), np.zeros(0)))
+    assert s.solved
+    return s.acceleration[4]
+
+
+def test_a_fast_joint_slows_down_before_its_stop(robot):
+    # At 15 rad/s the stop is 20 ms away where the knee is bent by 0.3 rad.
+    assert straightening(robot, OPTIONS, 0.32) == pytest.approx(-100.0, abs=1.0)
+    braking = straightening(robot, OPTIONS, 0.29)
+    assert braking == pytest.approx((15.0 - 0.29 / 0.02) / 0.005, abs=1.0)
+    slow = replace(OPTIONS, stop_share=0.8)
+    assert straightening(robot, slow, 0.29) == pytest.approx(-100.0, abs=1.0)
+    assert robot.joint_angle[1] == 0.29
+
+
 def test_motors_that_cannot_slow_a_joint_down_make_it_no_faster(tmp_path, robot):
     slow = tmp_path / "slow.urdf"
     slow.write_text(robot.urdf.replace('velocity="20"', 'velocity="17"'))

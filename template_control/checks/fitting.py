@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from template_control.checks.ranges import Range, Rising, Shape
+from template_control.checks.words import shown, words_for
 from template_control.errors import ParameterError, TemplateControlError
 
 _ANY_NUMBER = Range()
-_LONGEST = 60  # characters of a value that a message shows
 
 
 class Refused(Exception):
@@ -45,16 +45,6 @@ def check(
         return _fit(value, hint)
     except Refused as refused:
         raise error(f"{where} is {shown(value)}: give {refused}") from None
-
-
-def shown(value: Any) -> str:
-    """A value for a message, on one line and not long."""
-    try:
-        text = f"{value:g}" if isinstance(value, float) else repr(value)
-    except Exception:  # a stranger's __repr__ may do anything
-        text = f"a {type(value).__name__}"
-    text = " ".join(text.split())
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
 _PLANS: dict[int, tuple[Any, Callable[[Any], Any]]] = {}
@@ -199,7 +189,7 @@ def _items(value: Any, hint: Any) -> list[Any]:
     if isinstance(value, np.ndarray) and value.ndim > 0:
         return list(value.tolist())
     if isinstance(value, str | bytes) or not isinstance(value, Sequence):
-        raise Refused(_words(hint))
+        raise Refused(words_for(hint))
     return list(value)
 
 
@@ -208,37 +198,37 @@ def _tuple(value: Any, hint: Any) -> tuple[Any, ...]:
     many = len(hints) == 2 and hints[1] is Ellipsis
     items = _items(value, hint)
     if not many and len(items) != len(hints):
-        raise Refused(_words(hint))
+        raise Refused(words_for(hint))
     each = [hints[0]] * len(items) if many else hints
     try:
         found = tuple(_fit(item, h) for item, h in zip(items, each, strict=True))
     except Refused as refused:
-        raise Refused(f"{_words(hint)}; each {refused}" if many else _words(hint)) from None
+        raise Refused(f"{words_for(hint)}; each {refused}" if many else words_for(hint)) from None
     unchanged = isinstance(value, tuple) and all(a is b for a, b in zip(found, value, strict=True))
     return value if unchanged else found
 
 
 def _literal(value: Any, hint: Any) -> Any:
     if not any(type(value) is type(x) and value == x for x in get_args(hint)):
-        raise Refused(_words(hint))
+        raise Refused(words_for(hint))
     return value
 
 
 def _mapping(value: Any, hint: Any) -> Any:
     if not isinstance(value, Mapping):
-        raise Refused(_words(hint))
+        raise Refused(words_for(hint))
     key_hint, value_hint = get_args(hint)
     found = {}
     for key, entry in value.items():
         try:
             fitted = _fit(key, key_hint)
         except Refused as refused:
-            raise Refused(f"{_words(hint)}; each key {refused}") from None
+            raise Refused(f"{words_for(hint)}; each key {refused}") from None
         try:
             found[fitted] = _fit(entry, value_hint)
         except Refused as refused:
             text = f"{key} is {shown(entry)}, which should be {refused}"
-            raise Refused(f"{_words(hint)}; {text}") from None
+            raise Refused(f"{words_for(hint)}; {text}") from None
     same = all(found.get(key) is entry for key, entry in value.items())
     return value if same else found
 
@@ -287,10 +277,10 @@ def _instance(value: Any, kind: type) -> Any:
     if getattr(kind, "_is_protocol", False):
         missing = [name for name in _members(kind) if not _has(value, name)]
         if missing or isinstance(value, type):
-            raise Refused(_words(kind))
+            raise Refused(words_for(kind))
         return value
     if not isinstance(value, kind):
-        raise Refused(_words(kind))
+        raise Refused(words_for(kind))
     return value
 
 
@@ -309,38 +299,3 @@ def _members(kind: type) -> tuple[str, ...]:
         if not name.startswith("_")
     ]
     return tuple(dict.fromkeys(names))
-
-
-def _words(hint: Any) -> str:
-    """What fits an annotation, for a message."""
-    origin, args = get_origin(hint), get_args(hint)
-    if origin is Literal:
-        return "one of " + ", ".join(repr(x) for x in args)
-    if origin is Annotated:
-        return next(
-            (
-                extra.words("whole number" if args[0] is int else "number")
-                for extra in args[1:]
-                if isinstance(extra, Range)
-            ),
-            _words(args[0]),
-        )
-    if origin is tuple:
-        if len(args) == 2 and args[1] is Ellipsis:
-            return "a tuple"
-        each = list(dict.fromkeys(_words(x) for x in args))
-        if len(each) == 1:
-            return f"{len(args)} times {each[0]}"
-        return ", ".join(each)
-    if origin in (list, Sequence):
-        return "a list"
-    if origin in (Mapping, dict):
-        return "a mapping"
-    if hint is float:
-        return _ANY_NUMBER.words("number")
-    if hint is int:
-        return "a whole number"
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return f"a {hint.__name__}: " + ", ".join(str(member) for member in hint)
-    name = getattr(hint, "__name__", str(hint))
-    return f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"

@@ -7,14 +7,19 @@ import importlib
 import io
 import os
 import re
-import signal
 import sys
-import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from types import FrameType
 from typing import Any, NamedTuple
 
+from template_control.cli.interrupts import (
+    end_at_once,
+    end_quietly,
+    insist,
+    interrupt,
+    on_signals,
+    stopped,
+)
 from template_control.cli.report.output import INTERRUPTED
 from template_control.errors import TemplateControlError
 
@@ -82,8 +87,6 @@ _USER_ERROR = 2
 _STDOUT, _STDERR = 1, 2
 _PIPE_CLOSED = 141  # as shells have it where SIGPIPE ended a program
 _NOTHING_KEPT = "interrupted, nothing is kept"
-_PROCESS = os.getpid()
-_STOPPED = threading.Event()
 
 
 class _Version(argparse.Action):
@@ -158,16 +161,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is not None:
         return _command(arguments)
     output = _standard_streams()
-    _on_signals(_end_at_once)
+    on_signals(end_at_once)
+    insist()
     try:
         status = _command(sys.argv[1:], output)
-        if _STOPPED.is_set():
+        if stopped():
             with suppress(OSError):
                 sys.stdout.flush()
             os._exit(status)  # to take everything apart takes Python up to a second
         return status
     finally:
-        _on_signals(_end_quietly)
+        on_signals(end_quietly)
 
 
 def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
@@ -179,19 +183,19 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
         from template_control.terminal import plain_console
 
         if output is not None:
-            _on_signals(_interrupt)
+            on_signals(interrupt)
         with compiling(plain_console(stderr=True)):
             status = int(options.run(options))
         sys.stdout.flush()
         return status
     except KeyboardInterrupt as error:
         if output is not None:
-            _on_signals(_end_quietly)
+            on_signals(end_quietly)
         return _told(str(error) or _NOTHING_KEPT, INTERRUPTED)
     except TemplateControlError as error:
         return _told(str(error), _USER_ERROR)
     except (Exception, SystemExit):
-        if _STOPPED.is_set():  # an import that Ctrl-C ends may end with any error
+        if stopped():  # an import that Ctrl-C ends may end with any error
             return _told(_NOTHING_KEPT, INTERRUPTED)
         if output is None:
             raise
@@ -254,33 +258,6 @@ def _standard_streams() -> _Standard:
         for stream, old in zip(streams, (sys.stdout, sys.stderr), strict=True)
     )
     return streams[0]
-
-
-def _on_signals(handler: Callable[[int, FrameType | None], None]) -> None:
-    """What Ctrl-C does, SIGTERM does too, and the end of the terminal; not what nohup ignores."""
-    if threading.current_thread() is not threading.main_thread():
-        return
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, handler)
-
-
-def _end_at_once(number: int, frame: FrameType | None) -> None:
-    """While a command is imported, which Ctrl-C cannot end well."""
-    os.write(_STDERR, b"template-control: interrupted before anything was done\n")
-    os._exit(INTERRUPTED)
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    # A process that was just forked still has the handler, but is not the command.
-    if os.getpid() == _PROCESS:
-        _STOPPED.set()
-        raise KeyboardInterrupt
-
-
-def _end_quietly(number: int, frame: FrameType | None) -> None:
-    """When all is written and told."""
-    os._exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

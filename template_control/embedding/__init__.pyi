@@ -4,14 +4,17 @@ from .ahead.rehearsal import RehearsalOptions as RehearsalOptions
 from .ahead.rehearsal import rehearse as rehearse
 from .controller import EmbeddingController as EmbeddingController
 from .free.controller import FreeController as FreeController
+from .free.hurry import HurryOptions as HurryOptions
 from .free.options import FREE_PLANNER as FREE_PLANNER
 from .free.options import FreeOptions as FreeOptions
 from .free.phases import FREE_PHASES as FREE_PHASES
 from .guards import GuardOptions as GuardOptions
+from .learners.friction import FrictionOptions as FrictionOptions
 from .learners.lean import Lean as Lean
 from .learners.lean import LeanOptions as LeanOptions
 from .learners.load import LoadOptions as LoadOptions
 from .learners.momentum_trim import TrimOptions as TrimOptions
+from .learners.slope import SlopeOptions as SlopeOptions
 from .options import EmbeddingOptions as EmbeddingOptions
 from .phases import PHASES as PHASES
 from .phases import Clock as Clock
@@ -24,6 +27,7 @@ from .planners.planner import Free as Free
 from .planners.planner import LandingPlanner as LandingPlanner
 from .planners.planner import Planner as Planner
 from .planners.planner import PricingPlanner as PricingPlanner
+from .planners.planner import SlopePlanner as SlopePlanner
 from .planners.running import RunningOptions as RunningOptions
 from .planners.running import RunningPlanner as RunningPlanner
 from .planners.transition import TransitionOptions as TransitionOptions

@@ -4,35 +4,27 @@ It stands in a node of the automaton, moves along the automaton's edges when the
 them, plans at every section (and plans again where a foot has landed), and turns the plan into
 references for the whole-body QP. What a phase needs, which tasks, which feet, which clock, is
 looked up in the table of phases: the controller knows no gait.
-
-The legs' swing makes the robot's CoM run ahead of the template and fall back behind it within
-a step, while its angular momentum about the foot, on which all forces depend, stays the
-template's. So in stance the phase is that of a point that moves with dx/dt + L / (m y), L the
-angular momentum about the CoM: it starts in the CoM at every plan, and leads or lags it by
-centimetres.
 """
 
 from __future__ import annotations
 
-from math import isfinite
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
+from template_control.embedding.following.feet_in_air import FeetInAir
+from template_control.embedding.following.place import Place
+from template_control.embedding.following.sloping_ground import SlopingGround
 from template_control.embedding.guards import PLACED, RobotGuards
-from template_control.embedding.learners.lean import TrunkLean
-from template_control.embedding.learners.load import LoadEstimate
-from template_control.embedding.learners.momentum_trim import MomentumTrim
+from template_control.embedding.learners.learners import Learners
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.phases import Clock
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.walking.walk_kernels import CONTROL
 from template_control.embedding.references.feet import Feet
-from template_control.embedding.references.leg_forces import leg_forces
-from template_control.embedding.references.rolling import rolled
 from template_control.embedding.references.stumble import Stumble
-from template_control.embedding.section_report import Learnt, SectionReport
+from template_control.embedding.section_report import SectionReport
 from template_control.embedding.sensing import Sensing
 from template_control.embedding.station import stations
 from template_control.embedding.stride_planning import StridePlanning
@@ -41,7 +33,7 @@ from template_control.parts import ready
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Leg, Slot
+from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
@@ -70,10 +62,11 @@ class EmbeddingController:
         planning: the stride's decision and the path that follows it.
         swings: shapes of the swings in phases that have none of their own.
         feet: roles and swings of the feet.
-        reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
+        place: the robot's place on that path, and the template there.
+        learners: what is learnt from stride to stride.
+        ground: its slope, as the feet tell it.
+        frame: axes that lean with the ground.
         sensing: the robot's state in the template's terms.
-        phase_offset: the point whose direction is the phase is this far ahead of the CoM [m].
-        template_forces: (2, 2) leg forces of the template at this phase [N], rear and front.
     """
 
     @checked
@@ -97,26 +90,22 @@ class EmbeddingController:
         self.options = scaled(options or EmbeddingOptions(), Scale.of(self.parameters))
         o = self.options
         self.qp = WholeBodyQp(robot, o)
-        self.load = LoadEstimate(o.load, robot.gravity)
-        self.trim = MomentumTrim(self.parameters, o.trim)
-        self.lean = TrunkLean(o.lean, o.trunk_pitch)
+        self.learners = Learners(o, self.parameters, robot)
+        self.ground = SlopingGround(robot, o.slope, self.parameters.rest_length)
+        self.frame = self.ground.frame
         self.wanted = Wanted(pitch=o.trunk_pitch)
         self.swings = o.swings(robot)
         self.feet = Feet(self.swings.other, self.wanted.foot)
-        self.reference = self.wanted.com
-        self.template_forces = np.zeros((2, 2))
-        self.phase_time = 0.0
-        self.phase_offset = 0.0
+        self.place = Place(self.parameters, self.wanted.com)
         self.time = 0.0
-        self._fresh = True
-        self.sensing = Sensing(robot, self.feet, self.reference[4:])
+        self.sensing = Sensing(robot, self.feet, self.wanted.com[4:])
+        self._contact = np.zeros(2, dtype=bool)
         self._stumble = Stumble(o.stumble, robot.mass * robot.gravity)
+        self._in_air = FeetInAir(robot, self.feet, self._stumble, self.wanted)
         self._guards = RobotGuards(self.parameters, o.guards)
         self._stations = stations(automaton, robot.nv, o.phases)
         curved = {name for name, station in self._stations.items() if station.control.curved}
         self.planning = StridePlanning(route, planners, o.replan, automaton, curved)
-        p = self.parameters
-        self._body = np.array([p.mass, p.gravity, p.rest_length])
         self.station = next(iter(self._stations.values()))
 
     @property
@@ -137,8 +126,10 @@ class EmbeddingController:
     @property
     def template_com(self) -> tuple[float, float]:
         """The template's CoM at the robot's phase, in the world [m]."""
-        x, y = self.reference[:2]
-        return float(self._origin + x), float(self.sensing.ground + y)
+        x, y = self.place.reference[:2]
+        place = np.array([self._origin + x, self.sensing.ground + y])
+        x, y = self.frame.world(place).tolist()
+        return x, y
 
     @property
     def _origin(self) -> float:
@@ -163,7 +154,8 @@ class EmbeddingController:
         """
         section = self.planning.route.section
         planner, node = self.planning.begin(section)
-        self.lean.reset()
+        self.learners.lean.reset()
+        self.frame.reset()
         self._enter(node.name)
         self.feet.begin(rear)
         half = 0.5 * planner.gait.step_duration
@@ -173,6 +165,7 @@ class EmbeddingController:
             # Of two feet on the ground the front one landed last.
             self.feet.landed = self.feet.of[self.station.stance[-1]]
         self.sensing.begin(bool(node.stance))
+        self.ground.begin(self.feet.landed)
         self._sense(np.zeros(2, dtype=bool))
         self._decide(section)
 
@@ -192,25 +185,35 @@ class EmbeddingController:
             contact: (2,) whether each foot touches the ground.
             dt: control period [s].
             force: (2, d) the ground's force on each foot, forward first and up last [N], by which
-                a foot in the air tells a wall; None: it tells none.
+                a foot in the air tells a wall, and one that slides how slippery the ground is;
+                None: they tell neither.
 
         Raises:
             ParameterError: if the state is not finite.
         """
-        self.robot.update(q, v)
+        self._contact = contact
+        self.robot.update(*self.ground.enter(q, v))
         if force is not None:
+            force = self.frame.inward(force)
             self._stumble.feel(force, self.robot.foot_velocity[:, 1], dt)
             contact = contact & ~self._stumble.slipping
+            self._feel_friction(contact, force, dt)
         self.feet.swing_time += dt
         self._sense(contact)
         self._advance()
+        q, v = self.frame.enter(q, v)
         self._plan_again()
-        self._locate(dt)
+        speed = self.robot.com_velocity[0]
+        self.place.move(self.station, self.planning, self.sensing.now, speed, dt)
         self._swing(q, v, dt)
         self._track(q, v, dt)
         self.sensing.foresee(dt)
         self.time += dt
-        return self.qp.solve(self.station.tasks, self._stance(), self.load.factor)
+        solution = self.qp.solve(self.station.tasks, self._stance(), self.learners.load.factor)
+        if self.frame.angle != 0.0:
+            outward = self.frame.outward(solution.acceleration)
+            solution = replace(solution, acceleration=outward)
+        return solution
 
     # -- the automaton ----------------------------------------------------------------
 
@@ -222,7 +225,7 @@ class EmbeddingController:
     def _advance(self) -> None:
         """Take the first edge of the present node that the robot fires."""
         for edge in self.station.ways:
-            due = self.planning.dues[edge.event] - self.phase_time
+            due = self.planning.dues[edge.event] - self.place.time
             if self._guards.fired(edge, self.sensing.now, due):
                 self._take(edge)
                 return
@@ -234,6 +237,10 @@ class EmbeddingController:
         self._enter(str(edge.target))
         self.feet.apply(edge.reset)
         lifted = stood - self._standing()
+        # What the ground does next is not known; the best guess is its slope so far.
+        leans = bool(lifted and self.station.stance) and self._lean(
+            self.ground.slope.slope, self.feet.of[self.station.stance[0]]
+        )
         for foot in lifted:
             self._lift(foot)
         sensing, stance = self.sensing, self.station.stance
@@ -246,10 +253,10 @@ class EmbeddingController:
         momentum = self.station.control.momentum_speed
         if momentum is not before.control.momentum_speed:
             sensing.read_speed(momentum)
-        if lifted and not stance:
-            # No force moves the CoM now: its path, and all footholds on it, are certain.
+        if leans or (lifted and not stance):
+            # In flight no force moves the CoM: its path, and all footholds on it, are certain.
             self.planning.follow(self.node, sensing.now, self.time)
-            self._on_new_path()
+            self.place.restart()
         placed = PLACED.get(edge.reset)
         if placed is not None:
             self._land(placed)
@@ -273,7 +280,10 @@ class EmbeddingController:
 
         Where the table says ``unhit``, the path goes on with the speed before it hit the ground.
         """
+        leans = self._feel_slope(self.feet.of[leg])
         higher, s = self.sensing.land(leg), self.sensing.now
+        if leans:
+            self.planning.steady(self.node, s)
         measured = s.state[2:].copy()
         if self.station.control.unhit:
             s.state[2:] = self.sensing.unhit
@@ -282,104 +292,74 @@ class EmbeddingController:
         else:
             self._enter(self.planning.land_off(self.node, s, self.time, higher).name)
         s.state[2:] = measured
-        self._on_new_path()
+        self.place.restart()
+
+    def _feel_slope(self, foot: int) -> bool:
+        """A foot has landed: learn the slope; if it is off, take the line through both feet."""
+        off = self.robot.foot_position[foot, 1] - self.sensing.ground
+        self.ground.land(foot)
+        leans = abs(off) > self.options.replan.ground.height
+        return leans and self._lean(self.ground.slope.last, foot)
+
+    def _feel_friction(self, contact: NDArray[np.bool_], force: Array, dt: float) -> None:
+        """Let the cones be as narrow as the friction that sliding feet have felt."""
+        friction = self.learners.friction
+        if friction.feel(contact, force, self.robot.contact_velocity, dt):
+            self.qp.friction = replace(self.options, friction=friction.coefficient).cone
+
+    def _lean(self, slope: float, foot: int) -> bool:
+        """Turn the axes about a foot, as far as the planner knows slopes; whether they turned."""
+        leans = self.ground.lean(slope, foot, self.planning, self.sensing)
+        if leans:
+            self._sense(self._contact)
+        return leans
 
     def _decide(self, section: Section) -> None:
-        s = self.sensing.now
+        s, learners = self.sensing.now, self.learners
         if self.reports:
-            nominal = self.reports[-1].decision.nominal
-            self.load.end_stride(nominal)
-            self.trim.end_stride(section.padded(section.of(s.state)), nominal)
-            self.lean.end_stride(nominal)
-        learnt = Learnt(self.load.factor, self.trim.acceleration, self.lean.correction)
-        node = self.planning.decide(section, s, self.time, learnt)
-        self._enter(node.name)
-        if len({report.goal.stride for report in self.reports[-2:]}) > 1:
-            # A walk after a run stands up; one that leant had other drifts.
-            self.trim.forget()
-        self.lean.aim(self.reports[-1].goal)
-        self.trim.expect(self.planning.path if self.station.trimmed else None, self.planner.gait)
-        self._on_new_path()
+            learners.end_stride(section, s.state, self.reports[-1].decision.nominal)
+        self._enter(self.planning.decide(section, s, self.time, learners.learnt).name)
+        learners.begin_stride(self.planning, self.station.trimmed)
+        self.place.restart()
 
     def _plan_again(self) -> None:
         """Plan from here where a touchdown is overdue or the robot has left its path."""
-        s, planning = self.sensing.now, self.planning
-        if planning.overdue(self.node, self.phase_time):
+        s, planning, place = self.sensing.now, self.planning, self.place
+        if planning.overdue(self.node, place.time):
             planning.reach_on(self.node, s, self.time)
-        elif planning.surprised(s.state[2] - self.reference[2], self.phase_time, self.time):
-            self._enter(planning.reconsider(self.node, s, self.phase_time, self.time).name)
-            self.lean.aim(self.reports[-1].goal)
+        elif planning.surprised(s.state[2] - place.reference[2], place.time, self.time):
+            self._enter(planning.reconsider(self.node, s, place.time, self.time).name)
+            self.learners.lean.aim(self.reports[-1].goal)
         else:
             return
-        self._on_new_path()
-
-    def _on_new_path(self) -> None:
-        """The path starts where the robot is."""
-        self.phase_time = self.phase_offset = 0.0
-        self._fresh = True
+        self.place.restart()
 
     # -- control ----------------------------------------------------------------------
 
-    def _locate(self, dt: float) -> None:
-        """The template's state and forces at the robot's phase."""
-        s, path, toe = self.sensing.now, self.planning.path, self.planning.toe
-        x, y = s.state[0] + self.phase_offset - s.toes[0], s.state[1]
-        # Since the last tick, unless the path begins at this one. A direction needs a guess only.
-        passed = 0.0 if self._fresh and self.station.control.clock is Clock.TIME else dt
-        self._fresh = False
-        self.phase_time, row = self.station.locate(
-            *path.curve, x, y, self.phase_time + passed, self.reference
-        )
-        self.phase_offset += (s.state[2] - self.robot.com_velocity[0]) * dt
-        segment = path.curve.meta[row]
-        leg_forces(segment, toe, self.reference, self._body, self.template_forces)
-        if segment[3] != toe:
-            # Template and robot are on either side of liftoff: to each foot its own force.
-            self.template_forces[:] = np.flipud(self.template_forces.copy())
-
     def _swing(self, q: Array, v: Array, dt: float) -> None:
         """Move the references of the feet in the air towards their footholds."""
-        station, planning, wanted = self.station, self.planning, self.wanted
-        hips, wanted.hip_speed = self.robot.hips(q, v)
-        for leg in station.swings:
-            foot = self.feet.of[leg]
-            swing = self.feet.swing[foot]
-            landing = planning.landing(foot)
-            foothold, due = landing.x, landing.time - self.phase_time
-            if self._stumble.blocked[foot]:
-                swing.meet_wall(self.robot.foot_position[foot], due, dt)
-            elif planning.reaching and leg == station.awaited:
-                swing.drop(dt)
-            else:
-                if not isfinite(foothold):
-                    # The template cannot complete the stride; the gait's own foothold is the
-                    # best guess.
-                    gait = self.planner.gait
-                    foothold = self.sensing.now.toes[Leg.REAR] + gait.step_length
-                    due = gait.step_duration - self.feet.swing_time[foot]
-                if station.control.rolls:
-                    angle = float(self.reports[-1].decision.controls[Slot.TOUCHDOWN_ANGLE])
-                    foothold = rolled(foothold, angle, self.robot.foot_radius)
-                swing.advance(foothold, due, dt, self.sensing.ground)
-            wanted.furthest[foot] = swing.furthest(hips, self.robot.leg_length)
+        hips, self.wanted.hip_speed = self.robot.hips(q, v)
+        station, time = self.station, self.place.time
+        self._in_air.advance(station, self.planning, self.sensing, time, hips, dt)
 
     def _track(self, q: Array, v: Array, dt: float) -> None:
         """Let the phase's tasks write what they ask for."""
         s, wanted, station = self.sensing.now, self.wanted, self.station
         wanted.com_now[:] = s.state
         wanted.com_now[0] -= s.toes[0]
-        wanted.com_push = self.trim.acceleration if station.control.trims else 0.0
+        wanted.com_push = self.learners.trim.acceleration if station.control.trims else 0.0
         pitch, turning = self.robot.trunk(q, v)
         wanted.pitch_now[0], wanted.pitch_now[1] = pitch, turning
-        wanted.pitch = self.lean.advance(pitch, dt)
+        tilt = self.frame.angle  # the trunk is held by the vertical
+        wanted.pitch = self.learners.lean.advance(pitch - tilt, dt) + tilt
         wanted.feet = self.feet.of
         station.tasks.write(self.robot, wanted)
         if station.control.weighs and station.com is not None:
-            self.load.observe(station.com.lift(wanted), dt)
+            self.learners.load.observe(station.com.lift(wanted), dt)
 
     def _stance(self) -> Stance:
         """The feet on the ground, the template's forces on them, and how far they unload."""
-        station, forces = self.station, self.template_forces
+        station, forces = self.station, self.place.forces
         for leg in station.control.unloads:
             weight = self.robot.mass * self.robot.gravity
             station.cap[leg] = self.options.unload.cap(forces[leg, 1], weight)

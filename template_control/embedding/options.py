@@ -8,15 +8,18 @@ from typing import Annotated, ClassVar
 
 from template_control.checks.ranges import Range
 from template_control.embedding.guards import GuardOptions
+from template_control.embedding.learners.friction import FrictionOptions
 from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.learners.load import LoadOptions
 from template_control.embedding.learners.momentum_trim import TrimOptions
+from template_control.embedding.learners.slope import SlopeOptions
 from template_control.embedding.phases import PHASES, PhaseControl
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.references.leg_forces import UnloadOptions
 from template_control.embedding.references.stumble import StumbleOptions
 from template_control.embedding.references.swing_choice import SwingChoice, Swings
 from template_control.embedding.references.swing_foot import SwingOptions
+from template_control.estimation.delay import DelayOptions
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
@@ -43,6 +46,10 @@ class EmbeddingOptions(QpOptions):
         trim: tuning of the momentum trim.
         catches: whether a walk breaks into a run where it cannot go on, kept or of a scenario.
         lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
+        delay: how the delay from measurement to torque is learnt and reckoned with, where a planar
+            robot's whole state is measured; a run is told it, not the controller.
+        slope: how the ground's slope is learnt.
+        slides: how it is learnt that the ground is more slippery than ``friction`` says.
     """
 
     kind: ClassVar[str] = "planar"
@@ -59,6 +66,9 @@ class EmbeddingOptions(QpOptions):
     trim: TrimOptions = field(default_factory=TrimOptions)
     catches: bool = tuned(True)
     lean: LeanOptions = field(default_factory=LeanOptions)
+    delay: DelayOptions = field(default_factory=DelayOptions)
+    slope: SlopeOptions = field(default_factory=SlopeOptions)
+    slides: FrictionOptions = field(default_factory=FrictionOptions)
 
     def swings(self, robot: Biped) -> Swings:
         """Shapes of a robot's swings in phases that have none of their own."""

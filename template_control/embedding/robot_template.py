@@ -13,7 +13,7 @@ from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.by_speed.family_cost import stance_figures
 from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
-from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy
+from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy, with_push_off
 from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.maps.return_map import ReturnMap
@@ -45,6 +45,8 @@ _QUINTIC_SPEED, _QUINTIC_ACCELERATION = 1.875, 10.0 / float(np.sqrt(3.0))
 def default_gait(robot: Biped, touchdown_angle: Angle | None = None) -> WalkingGait:
     """The robot's walk: its own if it has one, else 66 degrees and 1.1 m/s for l0 = 1 m.
 
+    Its steps have push-off, with which a planner can cancel every error that the robot adds.
+
     Args:
         robot: its last update is overwritten.
         touchdown_angle: another one than the walk's, at the same speed at VLO [rad].
@@ -55,9 +57,8 @@ def default_gait(robot: Biped, touchdown_angle: Angle | None = None) -> WalkingG
     parameters = template_for(robot)
     angle, speed = robot.walk or _WALK
     unit = parameters.speed_unit
-    return gait_at(
-        parameters, angle if touchdown_angle is None else touchdown_angle, float(speed * unit)
-    )
+    angle = angle if touchdown_angle is None else touchdown_angle
+    return with_push_off(gait_at(parameters, angle, float(speed * unit)))
 
 
 @checked

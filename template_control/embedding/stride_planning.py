@@ -6,36 +6,29 @@ has carried the robot away from it.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Set
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.fitting import check
-from template_control.checks.ranges import Triple
-from template_control.embedding.planners.planner import (
-    LandingPlanner,
-    Planner,
-    Planners,
-    PricingPlanner,
-)
+from template_control.embedding.planners.planner import Decision, Planner, Planners, SlopePlanner
+from template_control.embedding.planning import choosing_again
 from template_control.embedding.planning.breaking import find_break
 from template_control.embedding.planning.planned_path import PlannedPath
+from template_control.embedding.planning.reachable_angles import reachable_angles, reachable_turn
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.planning.route_planners import RoutePlanners
+from template_control.embedding.planning.steadying import steady
 from template_control.embedding.planning.stepping_out import follow_curve
-from template_control.embedding.planning.unexpected_ground import choose_legs
 from template_control.embedding.references.template_path import join
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.embedding.sensing import Sensed
-from template_control.embedding.touchdown import flown_angle, free_controls
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Event, Slot
-from template_control.slip.maps.section import Section, section_of
+from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.catching import BreakingRoute
 from template_control.slip.scenario.route import Route, StrideGoal
@@ -83,7 +76,7 @@ class StridePlanning(PlannedPath):
         self._whole = True
         self._broken = False
         self._excess = 0.0  # speed at the stride's section less the wanted, and what came on top
-        self._planners = RoutePlanners(route, planners, options)
+        self._planners = RoutePlanners(route, planners, options, automaton)
         self._rest = RestOfStride(self._planners, automaton, curved)
 
     def begin(self, section: Section) -> tuple[Planner, Node]:
@@ -95,6 +88,7 @@ class StridePlanning(PlannedPath):
             ParameterError: if the route is empty, or there is no planner for that stride.
         """
         self._planners.reset()
+        self._rest.stand_on(self.parameters)
         self.reports.clear()
         self.arrived = False
         goal = self.first_goal()
@@ -126,39 +120,17 @@ class StridePlanning(PlannedPath):
             The node that the stride begins in.
         """
         z = section.of(sensed.state)
-        begin = time.perf_counter()
-        if self.reports:
-            last = self.reports[-1]
-            self._planners.of(last.goal).observe(last.decision, z)
-        goal = self.route.next(section, z, now)
-        if goal is None:
-            # The last stride goes on until whoever drives the robot ends the run.
-            self.arrived, goal = True, self.reports[-1].goal
+        report, start, goes_on = self._planners.decide(section, z, now, learnt, self.reports)
+        self.arrived = self.arrived or not goes_on
         self._broken = False
-        self._excess = float(z[0] - goal.target[0])
-        decision, start = self._planners.plan(section, z, goal)
-        seconds = time.perf_counter() - begin
-        node = self.automaton.start(goal.stride)
-        end = section_of(self.automaton.sections(node.name)[1])
-        offset = self._planners.of(goal).offset
-        self.reports.append(
-            SectionReport(
-                time=now,
-                section=section,
-                state=section.padded(z),
-                goal=goal,
-                target=end.padded(goal.target),
-                decision=decision,
-                offset=check("the planner's offset", offset, Triple).copy(),
-                learnt=learnt,
-                plan_seconds=seconds,
-            )
-        )
+        self._excess = float(z[0] - report.goal.target[0])
+        self.reports.append(report)
+        node = self.automaton.start(report.goal.stride)
         state = sensed.state.copy()
         if start is not z:
             state[:4] = section.state(start, state[0])
         node = self._follow(node, state, sensed, now)
-        if not decision.lasting and not self.arrived:
+        if not report.decision.lasting and not self.arrived:
             return self._break(node, sensed, 0.0, now)
         return node
 
@@ -201,17 +173,41 @@ class StridePlanning(PlannedPath):
             sensed: the robot's state.
             now: time [s].
         """
-        report, planner = self.reports[-1], self.planner
-        if isinstance(planner, LandingPlanner):
-            self._choose_again(planner, node, sensed)
-        else:
-            start = self.automaton.start(report.goal.stride)
-            z = self._rest.back_to_section(start, report, sensed)
-            if z is not None:
-                angle = flown_angle(sensed, self.parameters)
-                decision = planner.decide(z, report.goal.target, (angle, angle))
-                self.reports[-1] = replace(report, decision=decision)
+        self._hold(choosing_again.landed(self._rest, node, sensed, self.reports[-1]))
         self.follow(node, sensed, now)
+
+    def _hold(self, decision: Decision | None) -> None:
+        """From now on this decision holds, if it is one."""
+        if decision is not None:
+            self.reports[-1] = replace(self.reports[-1], decision=decision)
+
+    def on_slope(self, slope: float) -> float:
+        """Plan for another slope from now on.
+
+        Args:
+            slope: angle of the ground [rad].
+
+        Returns:
+            The slope that is planned for: 0 by a planner that knows none, or no gait there.
+        """
+        planner, report, ground = self.planner, self.reports[-1], self.parameters
+        if isinstance(planner, SlopePlanner):
+            ground = planner.on_slope(slope)
+        if self._rest.stand_on(ground):
+            self._hold(replace(report.decision, nominal=False))
+        return ground.slope
+
+    @property
+    def assist(self) -> float:
+        """What the template's legs add in double stance [m/s^2]."""
+        return self._rest.ground.assist
+
+    def steady(self, node: Node, sensed: Sensed) -> None:
+        """Choose the assist of a double stance that begins on ground that was not expected.
+
+        Arguments as for :meth:`follow`.
+        """
+        steady(self._rest, node, sensed, self.reports[-1], self.options.ground.assist)
 
     def land_off(self, node: Node, sensed: Sensed, now: float, height: float) -> Node:
         """A foot has landed where the ground may be higher or lower than it was thought.
@@ -225,27 +221,10 @@ class StridePlanning(PlannedPath):
         Returns:
             As :meth:`follow`.
         """
-        o, report = self.options.ground, self.reports[-1]
-        if abs(height) > o.height and node.name not in self.curved:
-            free = free_controls(self.automaton, node)
-            nominal, ahead = self.planner.gait.controls, self._rest.ahead(node, sensed)
-            target = report.target[: len(report.goal.target)]
-            # After a step up the end nearest to the gait is the best: three steps later the walk is
-            # back. The cheapest one goes on with a stride of half the speed.
-            planner = self.planner
-            lower = height < 0.0
-            price = planner.price if lower and isinstance(planner, PricingPlanner) else None
-            decision = choose_legs(ahead, report.decision, target, free, nominal, o, price)
-            self.reports[-1] = replace(report, decision=decision)
+        if abs(height) > self.options.ground.height and node.name not in self.curved:
+            rest, report = self._rest, self.reports[-1]
+            self._hold(choosing_again.landed_off(rest, node, sensed, report, height))
         return self.follow(node, sensed, now)
-
-    def _choose_again(self, planner: LandingPlanner, node: Node, sensed: Sensed) -> None:
-        """Let the planner choose the stiffnesses that the rest of the stride depends on."""
-        report = self.reports[-1]
-        free = free_controls(self.automaton, node)
-        ahead = self._rest.ahead(node, sensed)
-        decision = planner.land(ahead, report.decision, report.goal.target, free)
-        self.reports[-1] = replace(report, decision=decision)
 
     def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Break into another stride where the present one cannot go on.
@@ -256,8 +235,8 @@ class StridePlanning(PlannedPath):
             The node that the robot is in then, with the path from there; ``node`` where the route
             knows no other stride, or the template does not complete it.
         """
-        gap = self._excess, self._turn(phase_time)
-        found = find_break(self._rest, node, self.reports[-1], sensed, gap)
+        turn = reachable_turn(self.options, self.due(Event.TOUCHDOWN) - phase_time)
+        found = find_break(self._rest, node, self.reports[-1], sensed, (self._excess, turn))
         if found is None or not isinstance(self.route, BreakingRoute):
             return node
         self.reports[-1] = found.report
@@ -265,11 +244,6 @@ class StridePlanning(PlannedPath):
         self.route.take(found.goal)
         self.follow(found.node, sensed, now)
         return found.node
-
-    def _turn(self, phase_time: float) -> float:
-        """How far the swing foot can still change the touchdown angle [rad]."""
-        left = max(self.due(Event.TOUCHDOWN) - phase_time, 0.0)
-        return self.options.agility * min(left, self.options.foresight) ** 2
 
     def overdue(self, node: Node, phase_time: float) -> bool:
         """Whether the swing foot should have found the ground by now.
@@ -320,23 +294,20 @@ class StridePlanning(PlannedPath):
         Returns:
             The node that the robot is in then.
         """
-        report, planner = self.reports[-1], self.planner
+        rest, report = self._rest, self.reports[-1]
         if self._broken:
             other = self._break(node, sensed, phase_time, now)
             if self._planned_at < now:
                 self.follow(node, sensed, now)
             return other
         lasting = True
-        starts = node.name == self.automaton.starts[report.goal.stride]
-        if starts and node.name not in self.curved:
-            z = self._rest.back_to_section(node, report, sensed)
-            if z is not None:
-                change = self._turn(phase_time)
-                angle = float(report.decision.controls[Slot.TOUCHDOWN_ANGLE])
-                decision = planner.decide(z, report.goal.target, (angle - change, angle + change))
-                self.reports[-1] = replace(report, decision=decision)
-                lasting = decision.lasting
-        elif isinstance(planner, LandingPlanner):
-            self._choose_again(planner, node, sensed)
+        if node.name != self.automaton.starts[report.goal.stride] or node.name in self.curved:
+            self._hold(choosing_again.stiffnesses(rest, node, sensed, report))
+        else:
+            to_go = self.due(Event.TOUCHDOWN) - phase_time
+            angles = reachable_angles(rest, node, sensed, report, to_go)
+            decision = choosing_again.all_controls(rest, node, sensed, report, angles)
+            self._hold(decision)
+            lasting = decision is None or decision.lasting
         node = self.follow(node, sensed, now)
         return node if lasting and self._whole else self._break(node, sensed, 0.0, now)

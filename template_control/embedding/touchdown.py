@@ -22,6 +22,25 @@ def free_controls(automaton: Automaton, node: Node) -> list[int]:
     return sorted({int(k) for n in later for k in (n.rear, n.front) if k is not None})
 
 
+def angle_later(sensed: Sensed, parameters: SlipParameters, stiffness: float, time: float) -> float:
+    """Touchdown angle of a front leg that comes to l0 some time from now [rad].
+
+    The height then comes from its Taylor series to the second order.
+
+    Args:
+        sensed: the robot in single stance.
+        parameters: the template.
+        stiffness: of the leg that stands [N/m].
+        time: from now [s].
+    """
+    x, y, _, dy = sensed.state.tolist()
+    length = parameters.rest_length
+    stretch = length / float(np.hypot(x - sensed.toes[0], y)) - 1.0
+    lift = stiffness * stretch * y / parameters.mass - parameters.gravity
+    later = y + time * (dy + 0.5 * time * lift)
+    return float(np.arcsin(min(max(later / length, 0.0), 1.0)))
+
+
 def flown_angle(sensed: Sensed, parameters: SlipParameters) -> float:
     """Angle of the template's leg as it comes to l0 on the ballistic path through the robot [rad].
 

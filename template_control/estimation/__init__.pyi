@@ -1,6 +1,10 @@
 from .base_filter import BaseFilterOptions as BaseFilterOptions
+from .delay import DelayCompensation as DelayCompensation
+from .delay import DelayOptions as DelayOptions
 from .estimator import EstimatorOptions as EstimatorOptions
 from .estimator import StateEstimator as StateEstimator
 from .imu import ImuOptions as ImuOptions
 from .joint_filter import JointFilterOptions as JointFilterOptions
+from .noise_filter import NoiseFilter as NoiseFilter
+from .noise_filter import NoiseFilterOptions as NoiseFilterOptions
 from .readings import Readings as Readings

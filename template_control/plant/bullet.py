@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any, ClassVar
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +13,9 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
+from template_control.plant.bullet_bodies import ground_bodies, load_body
 from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import silenced
-from template_control.plant.terrain.pieces import pieces
 from template_control.plant.terrain.terrain import Terrain
 from template_control.robot.biped import Biped
 from template_control.robot.requirements import BASE_DOF
@@ -29,59 +26,9 @@ with silenced():  # PyBullet announces its build time on standard output or stde
 
 Array = NDArray[np.float64]
 
-# By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
-_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
 _CLOSE = 1e-6  # of the robot's mass
 AXES = {2: [0, 2], 3: [0, 1, 2]}
 """Of a force's components, by how many there are."""
-
-
-def load_body(robot: Biped, client: int, held: bool = True) -> int:
-    """Body of a robot's URDF; PyBullet only reads files.
-
-    Args:
-        robot: whose URDF.
-        client: PyBullet's handle of the world.
-        held: whether the root link is fixed to the world.
-
-    Raises:
-        RobotError: if PyBullet does not read it.
-    """
-    tree = ElementTree.fromstring(robot.urdf)
-    for link in tree.findall("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)  # which PyBullet would read all the same
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "robot.urdf"
-        path.write_bytes(ElementTree.tostring(tree, encoding="utf-8"))
-        try:
-            body = pybullet.loadURDF(
-                str(path), useFixedBase=held, flags=_FLAGS, physicsClientId=client
-            )
-        except pybullet.error as error:
-            raise RobotError(f"PyBullet does not read {robot.path} ({error}): change it") from None
-    return int(body)
-
-
-def _ground_bodies(terrain: Terrain, client: int) -> dict[int, float | None]:
-    """The ground's bodies, and the friction of each; None: that of the options."""
-    p = pybullet
-
-    def body(shape: int, position: tuple[float, float, float], pitch: float = 0.0) -> int:
-        turn = p.getQuaternionFromEuler((0.0, pitch, 0.0))
-        made = p.createMultiBody(
-            0, shape, basePosition=position, baseOrientation=turn, physicsClientId=client
-        )
-        return int(made)
-
-    height, stand_out = pieces(terrain)
-    plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client)
-    found: dict[int, float | None] = {body(plane, (0.0, 0.0, height)): None}
-    for piece in stand_out:
-        sides = piece.half_sides
-        box = p.createCollisionShape(p.GEOM_BOX, halfExtents=sides, physicsClientId=client)
-        found[body(box, piece.centre, piece.pitch)] = piece.friction
-    return found
 
 
 @dataclass(frozen=True)
@@ -151,7 +98,7 @@ class BulletPlant:
         p, c = pybullet, self.client
         p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
         p.setTimeStep(options.time_step, physicsClientId=c)
-        self._ground = _ground_bodies(options.ground, c)
+        self._ground = ground_bodies(options.ground, c)
         try:
             self.body = self._load()
             info = self._info()

@@ -41,6 +41,7 @@ class Biped(ABC):
         joint_names: actuated joints, in the order of the last entries of q and v.
         torque_limit: (nu,) URDF ``effort`` [N m].
         velocity_limit: (nu,) URDF ``velocity`` [rad/s].
+        joint_range: (nu, 2) URDF ``lower`` and ``upper`` [rad].
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
         leg_length: from hip to the foot sphere's centre with a straight knee [m].
         leg_mass: of the heavier leg [kg].
@@ -60,7 +61,7 @@ class Biped(ABC):
         foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
         foot_bias: (2, 2) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
         contact_velocity, contact_jacobian, contact_bias: of each foot in all ``directions``.
-        joint_velocity: (nu,) of the actuated joints [rad/s].
+        joint_angle, joint_velocity: (nu,) of the actuated joints [rad, rad/s].
         fastest: the largest share of its limit that a joint's speed has.
     """
 
@@ -81,6 +82,7 @@ class Biped(ABC):
     joint_names: tuple[str, ...]
     torque_limit: Array
     velocity_limit: Array
+    joint_range: Array
     legs: tuple[tuple[int, ...], ...]
     leg_length: float
     leg_mass: float
@@ -101,6 +103,7 @@ class Biped(ABC):
     contact_velocity: Array
     contact_jacobian: Array
     contact_bias: Array
+    joint_angle: Array
     joint_velocity: Array
     fastest: float
 
@@ -122,6 +125,10 @@ class Biped(ABC):
         self.joint_names = tuple(model.names)[first:]
         self.torque_limit = np.array(model.effortLimit[self.base_dof :])
         self.velocity_limit = np.array(model.velocityLimit[self.base_dof :])
+        nu = len(self.joint_names)
+        limits = (model.lowerPositionLimit, model.upperPositionLimit)
+        self.joint_range = np.column_stack(limits)[-nu:]
+        self.joint_angle = np.zeros(nu)
         self._foot_ids = tuple(model.getFrameId(foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
@@ -150,6 +157,7 @@ class Biped(ABC):
             the world's axes [m/s^2, rad/s^2].
         """
         model, data = self.model, self._data
+        self.joint_angle[:] = q[-len(self.joint_angle) :]
         pin.computeAllTerms(model, data, q, v)
         pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
         left, right = self._foot_ids

@@ -8,6 +8,7 @@ joint order; all hinges are revolute, so nq = nv.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import cos, sin
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -170,6 +171,14 @@ class PlanarBiped(Biped):
         )
         self._check_finite(finite, q, v)
         np.matmul(self.foot_jacobian, v, out=self.foot_velocity)
+
+    def turn_gravity(self, angle: float) -> None:
+        """Let the model stand in axes that are turned with a slope.
+
+        Args:
+            angle: of the axes' x over the horizontal [rad].
+        """
+        self.model.gravity.linear = self.gravity * np.array([-sin(angle), 0.0, -cos(angle)])
 
     def neutral(self) -> Array:
         """See :meth:`~.biped.Biped.neutral`."""

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
+from math import radians
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -14,7 +15,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index
 from template_control.embedding.planners.running import RunningOptions
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
-from template_control.errors import SweepError
+from template_control.errors import ParameterError, SweepError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.plant.mujoco import MujocoOptions
@@ -50,7 +51,8 @@ class Conditions(Checked):
         seed: of the whole campaign; a trial's own follows from it and the trial's number.
 
     Raises:
-        ParameterError: if a value is of a wrong type or out of its range.
+        ParameterError: if a value is of a wrong type or out of its range, or a planar robot is to
+            be pushed aside.
     """
 
     robot: RobotChoice = field(default_factory=RobotChoice)
@@ -58,6 +60,14 @@ class Conditions(Checked):
     plant: Literal["pybullet", "mujoco"] = "pybullet"
     mix: Mix = field(default_factory=Mix)
     seed: Index = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.robot.free and self.mix.direction != Mix().direction:
+            raise ParameterError(
+                f"Mix.direction is {list(self.mix.direction)}, and {self.robot.model} is held in"
+                " its plane: leave it out, or take a free robot"
+            )
 
     def draw(self, number: Index) -> Draw:
         """What disturbs a trial.
@@ -89,7 +99,8 @@ class Conditions(Checked):
         z = [*gait.state, 0.0][:3]
         step, phase = divmod(draw.push_at, 1.0)
         impulse = draw.push * impulse_unit(gait.parameters)
-        push = Push(impulse, int(step), phase, PUSH_SECONDS * scale.time)
+        seconds, direction = PUSH_SECONDS * scale.time, radians(draw.direction)
+        push = Push(impulse, int(step), phase, seconds, direction)
         delay = round(draw.delay * scale.time / plant.time_step) * plant.time_step
         simulation = SimulationOptions(
             steps=self.mix.steps,

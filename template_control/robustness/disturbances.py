@@ -7,23 +7,17 @@ weaker motors, which is what its torque limits are for.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from itertools import pairwise
-
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.planner import Planner
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
-from template_control.robot.biped import Biped
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.robustness.disturbance import Disturbance, Situation, Unit
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.sensing import SensorOptions
-from template_control.run.simulation import perturbed_start, simulate
-from template_control.slip.gaits.gait import WalkingGait
-from template_control.slip.gaits.running_gait import RunningGait
+from template_control.run.simulation import perturbed_start
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale
 
@@ -33,113 +27,16 @@ BEGIN = 10
 AFTER = 20
 """Steps a robot must go on after it, or with a lasting one from the start."""
 
+PHASES = 10
+"""Of the step in which a push begins: as many trials."""
+
 _SOON = 4  # steps of a robot that starts off its gait before a step of the ground comes
-_PHASES = 10  # of the step in which a push begins
 _EDGES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the way between two footholds
 _STARTS = 5  # seeds of the starts off the gait
 PUSH_SECONDS = 0.1
 """How long a push lasts on the reference template."""
 
 _TIME_STEP = PlantOptions().time_step
-
-
-@dataclass(frozen=True)
-class Situation:
-    """Where a disturbance meets the robot.
-
-    Attributes:
-        robot: the model; its last update is overwritten.
-        gait: the gait that is kept.
-        planner: that keeps it.
-    """
-
-    robot: Biped
-    gait: WalkingGait | RunningGait
-    planner: Planner
-
-    @property
-    def scale(self) -> Scale:
-        """Units of the gait's template."""
-        return Scale.of(self.gait.parameters)
-
-    def footholds(self, start: tuple[float, float, float], steps: int) -> NDArray[np.float64]:
-        """Where the robot treads in each step when nothing disturbs it.
-
-        Args:
-            start: (3,) dx/dt, y, dy/dt at the gait's section [m/s, m, m/s].
-            steps: how many.
-
-        Returns:
-            (n,) x of the footholds [m], the last step's last; the gait's own if the robot falls,
-            as it will then fall with the disturbance as well.
-        """
-        record = simulate(self.robot, self.planner, SimulationOptions(steps=steps, start=start))
-        if record.fell:
-            return self.gait.step_length * np.arange(steps + 1.0)
-        # The last section may round to just after the last sample.
-        at = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
-        # Before the first tick the ground has not pressed yet.
-        if np.all(record.contact_force[at[1:]].any(axis=(1, 2))):
-            return np.asarray(record.foot[at, record.rear[at], 0])
-        # No foot stands at an apex: that which bore most in between.
-        load = record.contact_force[:, :, 1]
-        strides = [slice(a, b) for a, b in pairwise(at)]
-        most = [np.unravel_index(np.argmax(load[s]), load[s].shape) for s in strides]
-        holds = [record.foot[s][i, foot, 0] for s, (i, foot) in zip(strides, most, strict=True)]
-        return np.array(holds)
-
-
-@dataclass(frozen=True)
-class Unit:
-    """The unit that levels are shown in.
-
-    Attributes:
-        name: stands after the number; "" for a coefficient.
-        factor: one SI unit in this unit; negative where a level is a share taken away.
-    """
-
-    name: str
-    factor: float = 1.0
-
-
-@dataclass(frozen=True)
-class Disturbance:
-    """One kind of disturbance.
-
-    Attributes:
-        name: on the command line.
-        title: in tables and figures.
-        unit: that levels are shown in.
-        levels: for the reference template [SI], from mild to severe.
-        trials: number of trials at each level.
-        size: factor from the reference template's levels to a template's.
-        options: of the run at a level [SI] and a trial's index.
-        passing: whether it comes only once: the robot must then be back on its gait at the end.
-            Otherwise it lasts from the start, and the robot must only go on.
-        grain: levels are whole multiples of it, at least one; 0 for any levels [SI].
-    """
-
-    name: str
-    title: str
-    unit: Unit
-    levels: tuple[float, ...]
-    trials: int
-    size: Callable[[SlipParameters], float]
-    options: Callable[[Situation, float, int], SimulationOptions]
-    passing: bool = False
-    grain: float = 0.0
-
-    def levels_for(self, parameters: SlipParameters) -> list[float]:
-        """The levels for a template [SI]."""
-        levels = [self.size(parameters) * level for level in self.levels]
-        if self.grain:
-            grains = (max(1, round(level / self.grain)) for level in levels)
-            levels = [self.grain * n for n in dict.fromkeys(grains)]
-        return levels
-
-    def shown(self, level: float) -> str:
-        """A level with its unit."""
-        return f"{self.unit.factor * level:.3g} {self.unit.name}".strip()
 
 
 def _plain(_: SlipParameters) -> float:
@@ -163,13 +60,21 @@ def impulse_unit(parameters: SlipParameters) -> float:
     return parameters.mass / REFERENCE.mass * Scale.of(parameters).speed
 
 
-def _pushed(where: Situation, level: float, trial: int) -> SimulationOptions:
-    push = Push(level, BEGIN, trial / _PHASES, PUSH_SECONDS * where.scale.time)
+def pushed(where: Situation, level: float, trial: int, direction: float = 0.0) -> SimulationOptions:
+    """A run with a push.
+
+    Args:
+        where: whom it meets.
+        level: its impulse [N s].
+        trial: which phase of the step it comes in.
+        direction: of a free robot, from forward to the left [rad].
+    """
+    push = Push(level, BEGIN, trial / PHASES, PUSH_SECONDS * where.scale.time, direction)
     return SimulationOptions(steps=BEGIN + 1 + AFTER, pushes=(push,))
 
 
 def _pushed_back(where: Situation, level: float, trial: int) -> SimulationOptions:
-    return _pushed(where, -level, trial)
+    return pushed(where, -level, trial)
 
 
 def _stepped(where: Situation, level: float, trial: int) -> SimulationOptions:
@@ -211,7 +116,8 @@ def _other_mass(where: Situation, level: float, trial: int) -> SimulationOptions
 
 
 def _weak(where: Situation, level: float, trial: int) -> SimulationOptions:
-    return _lasting(where, trial, embedding=EmbeddingOptions(torque_scale=level))
+    tuning = FreeOptions if isinstance(where.robot, FreeBiped) else EmbeddingOptions
+    return _lasting(where, trial, embedding=tuning(torque_scale=level))
 
 
 def _noisy(where: Situation, level: float, trial: int) -> SimulationOptions:
@@ -227,10 +133,14 @@ def _ladder(step: float, count: int, start: float = 0.0) -> tuple[float, ...]:
     return tuple(float(x) for x in np.round(start + step * np.arange(1, count + 1), 10))
 
 
-_PUSHES = _ladder(5.0, 30)
+PUSHES = _ladder(5.0, 30)
+"""Impulses of pushes on the reference template [N s]."""
+
+NEWTON_SECONDS = Unit("N s")
+
 _HEIGHTS = (0.005, *_ladder(0.01, 8))
 
-_NEWTON_SECONDS, _CENTIMETRES = Unit("N s"), Unit("cm", 100.0)
+_CENTIMETRES = Unit("cm", 100.0)
 _PER_CENT, _PER_CENT_LESS = Unit("%", 100.0), Unit("%", -100.0)
 
 # Name, title, unit, levels, trials, size, options.
@@ -238,19 +148,19 @@ DISTURBANCES: tuple[Disturbance, ...] = (
     Disturbance(
         "push-forward",
         "push forward",
-        _NEWTON_SECONDS,
-        _PUSHES,
-        _PHASES,
+        NEWTON_SECONDS,
+        PUSHES,
+        PHASES,
         impulse_unit,
-        _pushed,
+        pushed,
         passing=True,
     ),
     Disturbance(
         "push-backward",
         "push backward",
-        _NEWTON_SECONDS,
-        _PUSHES,
-        _PHASES,
+        NEWTON_SECONDS,
+        PUSHES,
+        PHASES,
         impulse_unit,
         _pushed_back,
         passing=True,

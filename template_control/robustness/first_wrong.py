@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.run.kinds.free_record import FreeRecord
 from template_control.run.record import Record
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
@@ -24,9 +25,9 @@ def first_wrong(record: Record) -> str:
     """The first of these that happened in the four strides before a fall.
 
     ``failed QP``; ``torque limit``: a joint is at its limit for 20 ms on end; ``slip``: a loaded
-    foot slides by 2 % of l0; ``stumble``: a foot is pressed backwards by more than friction can;
-    ``reach``: a loaded leg is straight; ``late``: no section for 1.3 step durations. Times are
-    those of the reference template.
+    foot slides by 2 % of l0, of a free robot in any direction; ``stumble``: a foot is pressed
+    backwards by more than friction can; ``reach``: a loaded leg is straight; ``late``: no section
+    for 1.3 step durations. Times are those of the reference template.
 
     Args:
         record: a run that fell, every sample kept.
@@ -70,8 +71,12 @@ def _limited(record: Record) -> NDArray[np.bool_]:
 def _slipped(record: Record) -> NDArray[np.bool_]:
     wrong = np.zeros(len(record.time), dtype=bool)
     for foot, bears in enumerate(_bears(record).T):
-        x = record.foot[:, foot, 0]
-        wrong |= bears & (np.abs(x - _at_begin(x, bears)) > _SLIP * _template(record).rest_length)
+        if isinstance(record, FreeRecord):
+            place = record.space_foot[:, foot, :2]
+        else:
+            place = record.foot[:, foot, :1]
+        slid = np.linalg.norm([x - _at_begin(x, bears) for x in place.T], axis=0)
+        wrong |= bears & (slid > _SLIP * _template(record).rest_length)
     return wrong
 
 

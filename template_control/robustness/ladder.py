@@ -9,22 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from template_control import settings
 from template_control.checks.checked import checked
 from template_control.embedding.planners.running import RunningOptions
 from template_control.errors import ParameterError, RobotError, SweepError
-from template_control.robustness.disturbances import (
-    AFTER,
-    BEGIN,
-    DISTURBANCES,
-    Disturbance,
-    Situation,
-)
+from template_control.robustness.aside import ALL
+from template_control.robustness.disturbance import Disturbance, Situation
+from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES
+from template_control.robustness.findings import Finding, Level, Robustness
 from template_control.robustness.fingerprint import fingerprint
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
@@ -32,104 +30,15 @@ from template_control.run.config import RunConfig
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
-from template_control.slip.gaits.gait import Gait, WalkingGait
-from template_control.slip.gaits.running_gait import RunningGait
+from template_control.slip.gaits.gait import Gait
 from template_control.sweep.sweep import Item, SweepOptions, sweep
 
 SETTLED = 0.02
 """How near to the gait's mean speed and height at its section a robot must be to be back on it."""
 
 _LAST = 5  # steps these are averaged over
-_HALF = 0.5
 _QUICK_LEVELS, _QUICK_TRIALS = 2, 2
-_BY_NAME = {d.name: d for d in DISTURBANCES}
-
-
-@dataclass(frozen=True)
-class Level:
-    """What came of one disturbance at one level.
-
-    Attributes:
-        level: the disturbance's size for this robot [SI].
-        succeeded, fell, astray: how many trials; astray is on its feet but not on its gait.
-    """
-
-    level: float
-    succeeded: int
-    fell: int
-    astray: int
-
-    @property
-    def rate(self) -> float:
-        """Share of the trials that succeeded."""
-        return self.succeeded / (self.succeeded + self.fell + self.astray)
-
-    @property
-    def standing(self) -> float:
-        """Share of the trials without a fall."""
-        return 1.0 - self.fell / (self.succeeded + self.fell + self.astray)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What one disturbance does to a robot.
-
-    Attributes:
-        disturbance: the one that was raised.
-        levels: those tried, from mild to severe.
-    """
-
-    disturbance: Disturbance
-    levels: tuple[Level, ...] = ()
-
-    @property
-    def breaking_point(self) -> float | None:
-        """The severest level up to which every trial of each level succeeds, or None."""
-        return _last(self.levels, [level.rate >= 1.0 for level in self.levels])
-
-    @property
-    def half_point(self) -> float | None:
-        """The severest level up to which at least half of each level's trials succeed, or None."""
-        return _last(self.levels, [level.rate >= _HALF for level in self.levels])
-
-    @property
-    def standing_point(self) -> float | None:
-        """The severest level up to which no trial falls, or None."""
-        return _last(self.levels, [level.fell == 0 for level in self.levels])
-
-    @property
-    def broken(self) -> bool:
-        """Whether the disturbance need not be raised further.
-
-        All trials of the last level fell, or more than half of the trials at each of the last two.
-        """
-        rates = [level.standing for level in self.levels]
-        twice = len(rates) > 1 and max(rates[-2:]) < _HALF
-        return bool(rates) and (rates[-1] == 0.0 or twice)
-
-
-def _last(levels: Sequence[Level], good: Sequence[bool]) -> float | None:
-    """The level before the first that is not good; None where that is the first."""
-    count = next((i for i, fine in enumerate(good) if not fine), len(good))
-    return levels[count - 1].level if count else None
-
-
-@dataclass(frozen=True)
-class Robustness:
-    """Findings for a robot.
-
-    Attributes:
-        robot: its name.
-        gait: that it kept.
-        speed_error, height_error: undisturbed, relative, as trials are judged.
-        findings: one a disturbance.
-    """
-
-    robot: str
-    gait: WalkingGait | RunningGait
-    speed_error: float
-    height_error: float
-    findings: tuple[Finding, ...]
+_BY_NAME = {d.name: d for d in ALL}
 
 
 def off_gait(record: Record, gait: Gait) -> tuple[float, float]:
@@ -150,11 +59,10 @@ def off_gait(record: Record, gait: Gait) -> tuple[float, float]:
     return float(speed / pace - 1.0), float(height / gait.state[1] - 1.0)
 
 
-def _situation(robot: str, speed: float | None) -> Situation:
-    """The robot and its gait: a walk, or a run with ``speed`` at apex [m/s]."""
-    choice = RobotChoice(robot)
-    if speed is None:
-        config = RunConfig(choice)
+def _situation(choice: RobotChoice, speed: float | None) -> Situation:
+    """The robot and its gait: a walk, of a free robot at ``speed``, or a run with it at apex."""
+    if speed is None or choice.free:
+        config = RunConfig(choice, GaitChoice(speed=speed))
     else:
         config = RunConfig(choice, GaitChoice("run", speed), RunningOptions())
     ready = config.prepare()
@@ -163,21 +71,26 @@ def _situation(robot: str, speed: float | None) -> Situation:
 
 @checked
 def trial(
-    robot: str, disturbance: str, level: float, number: int, speed: float | None = None
+    robot: str | dict[str, Any],
+    disturbance: str,
+    level: float,
+    number: int,
+    speed: float | None = None,
 ) -> dict[str, Any]:
     """One walk or run under one disturbance, as a sweep's worker runs it.
 
     Args:
-        robot: name or URDF path.
+        robot: name or URDF path; or a :class:`RobotChoice` as a table.
         disturbance: name of the disturbance.
         level: the disturbance's size for this robot [SI].
         number: of the trial, from 0; trials of a level differ by it.
-        speed: of a run, dx/dt at apex [m/s]; None: the robot walks.
+        speed: as for :func:`measure`.
 
     Returns:
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
     """
-    where = _situation(robot, speed)
+    choice = RobotChoice(robot) if isinstance(robot, str) else _choice(robot)
+    where = _situation(choice, speed)
     options = _BY_NAME[disturbance].options(where, level, number)
     record = simulate(where.robot, where.planner, options)
     errors = (None, None) if record.fell else off_gait(record, where.gait)
@@ -190,9 +103,13 @@ def trial(
     }
 
 
+def _choice(table: dict[str, Any]) -> RobotChoice:
+    return settings.from_table(RobotChoice, table)
+
+
 @checked
 def measure(
-    robot: str,
+    robot: str | RobotChoice,
     names: Sequence[str] | None = None,
     folder: Path | None = None,
     executor: Executor | None = None,
@@ -203,39 +120,43 @@ def measure(
     """Raise disturbances until the robot's walk or run breaks.
 
     Args:
-        robot: name or URDF path.
-        names: of the disturbances; None for all.
+        robot: name or URDF path, or which one.
+        names: of the disturbances; None for all that it can have.
         folder: for the trials' results, from which the same call goes on; None keeps them in
             memory. They are those of this code and this URDF: after a change of either all
             trials are run again.
         executor: where to run the trials; None for one process a core.
         quick: two levels of two trials each, to see that everything works.
         progress: show a bar a level on stderr.
-        speed: of a run, dx/dt at apex [m/s]; None: the robot walks.
+        speed: of a run, dx/dt at apex [m/s]; of a free robot, which walks, its mean speed. None:
+            the robot walks its own gait.
 
     Raises:
-        ParameterError: if there is no such disturbance.
+        ParameterError: if there is no such disturbance, or a planar robot cannot have it.
         RobotError: if there is no such robot or it falls without a disturbance.
         GaitError: if no run has this speed.
         SweepError: if a trial fails for another reason than a fall, or files do not fit.
     """
-    wanted = set(_BY_NAME if names is None else names)
-    if not wanted or not wanted <= set(_BY_NAME):
-        raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(_BY_NAME)}")
-    where = _situation(robot, speed)
+    choice = RobotChoice(robot) if isinstance(robot, str) else robot
+    known = {d.name: d for d in (ALL if choice.free else DISTURBANCES)}
+    wanted = set(known if names is None else names)
+    if not wanted or not wanted <= set(known):
+        raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(known)}")
+    where = _situation(choice, speed)
     model, gait = where.robot, where.gait
-    undisturbed = _undisturbed(robot, where)
-    chosen = [_shortened(d, quick) for d in DISTURBANCES if d.name in wanted]
+    undisturbed = _undisturbed(choice.model, where)
+    chosen = [_shortened(d, quick) for name, d in known.items() if name in wanted]
     levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
+    called = choice.model if choice == RobotChoice(choice.model) else settings.to_table(choice)
     moving: Item = {} if speed is None else {"speed": speed}
     trials = [(d.name, d.levels, d.trials) for d in chosen]
-    stem = fingerprint(model, trials, moving)
+    stem = fingerprint(model, trials, moving, choice.free)
     found = {d.name: Finding(d) for d in chosen}
     for index in range(max(len(of) for of in levels.values())):
         going = [d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken]
         items: list[Item] = [
             {
-                "robot": robot,
+                "robot": called,
                 "disturbance": d.name,
                 "level": levels[d.name][index],
                 "number": i,

@@ -23,6 +23,7 @@ class Draw(Checked):
         friction: of the ground.
         mass: error of every link's.
         push: impulse on the trunk.
+        direction: of the push, to the left of forward [deg].
         push_at: when it begins, in steps from the start.
         ground_step: height of the step.
         ground_step_at: place of its edge, in step lengths from the start.
@@ -40,6 +41,7 @@ class Draw(Checked):
     ground_step_at: float = 0.0
     noise: float = 0.0
     delay: float = 0.0
+    direction: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ class Mix(Checked):
         ground_step: height of one step of the ground, up positive [m].
         noise: standard deviation of measured angles [rad]; see ``SensorOptions.of_size``.
         delay: from measurement to torque [s], rounded to physics steps.
+        direction: of the push, to the left of forward [deg]; only a free robot has other directions
+            than 0, and it is no part of a draw's severity.
         within: steps in which push and ground step come, anywhere in them.
         after: steps that follow.
 
@@ -73,6 +77,7 @@ class Mix(Checked):
     ground_step: Ends = (-0.02, 0.02)
     noise: tuple[NotNegative, NotNegative] = (5e-4, 5e-4)
     delay: tuple[NotNegative, NotNegative] = (0.0, 0.004)
+    direction: Ends = (0.0, 0.0)
     within: tuple[Index, Count] = (2, 6)
     after: Count = 20
 
@@ -104,6 +109,7 @@ class Mix(Checked):
         lot = np.random.default_rng(seed)
         drawn = {name: float(lot.uniform(*getattr(self, name))) for name in _DRAWN}
         at = lot.uniform(*self.within, 2)
+        drawn["direction"] = float(lot.uniform(*self.direction))
         return Draw(**drawn, push_at=float(at[0]), ground_step_at=float(at[1]))
 
     def times(self, factor: NotNegative) -> Mix:
@@ -119,7 +125,7 @@ class Mix(Checked):
         for name in _DRAWN:
             still = getattr(_STILL, name)
             ends[name] = tuple(still + factor * (end - still) for end in getattr(self, name))
-        return Mix(**ends, within=self.within, after=self.after)
+        return Mix(**ends, direction=self.direction, within=self.within, after=self.after)
 
     def severity(self, draw: Draw) -> float:
         """How severe a draw is for this mix: root mean square of its shares of the ranges.
@@ -139,6 +145,11 @@ class Mix(Checked):
                 shares.append(away / reach if away != 0.0 else 0.0)
         return float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
 
+
+FREE_MIX = Mix(
+    height=(-0.01, 0.01), push=(0.0, 10.0), ground_step=(-0.01, 0.01), direction=(-180.0, 180.0)
+)
+"""For a robot that nothing holds: pushes from all sides, half as strong, and half the heights."""
 
 _DRAWN = ("speed", "height", "friction", "mass", "push", "ground_step", "noise", "delay")
 _STILL = Draw()  # nothing disturbs

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from template_control.checks.fitting import shown
+from template_control.checks.words import shown
 from template_control.embedding.controller import EmbeddingController
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,9 @@ from template_control.whole_body.solver import Solution
 
 Array = NDArray[np.float64]
 
-_FIRST_CAPACITY = 4096
+_BLOCK = 1024  # ticks
+# Columns that no field of the record holds as they are.
+_OTHERWISE = ("node", "rear", "solved", "stands", "interval", "tick_seconds", "solve_seconds")
 
 
 class Truth(NamedTuple):
@@ -36,32 +37,62 @@ class Truth(NamedTuple):
     push: float
 
 
-class _Errors:
-    """Template less robot, over the ticks of one sort [m]."""
+class _Counted(NamedTuple):
+    """Statistics over some ticks.
 
-    def __init__(self) -> None:
-        self.ticks = 0
-        self._squares = [0.0, 0.0]
-        self._most = [0.0, 0.0]
+    Attributes:
+        torque, speed: (nu,) largest size of each joint's torque and speed [N m, rad/s].
+        torque_square: (nu,) sum of squares.
+        work: of all joints, taken without its sign [J].
+        saturated, failures: ticks with a torque at its limit, and without a solved QP.
+        ticks: (2,) in stance, in flight.
+        error: (2, 2) template less robot, in stance and in flight, x and y: largest [m].
+        error_square: (2, 2) sum of squares.
+    """
 
-    def add(self, x: float, y: float) -> None:
-        self.ticks += 1
-        for axis, error in enumerate((x, y)):
-            self._squares[axis] += error * error
-            self._most[axis] = max(self._most[axis], abs(error))
+    torque: Array
+    speed: Array
+    torque_square: Array
+    work: float
+    saturated: int
+    failures: int
+    ticks: NDArray[np.int64]
+    error: Array
+    error_square: Array
 
-    @property
-    def rms(self) -> dict[str, float]:
-        x, y = (sqrt(square / max(self.ticks, 1)) for square in self._squares)
-        return {"x": x, "y": y}
 
-    @property
-    def most(self) -> dict[str, float]:
-        return {"x": float(self._most[0]), "y": float(self._most[1])}
+def _count(block: dict[str, Array], speed: Array, torque_limit: Array) -> _Counted:
+    """Statistics over the rows of a block, whose columns are given by name."""
+    torque = block["torque"]
+    size = np.abs(torque)
+    errors, stands = block["template_com"] - block["com"], block["stands"][:, 0] > 0.0
+    sorts = errors[stands], errors[~stands]
+    return _Counted(
+        torque=size.max(axis=0, initial=0.0),
+        speed=np.abs(speed).max(axis=0, initial=0.0),
+        torque_square=(torque * torque).sum(axis=0),
+        work=float(np.abs(torque * speed).sum(axis=1) @ block["interval"][:, 0]),
+        saturated=int((size >= 0.999 * torque_limit).any(axis=1).sum()),
+        failures=int((block["solved"] == 0.0).sum()),
+        ticks=np.array([len(some) for some in sorts]),
+        error=np.array([np.abs(some).max(axis=0, initial=0.0) for some in sorts]),
+        error_square=np.array([(some * some).sum(axis=0) for some in sorts]),
+    )
+
+
+def _together(counted: list[_Counted]) -> _Counted:
+    """Statistics over all ticks of several blocks."""
+    fields = dict(zip(_Counted._fields, map(np.array, zip(*counted, strict=True)), strict=True))
+    largest = {name: fields.pop(name).max(axis=0) for name in ("torque", "speed", "error")}
+    sums = {name: values.sum(axis=0) for name, values in fields.items()}
+    return _Counted(**largest, **sums)
 
 
 class Recorder:
-    """Records a run in a table, one row for each sample, that grows by doubling.
+    """Records a run in blocks of rows, one row for each tick.
+
+    A tick only writes its row. Statistics, and the choice of the rows that are kept, wait until a
+    block is full or somebody asks.
 
     Args:
         controller: whose references and steps are recorded.
@@ -83,6 +114,10 @@ class Recorder:
             "rear": 1,
             "solved": 1,
             "push": 1,
+            "stands": 1,
+            "interval": 1,
+            "tick_seconds": 1,
+            "solve_seconds": 1,
             "q": robot.nq,
             "v": robot.nv,
             "torque": nu,
@@ -100,22 +135,17 @@ class Recorder:
         self._columns = {
             name: slice(int(a), int(b)) for name, a, b in zip(widths, starts, ends, strict=True)
         }
-        self._table = np.empty((_FIRST_CAPACITY, int(ends[-1])))
-        self._times = np.empty((_FIRST_CAPACITY, 2))
+        self._block = np.empty((_BLOCK, int(ends[-1])))
+        self._block_start = 0  # tick of the block
+        # By the block's first tick: closing it once more, after an interruption, changes nothing.
+        self._kept: dict[int, Array] = {}
+        self._clocks: dict[int, Array] = {}
+        self._counted: dict[int, _Counted] = {}
+        self._before = 0.0
         self._joint = np.zeros((nu, 2))
         self._swing = np.empty((2, 2))
         self._node_index = controller.planning.automaton.index
-        self.rows = 0
         self.ticks = 0
-        self.peak_torque = np.zeros(nu)
-        self.peak_speed = np.zeros(nu)
-        self._work = 0.0
-        self._before = 0.0
-        self._torque_square = np.zeros(nu)
-        self._errors = {"stance": _Errors(), "flight": _Errors()}
-        self._nearly = 0.999 * controller.qp.torque_limit
-        self.saturated = 0
-        self.failures = 0
 
     def tick(self, true: Truth, solution: Solution, seconds: float) -> None:
         """Record one tick.
@@ -127,77 +157,84 @@ class Recorder:
         """
         time, q, v, contact_force, push = true
         c, r = self.controller, self.controller.robot
-        torque = solution.torque
-        size = np.abs(torque)
-        np.maximum(self.peak_torque, size, out=self.peak_torque)
-        self._torque_square += torque * torque
-        speed = v[r.base_dof :]
-        np.maximum(self.peak_speed, np.abs(speed), out=self.peak_speed)
-        self._work += float(np.abs(torque * speed).sum()) * (time - self._before)
-        self._before = time
-        self.saturated += bool((size >= self._nearly).any())
-        self.failures += not solution.solved
         template_x, template_y = c.template_com
-        x, y = r.com.tolist()
-        self._errors["stance" if c.station.stance else "flight"].add(template_x - x, template_y - y)
-        if self.ticks == len(self._times):
-            self._times = np.concatenate((self._times, np.empty_like(self._times)))
-        self._times[self.ticks] = seconds, solution.solve_seconds
-        if self.ticks % self.every == 0:
-            if self.rows == len(self._table):
-                self._table = np.concatenate((self._table, np.empty_like(self._table)))
-            r.joint_positions(self._joint)
-            swing = self._swing
-            swing[:] = np.nan
-            for leg in c.station.control.swings:
-                swing[c.feet.of[leg]] = c.wanted.foot[c.feet.of[leg], :, 0]
-            row, numbers = self._table[self.rows], self._numbers
-            row[:numbers] = (
-                time,
-                r.angular_momentum,
-                template_x,
-                template_y,
-                c.reference[2],
-                c.reference[3],
-                self._node_index[c.node.name],
-                c.feet.of[Leg.REAR],
-                solution.solved,
-                push,
-            )
-            state = (q, v, torque, r.com, r.com_velocity, r.foot_position, self._joint)
-            forces = (contact_force, c.template_forces, swing)
-            np.concatenate((*state, *forces), axis=None, out=row[numbers:])
-            self.rows += 1
+        feet, station = c.feet.of, c.station
+        r.joint_positions(self._joint)
+        swing = self._swing
+        swing[:] = np.nan
+        for leg in station.control.swings:
+            swing[feet[leg]] = c.frame.world(c.wanted.foot[feet[leg], :, 0])
+        row, numbers = self._block[self.ticks - self._block_start], self._numbers
+        row[:numbers] = (
+            time,
+            r.angular_momentum,
+            template_x,
+            template_y,
+            *c.frame.outward(c.place.reference[2:4]),
+            self._node_index[c.node.name],
+            feet[Leg.REAR],
+            solution.solved,
+            push,
+            bool(station.stance),
+            time - self._before,
+            seconds,
+            solution.solve_seconds,
+        )
+        state = (q, v, solution.torque, r.com, r.com_velocity, r.foot_position, self._joint)
+        forces = (contact_force, c.frame.outward(c.place.forces), swing)
+        np.concatenate((*state, *forces), axis=None, out=row[numbers:])
+        self._before = time
         self.ticks += 1
+        if self.ticks - self._block_start == _BLOCK:
+            self._close_block()
+
+    def _close_block(self) -> None:
+        """Count the ticks of the block, keep its samples, and begin anew."""
+        first = self._block_start
+        block = self._block[: self.ticks - first]
+        named = {name: block[:, columns] for name, columns in self._columns.items()}
+        speed = named["v"][:, self.controller.robot.base_dof :]
+        self._counted[first] = _count(named, speed, self.controller.qp.torque_limit)
+        self._kept[first] = block[-first % self.every :: self.every].copy()
+        self._clocks[first] = np.hstack((named["tick_seconds"], named["solve_seconds"]))
+        self._block_start = self.ticks
 
     def summary(self) -> dict[str, Any]:
         """Statistics over all ticks, sampled or not."""
-        names = self.controller.robot.joint_names
-        rms = np.sqrt(self._torque_square / max(self.ticks, 1)).tolist()
-        limit = self.controller.qp.torque_limit
-        stance, flight = self._errors["stance"], self._errors["flight"]
+        self._close_block()
+        robot, limits = self.controller.robot, self.controller.qp.torque_limit
+        found = _together(list(self._counted.values()))
+        ticks = max(self.ticks, 1)
+        squares = found.error_square / np.maximum(found.ticks, 1)[:, None]
+        (stance, flight), most = np.sqrt(squares).tolist(), found.error[0].tolist()
+        rms = np.sqrt(found.torque_square / ticks).tolist()
+        torques = zip(found.torque.tolist(), rms, limits.tolist(), strict=True)
+        speeds = zip(found.speed.tolist(), robot.velocity_limit.tolist(), strict=True)
         return {
             "joint_torque": {
-                name: {"peak": float(p), "rms": t, "limit": float(lim)}
-                for name, p, t, lim in zip(names, self.peak_torque, rms, limit, strict=True)
+                name: dict(zip(("peak", "rms", "limit"), row, strict=True))
+                for name, row in zip(robot.joint_names, torques, strict=True)
             },
             "joint_speed": {
-                name: {"peak": float(p), "limit": float(lim)}
-                for name, p, lim in zip(
-                    names, self.peak_speed, self.controller.robot.velocity_limit, strict=True
-                )
+                name: dict(zip(("peak", "limit"), row, strict=True))
+                for name, row in zip(robot.joint_names, speeds, strict=True)
             },
-            "joint_work": self._work,
-            "saturated_share": self.saturated / max(self.ticks, 1),
-            "qp_failures": self.failures,
-            "com_error_rms": stance.rms,
-            "com_error_max": stance.most,
-            "com_error_flight_rms": flight.rms if flight.ticks else None,
+            "joint_work": float(found.work),
+            "saturated_share": float(found.saturated / ticks),
+            "qp_failures": int(found.failures),
+            "com_error_rms": dict(zip("xy", stance, strict=True)),
+            "com_error_max": dict(zip("xy", most, strict=True)),
+            "com_error_flight_rms": (
+                dict(zip("xy", flight, strict=True)) if found.ticks[1] else None
+            ),
         }
 
     def record(self, metadata: dict[str, Any]) -> Record:
         """The run so far."""
-        table = self._table[: self.rows]
+        self._close_block()
+        table, clocks = (
+            np.concatenate(list(parts.values())) for parts in (self._kept, self._clocks)
+        )
         data = {name: table[:, columns].copy() for name, columns in self._columns.items()}
         for name in ("time", "angular_momentum", "node", "rear", "solved", "push"):
             data[name] = data[name][:, 0]
@@ -206,7 +243,7 @@ class Recorder:
         reports = self.controller.reports
         sections, strides = self.section_names(), self.stride_names()
         return Record(
-            **{k: x for k, x in data.items() if k not in ("node", "rear", "solved")},
+            **{k: x for k, x in data.items() if k not in _OTHERWISE},
             node=data["node"].astype(np.int64),
             rear=data["rear"].astype(np.int64),
             solved=data["solved"].astype(bool),
@@ -223,8 +260,8 @@ class Recorder:
             section_feasible=np.array([r.decision.feasible for r in reports]),
             section_load=np.array([r.learnt.load for r in reports]),
             section_trim=np.array([r.learnt.trim for r in reports]),
-            tick_seconds=self._times[: self.ticks, 0].copy(),
-            solve_seconds=self._times[: self.ticks, 1].copy(),
+            tick_seconds=clocks[:, 0].copy(),
+            solve_seconds=clocks[:, 1].copy(),
             plan_seconds=np.array([r.plan_seconds for r in reports]),
             metadata={**metadata, "sections": sections, "strides": strides},
         )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative
+from template_control.estimation.delay import DelayCompensation
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import Scale
 
@@ -108,6 +109,31 @@ class Sensors:
 
     def expect(self, acceleration: Array) -> None:
         """Nothing is expected: each tick is measured for itself."""
+
+
+class ForeseeingSensors:
+    """Sensors that tell the state in which the torques of this tick will act.
+
+    Args:
+        sensors: which measure it.
+        delay: that is learnt.
+    """
+
+    def __init__(self, sensors: Sensors, delay: DelayCompensation) -> None:
+        self._sensors, self._delay = sensors, delay
+
+    @property
+    def exact(self) -> bool:
+        """See :class:`Senses`."""
+        return self._sensors.exact and self._delay.ticks == 0
+
+    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """See :meth:`Senses.measure`."""
+        return self._delay.foresee(*self._sensors.measure(q, v, contact))
+
+    def expect(self, acceleration: Array) -> None:
+        """See :meth:`Senses.expect`."""
+        self._delay.expect(acceleration)
 
 
 class TorqueDelay:

@@ -119,7 +119,7 @@ def simulate(
                 world = (plant, kind, senses)
                 reason = _loop(world, controller, recorder, o, (last, progress))
             except KeyboardInterrupt as error:
-                if not recorder.rows:
+                if not recorder.ticks:
                     raise
                 reason, stop = "", error
         seconds = time.perf_counter() - begin
@@ -215,8 +215,8 @@ def _loop(
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start
         senses.expect(solution.acceleration)
-        if not senses.exact:
-            robot.update(q, v)  # what is recorded is true
+        if not senses.exact or controller.frame.angle != 0.0:
+            robot.update(q, v)  # what is recorded is true, and in the world's axes
         if len(begun) < len(controller.reports):
             # A step that changes into another stride keeps its pushes where they were.
             begun.append((controller.reports[-1].time, controller.planner.gait.step_duration))

@@ -46,6 +46,7 @@ from .gaits.running_gait import RunningFamily as RunningFamily
 from .gaits.running_gait import RunningGait as RunningGait
 from .gaits.running_gait import running_gait as running_gait
 from .gaits.running_gait import running_speeds as running_speeds
+from .gaits.slope_gait import on_slope as on_slope
 from .gaits.stability import Kind as Kind
 from .gaits.stability import closed_loop_eigenvalues as closed_loop_eigenvalues
 from .gaits.walking_family import WalkingFamily as WalkingFamily

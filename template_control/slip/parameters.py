@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
+from math import cos, pi, sin, sqrt
+from typing import Annotated
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import Positive
+from template_control.checks.ranges import Positive, Range
+
+Slope = Annotated[float, Range(-0.25 * pi, 0.25 * pi)]
+"""Of ground that one walks on [rad]."""
 
 
 @dataclass(frozen=True)
@@ -18,15 +22,27 @@ class SlipParameters(Checked):
         gravity: gravitational acceleration g [m/s^2].
         rest_length: rest length l0 of either leg [m].
         leg_stiffness: nominal leg stiffness k0 [N/m].
+        slope: angle of the ground, uphill positive [rad]. x points along the ground and y away from
+            it; gravity has a part along the ground then.
+        assist: forward acceleration that the legs add to their springs' in double stance [m/s^2].
+            In single stance no leg can: its force passes its foot.
 
     Raises:
-        ParameterError: if any of them is not a positive finite number.
+        ParameterError: if one of the first four is not a positive finite number, the slope is over
+            45 degrees, or the assist is not finite.
     """
 
     mass: Positive = 80.0
     gravity: Positive = 9.81
     rest_length: Positive = 1.0
     leg_stiffness: Positive = 16.5e3
+    slope: Slope = 0.0
+    assist: Annotated[float, Range()] = 0.0
+
+    @property
+    def gravity_parts(self) -> tuple[float, float]:
+        """Gravity into the ground, and along it, backward positive [m/s^2]."""
+        return self.gravity * cos(self.slope), self.gravity * sin(self.slope)
 
     @property
     def speed_unit(self) -> float:

@@ -1,8 +1,8 @@
 """Whole-body control on ProxQP: one warm-started workspace per contact state.
 
-A joint near its limit of speed has its acceleration bounded, in a workspace with these further
-rows. Where the motors cannot slow down so much, it shall not get faster; where they cannot do
-that either, the tick is solved without these rows.
+A joint near its limit of speed, or fast before its stop, has its acceleration bounded, in a
+workspace with these further rows. Where the motors cannot slow down so much, it shall not get
+faster; where they cannot do that either, the tick is solved without these rows.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import RATE, TIME, tuned
+from template_control.whole_body.joint_bounds import JointBounds, JointTuning
 from template_control.whole_body.problem import (
     Matrices,
     assemble,
@@ -55,6 +56,11 @@ class QpOptions(Checked):
         speed_horizon: a joint gains at most the rest up to its limit in this time [s]. Shorter,
             and it would meet the limit with a jolt; longer, and swings would be slowed that
             never come near it.
+        stop_share: from this share of a joint's limit of speed on it slows down before its stop.
+            A slower one hits it gently, and asking would only cost time.
+        stop_horizon: a joint's speed is at most the way to its stop over this time [s]. Shorter,
+            and motors must brake harder than they can; longer, and legs could not be nearly
+            straight.
     """
 
     friction: Positive = tuned(0.7)
@@ -65,6 +71,8 @@ class QpOptions(Checked):
     torque_cost: Positive = tuned(1e-4)
     speed_share: Share = tuned(0.85)
     speed_horizon: Positive = tuned(0.005, TIME)
+    stop_share: Share = tuned(0.5)
+    stop_horizon: Positive = tuned(0.02, TIME)
 
     @property
     def cone(self) -> float:
@@ -204,7 +212,8 @@ class WholeBodyQp:
         self.torque_limit: Array = robot.torque_limit * o.torque_scale
         self._contact_damping = o.contact_damping
         self._costs = np.array([o.force_cost, o.torque_cost])
-        self._speed_share, self._speed_rate = o.speed_share, 1.0 / o.speed_horizon
+        tuning = JointTuning(o.speed_share, o.speed_horizon, o.stop_share, o.stop_horizon)
+        self._bounds = JointBounds(robot, tuning)
         nu = len(self.torque_limit)
         self._workspaces, self._braked = (
             [_Workspace(robot, feet, bounded) for feet in range(3)] for bounded in (0, nu)
@@ -224,12 +233,10 @@ class WholeBodyQp:
         robot, feet = self.robot, len(stance.feet)
         limit = self.torque_limit / load
         w, seconds, solved = self._workspaces[feet], 0.0, False
-        if robot.fastest > self._speed_share:
+        if self._bounds.needed():
             w = self._braked[feet]
-            room, turning = robot.velocity_limit, robot.joint_velocity
             for slack in (-np.inf, 0.0):
-                w.most[:] = np.maximum(self._speed_rate * (room - turning), slack)
-                w.least[:] = -np.maximum(self._speed_rate * (room + turning), slack)
+                self._bounds.write(w.least, w.most, slack)
                 regular, solved, more = self._attempt(w, tasks, stance, limit)
                 seconds += more
                 if solved:

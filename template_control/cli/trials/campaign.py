@@ -29,7 +29,7 @@ from template_control.robustness.campaign import (
     run_campaign,
     save_falls,
 )
-from template_control.robustness.mix import Mix
+from template_control.robustness.mix import FREE_MIX, Mix
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
 from template_control.storage import Files, writable, write_text
@@ -37,7 +37,6 @@ from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
 from template_control.view.trials.campaign_figure import campaign_figure
 
-_MIX = Mix()
 _RANGES = {"trials": (1, 1_000_000), "severity": (0.0, 100.0), "seed": (0, 2**63 - 1)}
 _LISTED = 20  # trials that went wrong, at most, in the printed table
 
@@ -78,8 +77,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output",
         type=Path,
-        help="folder for results, figure and falls; by default runs/campaign/ROBOT, with the"
-        " gait's name if it is a run, and the engine's if it is not PyBullet",
+        help="folder for results, figure and falls; by default runs/campaign/ROBOT, with free"
+        " if nothing holds it, the gait's name if it is a run, and the engine's if it is not"
+        " PyBullet",
     )
     add_printed(parser)
 
@@ -92,9 +92,11 @@ def run(options: argparse.Namespace) -> int:
     """
     check_ranges(options, _RANGES)
     count = worker_count(options)
-    mix = _MIX if options.mix is None else settings.read(Mix, options.mix)
+    chosen = robot_choice(options, RobotChoice())
+    default = FREE_MIX if chosen.free else Mix()
+    mix = default if options.mix is None else settings.read(Mix, options.mix)
     conditions = Conditions(
-        robot_choice(options, RobotChoice()),
+        chosen,
         GaitChoice(options.gait, options.speed),
         options.plant,
         mix.times(options.severity),
@@ -123,6 +125,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _name(robot: str, conditions: Conditions) -> str:
     parts = [robot]
+    if conditions.robot.free:
+        parts.append("free")
     if conditions.gait.name != "walk":
         parts.append(conditions.gait.name)
     if conditions.plant != Conditions().plant:

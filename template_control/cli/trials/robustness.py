@@ -22,17 +22,19 @@ from template_control.cli.trials.common import (
 )
 from template_control.errors import ParameterError
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.robot.library import load_robot
-from template_control.robustness.disturbances import AFTER, DISTURBANCES
-from template_control.robustness.ladder import SETTLED, Finding, Robustness, measure
+from template_control.robustness.aside import ALL
+from template_control.robustness.disturbances import AFTER
+from template_control.robustness.findings import Finding, Robustness
+from template_control.robustness.ladder import SETTLED, measure
 from template_control.run.choices.gait import GaitChoice
+from template_control.run.choices.robot import RobotChoice
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writable
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
 from template_control.view.trials.robustness_figure import robustness_figure
 
-_NAMES = tuple(d.name for d in DISTURBANCES)
+_NAMES = tuple(d.name for d in ALL)
 _COLUMNS = (
     "disturbance",
     "trials",
@@ -56,7 +58,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot(parser)
-    add_gait(parser, "of a run at apex; 3 m/s for l0 = 1 m if not given")
+    parser.add_argument(
+        "--free", action="store_true", help="nothing holds the robot; it is pushed aside too"
+    )
+    add_gait(parser, "of a run at apex, 3 m/s for l0 = 1 m if not given; of a free walk the mean")
     parser.add_argument(
         "--disturbance",
         action="append",
@@ -71,8 +76,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output",
         type=Path,
-        help="folder for the trials and the figure; by default runs/robustness/ROBOT, of a run"
-        " runs/robustness/ROBOT-run",
+        help="folder for the trials and the figure; by default runs/robustness/ROBOT, with -run of"
+        " a run and -free of a free robot",
     )
     add_printed(parser)
 
@@ -84,14 +89,14 @@ def run(options: argparse.Namespace) -> int:
         ParameterError: if the number of workers is out of its range, or a walk is given a speed.
     """
     count = worker_count(options)
-    speed, name = _speed(options), Path(options.robot).stem  # before a folder is made for it
-    name += "" if speed is None else "-run"
+    # Before a folder is made for it.
+    choice = RobotChoice(options.robot, free=options.free)
+    speed, name = _speed(options, choice), Path(options.robot).stem
+    name += "-free" * choice.free + "-run" * (options.gait == "run")
     folder = writable(options.output or Path("runs/robustness") / name)
     try:
         with workers(count) as pool, stdout_to_stderr():
-            found = measure(
-                options.robot, options.disturbance, folder, pool, options.quick, speed=speed
-            )
+            found = measure(choice, options.disturbance, folder, pool, options.quick, speed=speed)
     except KeyboardInterrupt:
         return kept(folder)
     files = Files()
@@ -106,10 +111,15 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _speed(options: argparse.Namespace) -> float | None:
-    """Of a run, dx/dt at apex; None: the robot is to walk."""
-    robot = load_robot(options.robot)
+def _speed(options: argparse.Namespace, choice: RobotChoice) -> float | None:
+    """Of a run, dx/dt at apex; of a free walk, its mean; None: the robot walks its own gait."""
+    robot = choice.load()
     check_ranges(options, {"speed": SPEEDS})
+    if choice.free:
+        if options.gait == "run":
+            raise ParameterError(f"{choice.model} walks free, and does not run: leave --gait out")
+        GaitChoice(speed=options.speed).of(robot)  # which tells where there is none
+        return None if options.speed is None else float(options.speed)
     if options.gait == "run":
         gait = GaitChoice("run", options.speed).of(robot)
         return float(gait.state[0])

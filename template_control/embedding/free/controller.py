@@ -9,16 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, isfinite, sin
+from math import cos, inf, isfinite, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.free.hurry import Outlook, hurried
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.sideways import SIDES, Sideways
-from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.planners.planner import Decision, Planner, Planners
 from template_control.embedding.references.swing_foot import quintic_step
 from template_control.parts import ready
 from template_control.robot.free.free_biped import FreeBiped
@@ -67,8 +68,6 @@ class FreeController(EmbeddingController):
         ready(LATERAL)
         wish = LateralWish(self.options.step_width)
         self.sideways = Sideways(self.parameters, unscaled.lateral, wish)
-        self._state = (robot.neutral(), np.zeros(robot.nv))
-        self._contact = np.zeros(2, dtype=bool)
         self.turning: Callable[[float], float] = lambda time: 0.0
 
     def start(self, rear: int = 0, swung: tuple[float, float] | None = None) -> None:
@@ -87,10 +86,12 @@ class FreeController(EmbeddingController):
     ) -> Solution:
         """As :meth:`~template_control.embedding.controller.EmbeddingController.tick`.
 
-        Feet that also swing sideways tell no walls: ``force`` is not looked at.
+        Feet that also swing sideways tell no walls. On feet that slide ``force`` is looked at.
         """
-        self._state, self._contact = (q, v), contact
-        return super().tick(q, v, contact, dt)
+        solution = super().tick(q, v, contact, dt)
+        if force is not None:
+            self._feel_friction(contact, self.robot.faced(force), dt)
+        return solution
 
     # -- sections, touchdowns, liftoffs --------------------------------------------------
 
@@ -107,7 +108,33 @@ class FreeController(EmbeddingController):
         sideways.wish = replace(sideways.wish, turn=turn)
         sideways.walk(self.planner.gait)
         sideways.aim(SIDES[stance])
+        self._hurry(section)
         sideways.expect(self.planning.due(Event.TOUCHDOWN))
+
+    def _hurry(self, section: Section) -> None:
+        """Let the step that begins at a section end sooner, where its foothold is out of reach."""
+        planning, sensed = self.planning, self.sensing.now
+        report, z, planner = planning.reports[-1], section.of(sensed.state), self.planner
+
+        def decide(least: float) -> Decision:
+            return planner.decide(z, report.goal.target, (least, inf))
+
+        def look(decision: Decision) -> Outlook:
+            if decision is not planning.reports[-1].decision:
+                self._follow(decision)
+            feet = np.array([self._foot_side(foot) for foot in planning.feet])
+            return self.sideways.outlook(planning.path, 0.0, self.sway(), feet)
+
+        best = hurried(report.decision, decide, look, self.options.hurry)
+        if best is not planning.reports[-1].decision:
+            self._follow(best)
+
+    def _follow(self, decision: Decision) -> None:
+        """Take another decision for the present step, and the path that follows it."""
+        planning, sensed = self.planning, self.sensing.now
+        planning.reports[-1] = replace(planning.reports[-1], decision=decision)
+        self._enter(planning.follow(self.node, sensed, self.time).name)
+        self.place.restart()
 
     def _land(self, leg: Leg) -> None:
         self.sideways.touch_down(self.time - self.reports[-1].time)
@@ -130,7 +157,7 @@ class FreeController(EmbeddingController):
             ahead[:], side[:] = c * ahead + s * side, c * side - s * ahead
             ahead[0] += about[0]
             side[0] += about[1]
-        self.robot.update(*self._state)
+        self.robot.update(*self.ground.told)
         self._sense(self._contact)
 
     def _foot_side(self, foot: int) -> float:
@@ -153,9 +180,9 @@ class FreeController(EmbeddingController):
         for leg in self.station.swings:
             foot = self.feet.of[leg]
             shape, side = self.feet.swing[foot].options, self.wanted.side[foot]
-            due = planning.landing(foot).time - self.phase_time
+            due = planning.landing(foot).time - self.place.time
             feet = np.array([self._foot_side(foot) for foot in planning.feet])
-            target = self.sideways.foothold(planning.path, self.phase_time, self.sway(), feet)
+            target = self.sideways.foothold(planning.path, self.place.time, self.sway(), feet)
             if due <= shape.horizon or not isfinite(target):
                 side[1:] = 0.0
             else:

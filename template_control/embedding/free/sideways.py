@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.free.hurry import Outlook, outlook
 from template_control.embedding.references.template_path import TemplatePath
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.lateral.cycle import LateralCycle, LateralWish, lateral_cycle
@@ -116,6 +117,14 @@ class Sideways:
         """
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
 
+    def outlook(self, path: TemplatePath, time: float, com: Array, feet: Array) -> Outlook:
+        """What is to be expected of the next foothold.
+
+        Args:
+            path, time, com, feet: as for :meth:`foothold`.
+        """
+        return outlook(self._find(path, time, com, feet), self._aim)
+
     def foothold(self, path: TemplatePath, time: float, com: Array, feet: Array) -> float:
         """y of the next foothold [m]; NaN where none is known.
 
@@ -125,9 +134,12 @@ class Sideways:
             com: (2,) y of the CoM and dy/dt [m, m/s].
             feet: (2,) y of the feet that were rear and front at the start of the path [m].
         """
-        if path is not self._planar:
-            self._planar, self._path = path, lateral_path(path.strides, self._gravity)
-        found = place(self._path, self._aim, time, com, feet)
+        found = self._find(path, time, com, feet)
         if found.left > self.options.hold or self.placed is None:
             self.placed = found
         return self.placed.y
+
+    def _find(self, path: TemplatePath, time: float, com: Array, feet: Array) -> Placement:
+        if path is not self._planar:
+            self._planar, self._path = path, lateral_path(path.strides, self._gravity)
+        return place(self._path, self._aim, time, com, feet)

@@ -14,6 +14,7 @@ from template_control.checks.ranges import Shape
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
+from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
@@ -127,6 +128,22 @@ class PricingPlanner(Planner, Protocol):
 
     def price(self, z: Array) -> float:
         """The least cost that the planner knows from section state ``z`` (n,) on."""
+
+
+@runtime_checkable
+class SlopePlanner(Planner, Protocol):
+    """A planner that knows slopes; of any other the ground is level."""
+
+    def on_slope(self, slope: float) -> SlipParameters:
+        """Plan for ground that rises from now on; :meth:`~Planner.reset` makes it level.
+
+        Args:
+            slope: its angle, uphill positive [rad]. States are told in axes that are turned with
+                the ground. :attr:`~Planner.gait` stays the one of level ground.
+
+        Returns:
+            The template on the ground that is planned for, with its assist.
+        """
 
 
 @runtime_checkable

@@ -17,6 +17,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, NotNegative, Positive, Share
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.regularised import FromSection, Prior
+from template_control.embedding.planners.within_reach import solve_within_reach
 from template_control.embedding.planning.nearby import NearbyStrides
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
@@ -43,6 +44,9 @@ class RunningOptions(Checked):
         top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the foot
             would touch down at once.
         pace: the speed aimed at is at most this far from the present one.
+        brake: below the present one at most this far; None: as ``pace``.
+        miss: where a stride would miss the speed aimed at by more than this, and by more than half
+            of the change, a smaller change is tried.
         climb: the height aimed at is at most this far from the present one.
         offset_gain: share of a stride's surprise that enters the offset estimate.
         offset_bound: largest offset believed.
@@ -60,6 +64,8 @@ class RunningOptions(Checked):
     stiffness_range: Interval = tuned((0.6, 1.6))
     top_margin: NotNegative = tuned(0.005)
     pace: Positive = tuned(0.09, SPEED)
+    brake: Positive | None = tuned(None, SPEED)
+    miss: Positive = tuned(0.1, SPEED)
     climb: Positive = tuned(0.02, LENGTH)
     offset_gain: Share = tuned(0.2)
     offset_bound: tuple[NotNegative, NotNegative] = tuned((0.3, 0.03), SPEED, LENGTH)
@@ -68,7 +74,14 @@ class RunningOptions(Checked):
     near: NotNegative = tuned(0.5)
 
 
-AGILE = RunningOptions(change=(0.03, 0.3, 0.3), stiffness_range=(0.4, 2.5), pace=0.45, near=0.0)
+AGILE = RunningOptions(
+    change=(0.03, 0.3, 0.3),
+    stiffness_range=(0.4, 2.5),
+    pace=0.45,
+    brake=0.35,
+    rounds=10,
+    near=0.0,
+)
 """For great accelerations: the legs change their stiffness further. Motors are at their limits,
 where the smallest difference counts."""
 
@@ -95,7 +108,8 @@ class RunningPlanner:
         o = self.options
         self._grid = 0.5 * o.pace
         # As arrays at once: a plan has little time.
-        self._reach = np.array([o.pace, o.climb])
+        self._rise = np.array([o.pace, o.climb])
+        self._drop = np.array([o.pace if o.brake is None else o.brake, o.climb])
         self._strides = NearbyStrides(np.array(o.tolerance), o.near)
         # Compile now what a stride would otherwise wait for.
         self.decide(gait.apex)
@@ -114,10 +128,14 @@ class RunningPlanner:
             self.gait = self._family.at(float(target[0]))
         wanted = self.gait.apex if target is None else target
         near = self._near(z, wanted)
-        aim = np.minimum(np.maximum(wanted, z - self._reach), z + self._reach)
+        aim = np.minimum(np.maximum(wanted, z - self._drop), z + self._rise)
         prior = self._prior(z, near, angles)
         stride = FromSection(self._map, z, prior.slots)
-        u, end = self._strides.solve(stride, aim - self.offset[:2], prior)
+
+        def solve(goal: Array) -> tuple[Array, Array | None]:
+            return self._strides.solve(stride, goal, prior)
+
+        u, end = solve_within_reach(solve, z, aim - self.offset[:2], self.options.miss)
         completed = end is not None
         predicted = APEX.padded(z if end is None else end) + self.offset
         at_target = bool(abs(wanted[0] - aim[0]) < _SAME and abs(wanted[1] - aim[1]) < _SAME)

@@ -24,6 +24,10 @@ class ReplanOptions(Checked):
         agility: a touchdown in t seconds can still be planned anew with an angle that differs
             from the old one by this times t^2 [rad/s^2]; the swing foot cannot do more.
         foresight: t counts as this at most [s]; where no touchdown is due it has no bound.
+        soonest: a touchdown is not planned anew to come earlier than this from now [s], nor earlier
+            than it was due where that is less: a foot that is up has to come down.
+        soonest_share: of the gait's step duration, which counts in place of ``soonest`` where it
+            is less: a fast walk that is pushed needs its foot at once.
         calmer: shares of dy/dt, tried in turn, of the states that a path starts from where the
             template cannot go on from the robot's: its leg cannot pull, the robot's can.
         highest: height over l0 above which no such path starts.
@@ -37,6 +41,8 @@ class ReplanOptions(Checked):
     angle_drop: NotNegative = tuned(0.15)
     agility: NotNegative = tuned(8.0, RATE_SQUARED)
     foresight: NotNegative = tuned(1.0, TIME)
+    soonest: NotNegative = tuned(0.06, TIME)
+    soonest_share: Share = tuned(0.08)
     calmer: tuple[Share, ...] = tuned((0.5, 0.0))
     highest: Positive = tuned(0.99)
     ground: UnexpectedGroundOptions = field(default_factory=UnexpectedGroundOptions)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Set
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.dynamics.stride import Stride, StrideSimulator
 from template_control.slip.maps.section import section_of
+from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal
 
 Array = NDArray[np.float64]
@@ -34,7 +36,30 @@ class RestOfStride:
         self.planners = planners
         self.automaton = automaton
         self.curved = curved
-        self._simulator = StrideSimulator(planners.route.parameters, automaton)
+        self._parameters = planners.route.parameters
+        self._simulator = self._mirrored = StrideSimulator(self._parameters, automaton)
+
+    def stand_on(self, ground: SlipParameters) -> bool:
+        """Run the template on other ground.
+
+        Args:
+            ground: whose slope and assist count.
+
+        Returns:
+            Whether it is other ground.
+        """
+        p = replace(self._parameters, slope=ground.slope, assist=ground.assist)
+        if p == self._simulator.parameters:
+            return False
+        self._simulator = StrideSimulator(p, self.automaton)
+        # Uphill is downhill for one who walks back.
+        self._mirrored = StrideSimulator(replace(p, slope=-p.slope), self.automaton)
+        return True
+
+    @property
+    def ground(self) -> SlipParameters:
+        """The template on its present ground."""
+        return self._simulator.parameters
 
     def onward(self, node: str, sensed: Sensed, state: Array, u: Array) -> Stride:
         """The template's stride from ``node`` on.
@@ -140,7 +165,7 @@ class RestOfStride:
         if before.rear is not None and node.rear is not None:
             u[before.rear] = u[node.rear]
         mirrored = [sensed.toes[0] - x, y, dx, -dy]
-        past = self._simulator.run(before.name, mirrored, u)
+        past = self._mirrored.run(before.name, mirrored, u)
         if not past.completed:
             return None
         return report.section.mirror(report.section.of(past.state))

@@ -1,16 +1,22 @@
-"""The planners of a route: which one plans a stride, and from where."""
+"""The planners of a route: which one plans a stride, from where, and what it decides."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.fitting import check
+from template_control.checks.ranges import Triple
 from template_control.embedding.planners.planner import Decision, Planner, Planners
 from template_control.embedding.planning.replan_options import ReplanOptions
+from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.errors import ParameterError
-from template_control.slip.maps.section import Section
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.maps.section import Section, section_of
 from template_control.slip.scenario.route import Route, StrideGoal
 
 Array = NDArray[np.float64]
@@ -23,12 +29,16 @@ class RoutePlanners:
         route: which stride comes next, and towards which state.
         planners: one for each kind of stride of the route.
         options: from which states a path starts where the robot's leads nowhere.
+        automaton: of the strides.
     """
 
-    def __init__(self, route: Route, planners: Planners, options: ReplanOptions) -> None:
+    def __init__(
+        self, route: Route, planners: Planners, options: ReplanOptions, automaton: Automaton
+    ) -> None:
         self.route = route
         self.planners = planners
         self.options = options
+        self.automaton = automaton
 
     def reset(self) -> None:
         """Forget an earlier run."""
@@ -60,6 +70,50 @@ class RoutePlanners:
             )
         return self.planners[goal.stride]
 
+    def decide(
+        self,
+        section: Section,
+        z: Array,
+        now: float,
+        learnt: Learnt,
+        reports: Sequence[SectionReport],
+    ) -> tuple[SectionReport, Array, bool]:
+        """Learn from the stride that ended, ask the route for the next one, and plan it.
+
+        Args:
+            section: that was reached.
+            z: (n,) state there.
+            now: time [s].
+            learnt: what the controller has learnt, for the report.
+            reports: of the strides so far; none at the start.
+
+        Returns:
+            What was decided, the section state from which its path starts, and whether the route
+            goes on.
+        """
+        begin = time.perf_counter()
+        if reports:
+            last = reports[-1]
+            self.of(last.goal).observe(last.decision, z)
+        wanted = self.route.next(section, z, now)
+        # The last stride goes on until whoever drives the robot ends the run.
+        goal = reports[-1].goal if wanted is None else wanted
+        decision, start = self.plan(section, z, goal)
+        seconds = time.perf_counter() - begin
+        end = section_of(self.automaton.sections(self.automaton.start(goal.stride).name)[1])
+        report = SectionReport(
+            time=now,
+            section=section,
+            state=section.padded(z),
+            goal=goal,
+            target=end.padded(goal.target),
+            decision=decision,
+            offset=check("the planner's offset", self.of(goal).offset, Triple).copy(),
+            learnt=learnt,
+            plan_seconds=seconds,
+        )
+        return report, start, wanted is not None
+
     def plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
         """A decision at ``z``, and the section state from which its path starts.
 
@@ -79,6 +133,7 @@ class RoutePlanners:
         for share in o.calmer:
             start = section.calmer(z, share, o.highest * self.route.parameters.rest_length)
             calmer = planner.decide(start, goal.target)
-            if calmer.lasting:
-                return replace(calmer, feasible=decision.feasible, nominal=False), start
+            if calmer.lasting:  # from there; from here a run may be the better way
+                feasible = decision.feasible
+                return replace(calmer, feasible=feasible, lasting=False, nominal=False), start
         return decision, z

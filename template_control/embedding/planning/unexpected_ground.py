@@ -15,7 +15,7 @@ from template_control.checks.ranges import Count, Index, Interval, NotNegative, 
 from template_control.embedding.planners.planner import Ahead, Decision
 from template_control.embedding.planners.regularised import FromHere, Prior, solve_stride
 from template_control.slip.automaton.vocabulary import Outcome, Slot
-from template_control.slip.similarity import LENGTH, SPEED, tuned
+from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, tuned
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,7 @@ class UnexpectedGroundOptions(Checked):
         rounds: Gauss-Newton steps.
         tries: points of the grid of stiffnesses whose ends the planner prices.
         effort: what a change that counts as 1 adds to the planner's price.
+        assist: largest change of the forward acceleration that two legs add in such a step [m/s^2].
     """
 
     height: NotNegative = tuned(0.008, LENGTH)
@@ -46,6 +47,7 @@ class UnexpectedGroundOptions(Checked):
     rounds: Index = tuned(5)
     tries: Count = tuned(36)
     effort: NotNegative = tuned(0.1)
+    assist: NotNegative = tuned(1.5, ACCELERATION)
 
 
 class _Pricing(NamedTuple):

@@ -35,7 +35,7 @@ class UnloadOptions(Checked):
             template_force: vertical force of the template's leg at this phase [N].
             weight: of the robot, m g [N].
         """
-        return self.share * template_force + self.floor * weight
+        return self.share * max(template_force, 0.0) + self.floor * weight
 
 
 @compiled
@@ -43,13 +43,14 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
     """The template's leg forces (2, 2) [N], rows rear and front, columns x and y.
 
     Springs push with k (l0 - l). Where none are, both legs carry m (g + y'') so that the centre of
-    pressure is x - y x'' / (g + y''), or the foot next to it; each force acts along its leg.
+    pressure is x - y x'' / (g + y''), or the foot next to it; each force acts along its leg. The
+    assist of two legs moves load from one to the other, so that it lifts nothing.
 
     Args:
         meta_row: (7,) toes and stiffnesses of the path's segment; NaN for legs without springs.
         toe: where x of the CoM is taken from [m].
         com: (6,) x and y of the template's CoM, and their first and second derivatives.
-        body: (3,) m, g, l0 [kg, m/s^2, m].
+        body: (4,) m, g, l0 and the assist of two legs [kg, m/s^2, m, m/s^2].
         forces: overwritten; zero for a leg in the air.
     """
     com_x, com_y, rest_length = com[0] + toe, com[1], body[2]
@@ -69,3 +70,12 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
         length = np.sqrt(dx * dx + com_y * com_y)
         size = max(0.0, k * (rest_length - length)) / length
         forces[leg, 0], forces[leg, 1] = size * dx, size * com_y
+    if body[3] == 0.0 or meta_row[5] == 0.0 or meta_row[6] == 0.0:
+        return
+    moved = body[0] * body[3] / (meta_row[4] - meta_row[3])
+    for leg in range(2):
+        share = moved if leg == 0 else -moved
+        forces[leg, 0] += share * (com_x - meta_row[3 + leg])
+        forces[leg, 1] += share * com_y
+        if forces[leg, 1] < 0.0:
+            forces[leg, 0], forces[leg, 1] = 0.0, 0.0  # legs do not pull

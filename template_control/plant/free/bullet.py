@@ -9,7 +9,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.plant.bullet import BulletPlant, PlantOptions, load_body
+from template_control.plant.bullet import BulletPlant, PlantOptions
+from template_control.plant.bullet_bodies import load_body
 from template_control.plant.quiet import silenced
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.free.free_terms import BASE_DOF

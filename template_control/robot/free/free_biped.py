@@ -39,7 +39,6 @@ from template_control.robot.urdf import (
 
 Array = NDArray[np.float64]
 
-_POSITION = BASE_DOF + 1  # places in q before the joints
 _ROOT = 1  # Pinocchio's index of the free flyer
 
 
@@ -77,7 +76,6 @@ class FreeBiped(Biped):
         origin: (2,) x and y of the heading frame's origin in the world [m].
         space: all terms with three directions, in the heading frame.
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
-        joint_range: (nu, 2) from where to where each joint turns, by the URDF's limits [rad].
     """
 
     base_dof = BASE_DOF
@@ -92,8 +90,6 @@ class FreeBiped(Biped):
             for leg, foot in zip(self._leg_joints, self._foot_ids, strict=True)
         )
         data = self._data
-        limits = (model.lowerPositionLimit, model.upperPositionLimit)
-        self.joint_range = np.column_stack(limits)[_POSITION:]
         self.rotation: Array = data.oMi[_ROOT].rotation
         self._hips = [data.oMi[leg[-2]].translation for leg in self._leg_joints]
         self._sources = sources(model, data, self._foot_ids, self.foot_radius)
@@ -178,6 +174,11 @@ class FreeBiped(Biped):
         self.angular_momentum, self.angular_momentum_bias = s.momentum[1], s.momentum_bias[1]
         np.matmul(s.foot_jacobian, v, out=self.contact_velocity)
 
+    def faced(self, vector: Array) -> Array:
+        """(..., 3) vectors in the heading frame, from the world's axes."""
+        c, s = cos(self.heading), sin(self.heading)
+        return vector @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
     def face(self, heading: float, origin: Array) -> None:
         """Put the heading frame somewhere; takes effect at the next :meth:`update`.
 
@@ -221,6 +222,14 @@ class FreeBiped(Biped):
     def moved(self, q: Array, step: Array) -> Array:
         """See :meth:`~template_control.robot.biped.Biped.moved`."""
         return np.asarray(pin.integrate(self.model, q, step))
+
+    def between(self, q: Array, other: Array) -> Array:
+        """(nv,) the motion that leads from one configuration to another one [m, rad].
+
+        Args:
+            q, other: (nq,) configurations, not half a turn apart.
+        """
+        return np.asarray(pin.difference(self.model, q, other))
 
     def joint_positions(self, out: Array) -> None:
         """See :meth:`~template_control.robot.biped.Biped.joint_positions`."""

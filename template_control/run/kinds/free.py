@@ -15,6 +15,7 @@ from template_control.embedding.free.sideways import SIDES
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.errors import ParameterError
+from template_control.estimation.noise_filter import NoiseFilter
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.plant.free.mujoco import FreeMujocoPlant
@@ -23,6 +24,7 @@ from template_control.plant.plant import Plant, World, plant_name
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.free.start import FreePose, free_state_in
 from template_control.run.kinds.free_recorder import FreeRecorder
+from template_control.run.kinds.free_sensors import FilteredSensors
 from template_control.run.kinds.kind import Kind
 from template_control.run.options import SimulationOptions
 from template_control.run.recorder import Recorder
@@ -123,7 +125,7 @@ class Free(Kind):
         )
 
     def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
-        """See :meth:`.kind.Kind.senses`.
+        """See :meth:`.kind.Kind.senses`; noise is filtered.
 
         Raises:
             ParameterError: if the state is to be estimated.
@@ -133,7 +135,14 @@ class Free(Kind):
                 f"{self.robot.name} walks free, and the estimate is that of a planar robot: give"
                 " SensorOptions"
             )
-        return Sensors(o.sensors, self.robot, controller.parameters.rest_length)
+        sensors = Sensors(o.sensors, self.robot, controller.parameters.rest_length)
+        tuning = controller.options.noise_filter if isinstance(controller, FreeController) else None
+        if sensors.exact or tuning is None:
+            return sensors
+        deviation = np.array([o.sensors.position_noise, o.sensors.velocity_noise])
+        return FilteredSensors(
+            sensors, NoiseFilter(self.robot, deviation, tuning), o.plant.time_step
+        )
 
     def force(self, along: float, aside: float) -> tuple[float, ...]:
         """See :meth:`.kind.Kind.force`: along the world's x and y; forward is the heading."""

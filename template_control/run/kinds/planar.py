@@ -14,6 +14,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.standing.pose import standing_pose
 from template_control.errors import ParameterError
+from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.imu import ImuOptions, ImuSensors
 from template_control.plant.plant import Plant, World, open_plant
 from template_control.robot.planar_biped import PlanarBiped
@@ -21,7 +22,7 @@ from template_control.robot.start import Pose, state_at_vlo, state_in
 from template_control.run.kinds.kind import Kind
 from template_control.run.options import Course, SimulationOptions
 from template_control.run.recorder import Recorder
-from template_control.run.sensing import Senses, Sensors
+from template_control.run.sensing import ForeseeingSensors, Senses, Sensors
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.maps.section import APEX, REST
 from template_control.slip.scenario.route import Route
@@ -78,7 +79,8 @@ class Planar(Kind):
             controller.start(pose.rear, pose.swung)
             return q, v
         # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
-        swing = np.array([0.0, controller.swings.other.clearance])
+        shape = controller.swings.towards(controller.planning.first_goal())
+        swing = np.array([0.0, shape.clearance])
         pitch = controller.first_pitch()
         q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
         controller.start()
@@ -102,7 +104,9 @@ class Planar(Kind):
         parameters = controller.parameters
         if isinstance(o.sensors, ImuOptions):
             return ImuSensors(o.sensors, self.robot, Scale.of(parameters), o.plant.time_step)
-        return Sensors(o.sensors, self.robot, parameters.rest_length)
+        delay = DelayCompensation(controller.options.delay, self.robot, o.plant.time_step)
+        sensors = Sensors(o.sensors, self.robot, parameters.rest_length)
+        return ForeseeingSensors(sensors, delay)
 
     def force(self, along: float, aside: float) -> tuple[float, ...]:
         """See :meth:`.kind.Kind.force`: what holds the robot bears the rest."""

@@ -13,7 +13,7 @@ from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_bottom
 from template_control.slip.dynamics.locate import Watch, arm, first_event, root
-from template_control.slip.dynamics.model import Kernel, Model, model_of
+from template_control.slip.dynamics.model import Kernel, Model, backward, model_of
 from template_control.slip.dynamics.path import FLIGHT, STANCE, Path, sample
 from template_control.slip.dynamics.stance_map import (
     Launch,
@@ -67,9 +67,9 @@ def _end_velocity(a: Array, momentum: float, t: float, state: Array, out: Array)
 
 @inner
 def _potential(state: Array, toes: Array, stiffness: Array, model: Model) -> float:
-    """Gravitational and spring energy over mass [J/kg]."""
+    """Energy over mass of gravity, of what else acts along the ground, and of springs [J/kg]."""
     x, y = state[0], state[1]
-    potential = model.gravity * y
+    potential = model.gravity * y + backward(model, stiffness) * x
     for leg in range(2):
         if stiffness[leg] == 0.0:
             continue
@@ -87,6 +87,7 @@ def _stance(
     ``_NO_EVENT`` if none does, ``_GOES_ON`` where the phase is too long for one path.
     """
     mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
+    pull = (gravity, backward(model, stiffness))
     toes, out = watch.toes, watch.out
     torsion = 0.0 * state[0]
     if stiffness[0] == 0.0 or stiffness[1] == 0.0:
@@ -122,7 +123,7 @@ def _stance(
             t = _SAFE_SHARE * horizon
         end = corrected(a, t, momentum, toes, stiffness, model, out)
     elif map_kind == _PAPER:
-        end = momentum + momentum_changes(a, t, gravity, torsion / mass)
+        end = momentum + momentum_changes(a, t, pull, torsion / mass)
         harmonic(a, start, end, w2, length, gravity)
     else:
         end = momentum
@@ -178,7 +179,7 @@ def closed_form_stride(
         if stiffness[0] == 0.0 and stiffness[1] == 0.0:
             for i in range(4):
                 a[i] = state[i]
-            a[4] = model.gravity
+            a[4], a[5] = model.gravity, model.along
             path = Path(a, a)
             substep = _SUBSTEP * np.sqrt(rest_length / model.gravity)
             edge, t = first_event(FLIGHT, path, model.max_time, substep, _EVENT_TIME, watch)

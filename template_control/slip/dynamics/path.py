@@ -28,8 +28,8 @@ class Path(NamedTuple):
         a, b: SERIES: those of the polynomials of x and y, constant term first. STANCE: a is
             (12,), about a pivot at x = a0, r = a1 + a8 t + a9 t^2 + a2 sin(a5 t) + a3 cos(a5 t) and
             theta = a4 + a6 t + a10 t^2 + a11 t^3 + a7 (a2 cos(a5 t) - a3 sin(a5 t)), which
-            is (11) where a8 to a11 are zero. FLIGHT: a is (5,) x, y, dx/dt, dy/dt at t = 0
-            and gravity. The latter two do not read b.
+            is (11) where a8 to a11 are zero. FLIGHT: a is (6,) x, y, dx/dt, dy/dt at t = 0
+            and gravity, into the ground and along it. The latter two do not read b.
     """
 
     a: Array
@@ -70,9 +70,9 @@ def _stance(kind: int, path: Path, t: float, out: Array) -> None:
 
 def _flight(kind: int, path: Path, t: float, out: Array) -> None:
     a = path.a
-    out[0], out[1] = a[0] + a[2] * t, a[1] + (a[3] - 0.5 * a[4] * t) * t
-    out[2], out[3] = a[2] + 0.0 * t, a[3] - a[4] * t
-    out[4], out[5] = 0.0 * t, -a[4] + 0.0 * t
+    out[0], out[1] = a[0] + (a[2] - 0.5 * a[5] * t) * t, a[1] + (a[3] - 0.5 * a[4] * t) * t
+    out[2], out[3] = a[2] - a[5] * t, a[3] - a[4] * t
+    out[4], out[5] = -a[5] + 0.0 * t, -a[4] + 0.0 * t
 
 
 _BY_KIND = (_series, _stance, _flight)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import inner
-from template_control.slip.dynamics.model import Model
+from template_control.slip.dynamics.model import Model, backward
 from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, Path, sample
 
 Array = NDArray[np.float64]
@@ -122,13 +122,13 @@ def harmonic(
 
 
 @inner
-def momentum_changes(a: Array, t: float, gravity: float, torsion: float) -> float:
+def momentum_changes(a: Array, t: float, gravity: tuple[float, float], torsion: float) -> float:
     """Change of p/m over [0, t] by gravity (12), (13) and the torsional spring (27).
 
     Args:
         a: (12,) the first iteration's path.
         t: end of the phase [s].
-        gravity: [m/s^2].
+        gravity: into the ground, and what acts along it, backward positive [m/s^2].
         torsion: k_t / m, 0 in single stance.
     """
     w, l1, l2 = a[5], a[2], a[3]
@@ -136,7 +136,8 @@ def momentum_changes(a: Array, t: float, gravity: float, torsion: float) -> floa
     start_angle = a[4] + a[7] * l1
     end_angle = a[4] + a[6] * t + a[7] * (l1 * c - l2 * s)
     mean_r = a[1] + (l1 - l1 * c + l2 * s) / (w * t)
-    change = -0.5 * t * gravity * mean_r * (np.cos(start_angle) + np.cos(end_angle))
+    change = -0.5 * t * gravity[0] * mean_r * (np.cos(start_angle) + np.cos(end_angle))
+    change += 0.5 * t * gravity[1] * mean_r * (np.sin(start_angle) + np.sin(end_angle))
     integral = 0.5 * a[6] * t * t + a[7] / w * (l1 * s - l2 * (1.0 - c)) + a[4] * t
     return change - torsion * (integral - 0.5 * np.pi * t)
 
@@ -188,6 +189,7 @@ def corrected(
         p/m at ``t`` [m^2/s].
     """
     mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
+    along = backward(model, stiffness)
     w2 = a[5] * a[5]
     # Radial defects and torques at 0, t/2 and t.
     pull_0 = pull_1 = pull_2 = torque_0 = torque_1 = torque_2 = 0.0 * a[0]
@@ -205,8 +207,8 @@ def corrected(
         d = x - a[0]
         r = np.sqrt(d * d + y * y)
         force, torque = _spring(x, y, a[0], toes, stiffness, rest_length)
-        pull = force / (r * mass) - gravity * y / r + w2 * (r - a[1])
-        torque = torque / mass - gravity * d
+        pull = force / (r * mass) - (gravity * y + along * d) / r + w2 * (r - a[1])
+        torque = torque / mass - gravity * d + along * y
         if i == 0:
             pull_0, torque_0 = pull, torque
         elif i == 1:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import inner
-from template_control.slip.dynamics.model import Model
+from template_control.slip.dynamics.model import Model, backward
 
 Array = NDArray[np.float64]
 
@@ -47,10 +47,12 @@ def expand(
         The step h [s] within which the truncated series are exact to ``TOLERANCE``.
     """
     mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
+    along = backward(model, stiffness)
     cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
     for n in range(ORDER - 1):
-        ax = 0.0 * cx[0]
-        ay = ax - (gravity if n == 0 else 0.0)
+        ax = ay = 0.0 * cx[0]
+        if n == 0:
+            ax, ay = ax - along, ay - gravity
         for leg in range(2):
             if stiffness[leg] == 0.0:
                 continue

@@ -30,13 +30,15 @@ class CatchOptions(Checked):
     """When a run catches a walk, and when it is over.
 
     Attributes:
-        excess: a walk that is faster than wanted by less than this is left to its planner.
+        excess: a walk that is faster than wanted by less than this is left to its planner,
+        fast: unless it is at least this fast at VLO, where the template is about to take off.
         walkable: at an apex with at most this speed the robot walks again.
         slow: dx/dt at apex that the run slows down to; less than ``walkable``, as no run settles
             on its speed exactly.
     """
 
     excess: NotNegative = tuned(0.42, SPEED)
+    fast: Positive = tuned(1.45, SPEED)
     walkable: Positive = tuned(1.45, SPEED)
     slow: Positive = tuned(1.35, SPEED)
 
@@ -107,7 +109,8 @@ class CatchingRoute:
     def instead(self, goal: StrideGoal, speed: float, excess: float) -> StrideGoal | None:
         """See :meth:`BreakingRoute.instead`: a run, for a walk that is fast enough for it."""
         slowest, fastest = running_speeds(self.parameters)
-        walks = goal.stride in _WALKS and excess >= self.options.excess
+        o, at_vlo = self.options, float(goal.target[0]) + excess
+        walks = goal.stride in _WALKS and (excess >= o.excess or at_vlo >= o.fast)
         on = self._caught and goal.stride == _BREAKS
         if speed < slowest or not (walks or on):
             return None

@@ -17,6 +17,7 @@ _SHOWN = {
     "friction": ("friction", 1.0),
     "mass": ("mass [%]", 100.0),
     "push": ("push [N s]", 1.0),
+    "direction": ("push, direction [deg]", 1.0),
     "ground_step": ("ground step [cm]", 100.0),
     "noise": ("noise [mrad]", 1e3),
     "delay": ("delay [ms]", 1e3),

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from template_control.robustness.disturbances import AFTER
-from template_control.robustness.ladder import Finding, Robustness
+from template_control.robustness.findings import Finding, Robustness
 from template_control.view.style import as_text
 
 _RATE, _STANDING, _POINT = "#2a6196", "0.6", "#db7321"

@@ -27,13 +27,16 @@ from template_control.embedding.planners.walking.step_search import (
     choose,
 )
 from template_control.embedding.planners.walking.walk_kernels import WALK
+from template_control.errors import GaitError
 from template_control.parts import ready
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WalkingGait, control_units, vlo_jacobians
+from template_control.slip.gaits.slope_gait import on_slope
 from template_control.slip.gaits.walking_family import WalkingFamily
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import (
     Scale,
     scaled,
@@ -70,11 +73,13 @@ class LqrPlanner:
         o = self.options
         settled = o.push_off.settled_price if self._pushes else np.inf
         self._trust = Trust(o.trusted_price, settled)
+        self._slope = 0.0
         self._settle_on(gait)
 
     def _settle_on(self, gait: WalkingGait) -> None:
-        """Make ``gait`` the one that the law leads to."""
+        """Make ``gait`` the one that the law leads to, on the present slope."""
         self.gait = gait
+        gait = self._here = self._sloped()
         self.a, self.b = vlo_jacobians(gait)
         o = self.options
         costs = (*o.control_cost, o.push_off.cost) if self._pushes else o.control_cost
@@ -84,7 +89,8 @@ class LqrPlanner:
         self._gain = np.linalg.solve(
             r + self.b.T @ self._cost @ self.b, self.b.T @ self._cost @ self.a
         )
-        self._settling = settling_map(self.a, self.b, np.array(o.tolerance), o.control_weight)
+        self._change_weight = self._weight_of_change()
+        self._settling = settling_map(self.a, self.b, np.array(o.tolerance), self._change_weight)
         self._shift = self._settling @ self.offset
         self._law = self._aim()
 
@@ -94,18 +100,34 @@ class LqrPlanner:
     def reset(self) -> None:
         """See :class:`~.planner.Planner`: back to the gait it was made for, without an offset."""
         self.offset = np.zeros(3)
+        self._slope = 0.0
         self._settle_on(self._family.reset())
+
+    def on_slope(self, slope: float) -> SlipParameters:
+        """See :meth:`~.planner.SlopePlanner.on_slope`; without a gait there the ground is level."""
+        if slope != self._slope:
+            self._slope = slope
+            self._settle_on(self.gait)
+        return self._here.parameters
+
+    def _sloped(self) -> WalkingGait:
+        """The gait on the present slope."""
+        try:
+            return on_slope(self.gait, self._slope)
+        except GaitError:
+            self._slope = 0.0
+            return self.gait
 
     def _aim(self) -> Law:
         """The linear law about the fixed point the robot has with the present offset."""
-        p, o = self.gait.parameters, self.options
+        p, o = self._here.parameters, self.options
         shift = self._shift = self._settled()
-        slots, units = control_units(self.gait)
-        nominal, others = self.gait.controls[slots] / units, len(slots) - 1
+        slots, units = control_units(self._here)
+        nominal, others = self._here.controls[slots] / units, len(slots) - 1
         steps = o.push_off.second_steps if self._pushes else o.second_steps
         relative_to = (nominal[0], *[0.0] * others)
         return Law(
-            target=self.gait.vlo + shift[:3],
+            target=self._here.vlo + shift[:3],
             control=nominal + shift[3:],
             gain=self._gain,
             cost=self._cost,
@@ -116,11 +138,19 @@ class LqrPlanner:
             second_steps=np.add(np.array(steps).reshape(-1, len(slots)), relative_to),
             enough=o.trusted_price,
             first_weight=o.search.first_weight,
+            effort=o.search.effort * self._costs,
+            highest=p.rest_length + o.search.flight,
             top_margin=o.top_margin,
-            earliest=o.earliest_touchdown,
+            earliest=min(o.earliest_touchdown, o.earliest_share * self.gait.step_duration),
             stiffness=p.leg_stiffness,
-            kernel=stride_kernel(p, self.gait.stride),
+            kernel=stride_kernel(p, self._here.stride),
         )
+
+    def _weight_of_change(self) -> float:
+        """Of the settled controls' changes: with push-off more, the straighter the leg at VLO."""
+        o, bend = self.options, 1.0 - self._here.vlo[1] / self._here.parameters.rest_length
+        share = o.push_off.straight / bend if self._pushes else 0.0
+        return float(o.control_weight * (1.0 + share**2))
 
     def _settled(self) -> Array:
         """(3 + c,) shift of the fixed point by the present offset.
@@ -132,17 +162,17 @@ class LqrPlanner:
         linear: Array = self._settling @ self.offset
         if not self._pushes:
             return linear
-        o, (slots, units) = self.options, control_units(self.gait)
-        shift, step = self._shift, ReturnMap(self.gait.parameters, self.gait.stride)
+        o, (slots, units) = self.options, control_units(self._here)
+        shift, step = self._shift, ReturnMap(self._here.parameters, self._here.stride)
         for _ in range(_ROUNDS):
-            z, u = self.gait.vlo + shift[:3], self.gait.controls.copy()
+            z, u = self._here.vlo + shift[:3], self._here.controls.copy()
             u[slots] += shift[3:] * units
             here = step.linearise(z, u)
             if here.outcome is not Outcome.SECTION:
                 return linear
             a, b = here.state_jacobian, here.control_jacobian[:, slots] * units
             rest = here.state + self.offset - z + shift[:3] - a @ shift[:3] - b @ shift[3:]
-            shift = settling_map(a, b, np.array(o.tolerance), o.control_weight) @ rest
+            shift = settling_map(a, b, np.array(o.tolerance), self._change_weight) @ rest
         return shift
 
     def decide(
@@ -164,8 +194,8 @@ class LqrPlanner:
             upper[0] = max(min(upper[0], angles[1]), lower[0])
             law = law._replace(lower=lower, upper=upper)
         u, first, cost, nominal = self._best(law, z)
-        slots, units = control_units(self.gait)
-        controls = self.gait.controls.copy()
+        slots, units = control_units(self._here)
+        controls = self._here.controls.copy()
         controls[slots] = u * units
         nominal = nominal and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)

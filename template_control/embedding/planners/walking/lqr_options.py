@@ -35,6 +35,11 @@ class SearchOptions(Checked):
     Attributes:
         first_weight: weight of the cost-to-go after the first step, relative to that after the
             second. Where two steps end alike, it favours the one nearer the gait half-way.
+        effort: weight of the LQR's own cost of the first step's controls. Where two steps end
+            alike, it favours the gait's: no robot follows a step well whose legs are much softer.
+        flight: a VLO state that would fly on to this far above l0 [m] is in flight: no walking step
+            begins there. The template's leg would pull. A robot is a few millimetres above l0 in
+            steady walks too.
         coarse: numbers of points in alpha, kappa_1 and kappa_2 over all of their ranges. Most are
             in alpha, which decides where the foot lands.
         fine: numbers of points in alpha and kappa_2 of each finer grid about the best so far, at
@@ -45,6 +50,8 @@ class SearchOptions(Checked):
     """
 
     first_weight: NotNegative = tuned(0.3)
+    effort: NotNegative = tuned(0.1)
+    flight: NotNegative = tuned(0.005, LENGTH)
     coarse: tuple[Count, Count, Count] = tuned((5, 3, 3))
     fine: tuple[_Several, _Several] = tuned((5, 3))
     rounds: Index = tuned(2)
@@ -67,6 +74,9 @@ class PushOffOptions(Checked):
         settled_price: cost-to-go up to which a step of the linear law may lead further away. Above
             it such a step is searched for: near some gaits the law alone settles beside them, in
             states in which the map is no longer linear.
+        straight: bend of the leg at VLO, 1 - y/l0, at which :attr:`LqrOptions.control_weight`
+            counts twice, and more the straighter the leg is. The fastest gaits bear no large change
+            of their controls: with less weight the walk sways more and more.
         second_steps: what :attr:`LqrOptions.second_steps` are in other steps: alpha relative to
             the gait's [rad], kappa_1, kappa_2 and kappa_p over k0. A stiff push-off puts energy in.
     """
@@ -74,6 +84,7 @@ class PushOffOptions(Checked):
     cost: Positive = tuned(2.0)
     points: Count = tuned(3)
     settled_price: NotNegative = tuned(0.01)
+    straight: NotNegative = tuned(0.004)
     second_steps: tuple[_Four, ...] = tuned(
         (
             (0.0, 1.5, 1.0, 0.75),
@@ -113,8 +124,10 @@ class LqrOptions(Checked):
             knees can carry it.
         top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the
             foot would touch down at once.
-        earliest_touchdown: no foot is to touch down so soon after VLO [s]: in a plane the swing
-            leg comes in time, and 0 is no bound; one that has to move aside too needs some.
+        earliest_touchdown: no foot is to touch down so soon after VLO [s]: the swing leg passes the
+            other one about then, and is not in front yet. 0 is no bound.
+        earliest_share: of the gait's step duration, which counts in its place where it is less:
+            fast gaits swing their legs faster.
         trusted_price: the linear law's step is taken without a search below this price.
         spread: half-widths of the search in alpha [rad] and kappa_2 / k0.
         search: points, rounds and weights of the search.
@@ -138,7 +151,8 @@ class LqrOptions(Checked):
     stiffness_range: Interval = tuned((0.5, 1.5))
     angle_range: Interval = tuned((-0.12, 0.065))
     top_margin: NotNegative = tuned(0.01)
-    earliest_touchdown: NotNegative = tuned(0.0, TIME)
+    earliest_touchdown: NotNegative = tuned(0.12, TIME)
+    earliest_share: Share = tuned(0.2)
     trusted_price: NotNegative = tuned(1.0)
     spread: tuple[NotNegative, NotNegative] = tuned((0.16, 0.25))
     search: SearchOptions = field(default_factory=SearchOptions)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import callee, compiled
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.section_map import RESULTS, one_stride
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 # Numba would compile once more for a literal int or bool.
 _FAST = np.int64(MapKind.IMPROVED)
 _ON_EXACT, _ON_FAST = np.bool_(True), np.bool_(False)
+_FLIES = int(Outcome.UNWANTED_FLIGHT)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
 
@@ -63,6 +64,8 @@ class Law(NamedTuple):
         second_steps: (n, c) other controls than u_s - K (z - z_s) for the second step.
         enough: a cost below which no other second step is tried.
         first_weight: of the cost-to-go after the first step beside that after the second.
+        effort: (c,) of (u - u_s)^2 in the first step, beside both.
+        highest: a CoM that flies higher than this [m] has left the ground.
         top_margin: alpha stays this far [rad] below asin(y / l0).
         earliest: alpha also stays below asin(y / l0) this long after VLO [s].
         stiffness: k0 [N/m].
@@ -80,6 +83,8 @@ class Law(NamedTuple):
     second_steps: Array
     enough: float
     first_weight: float
+    effort: Array
+    highest: float
     top_margin: float
     earliest: float
     stiffness: float
@@ -157,6 +162,9 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, z_next: Array) -
     Returns:
         The Outcome's value; ``z_next`` means nothing where that is not SECTION.
     """
+    # The template's leg would pull at the ground, which no robot's does.
+    if z[1] + max(z[2], 0.0) ** 2 / (2.0 * law.kernel.gravity) > law.highest:
+        return _FLIES
     controls = np.zeros(NUM_SLOTS)
     for i in range(u.shape[0]):
         controls[law.slots[i]] = u[i] if i == 0 else u[i] * law.stiffness
@@ -200,6 +208,8 @@ def price(
         return 2.0 * FALL_PRICE
     here = _cost_to_go(law.target, law.cost, first)
     share = law.first_weight * here
+    for i in range(u.shape[0]):
+        share += law.effort[i] * (u[i] - law.control[i]) ** 2
     if share >= limit:
         return share
     best = FALL_PRICE + here
@@ -263,7 +273,7 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
     """
     controls = best.shape[0]
     u, end, centre = np.empty(controls), np.empty(3), np.empty(controls)
-    cheapest = price(law, _ON_FAST, s, z, best, np.inf, first)
+    cheapest = price(law, _ON_EXACT, s, z, best, np.inf, first)
     coarse, fine = 1, grid.fine[0] * grid.fine[1] + 2 * (controls - 2)
     for j in range(controls):
         coarse *= grid.coarse[j]
@@ -276,7 +286,9 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
             else:
                 _fine(grid, centre, widths, i, u)
             bounded(law, z, u)
-            cost = price(law, _ON_FAST, s, z, u, cheapest, end)
+            if price(law, _ON_FAST, s, z, u, cheapest, end) >= cheapest:
+                continue
+            cost = price(law, _ON_EXACT, s, z, u, cheapest, end)
             if cost < cheapest:
                 cheapest = cost
                 _copy(u, best)
@@ -284,7 +296,7 @@ def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array
         _copy(best, centre)
         if level > 0:
             widths = grid.narrowing * widths[0], grid.narrowing * widths[1]
-    return price(law, _ON_EXACT, s, z, best, np.inf, first)
+    return cheapest
 
 
 @compiled

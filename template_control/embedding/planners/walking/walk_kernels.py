@@ -93,6 +93,8 @@ def step_search() -> None:
         second_steps=np.ones((1, 3)),
         enough=1.0,
         first_weight=0.3,
+        effort=np.zeros(3),
+        highest=1.0,
         top_margin=0.01,
         earliest=0.0,
         stiffness=_K0,
@@ -108,7 +110,7 @@ def references() -> None:
     coefficients, meta = np.ones((2, 1, ORDER + 1)), np.ones((1, 7))
     for locate in LOCATE.values():
         locate(coefficients, meta, np.ones(3), 0.1, 1.0, 0.0, np.zeros(6))
-    leg_forces(meta[0], 0.1, np.ones(6), np.ones(3), np.zeros((2, 2)))
+    leg_forces(meta[0], 0.1, np.ones(6), np.array([1.0, 1.0, 1.0, 0.0]), np.zeros((2, 2)))
     quintic_step(np.zeros(3), 0.1, 0.0, 1.0, 1e-3)
 
 

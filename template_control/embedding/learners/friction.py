@@ -1,0 +1,125 @@
+"""How slippery the ground is, learnt where a foot slides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive, Share
+from template_control.slip.similarity import SPEED, TIME, tuned
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FrictionOptions(Checked):
+    """Tuning of the friction's estimate.
+
+    Attributes:
+        speed: a foot on the ground that moves faster along it slides [m/s]. Speeds of a foot that
+            stands are noise; 0.5 mrad of it is about 0.02 m/s there, which never stays this
+            large, and against the force, for ``duration``.
+        duration: a foot has to slide for so long to tell anything [s].
+        settling: for so long after a touchdown nothing is learnt [s]. The force is the impact's.
+        load: share of the weight that a foot carries at least. Of a small force the direction is
+            not known well.
+        doubt: share by which the ground has to be more slippery than thought, to be believed.
+        lowest: coefficient that is believed. On less no gait stands, and a smaller one would come
+            from a fault.
+    """
+
+    speed: Positive = tuned(0.05, SPEED)
+    duration: NotNegative = tuned(0.008, TIME)
+    settling: NotNegative = tuned(0.005, TIME)
+    load: Positive = tuned(0.05)
+    doubt: Share = tuned(0.03)
+    lowest: Positive = tuned(0.3)
+
+
+@dataclass
+class _Slide:
+    """What a foot has felt since it began to slide.
+
+    Attributes:
+        standing: time since touchdown [s].
+        time: since it began to slide [s].
+        along, normal: sums of the ground's forces [N].
+    """
+
+    standing: float = 0.0
+    time: float = 0.0
+    along: float = 0.0
+    normal: float = 0.0
+
+    def end(self) -> None:
+        """The foot slides no longer."""
+        self.time = self.along = self.normal = 0.0
+
+
+class FrictionEstimate:
+    """Coulomb coefficient of the ground.
+
+    The force on a foot that slides lies on the friction cone, whatever was asked for. So its mean
+    ratio while the foot slides is the coefficient. It is only ever lowered: how far a foot that
+    stands is from sliding, nothing tells; and ground that was slippery once may be so again.
+
+    Args:
+        options: what counts as sliding.
+        told: the coefficient before anything is learnt.
+        weight: of the robot [N].
+
+    Attributes:
+        coefficient: the estimate.
+    """
+
+    def __init__(self, options: FrictionOptions, told: float, weight: float) -> None:
+        self.options = options
+        self.coefficient = told
+        self._least = options.load * weight
+        self._slides = (_Slide(), _Slide())
+
+    def feel(self, contact: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
+        """Look at how the feet move, and what acts on them.
+
+        Args:
+            contact: (2,) whether each foot touches ground to stand on.
+            force: (2, d) the ground's force on each foot, along the ground first and up last [N].
+            speed: (2, d) of the feet's material points on the ground [m/s].
+            dt: since the last look [s].
+
+        Returns:
+            Whether the estimate has changed.
+        """
+        before = self.coefficient
+        # Number by number: arrays of two would take five times as long, at every tick.
+        feet = zip(self._slides, contact.tolist(), force.tolist(), speed.tolist(), strict=True)
+        for slide, touches, one, moves in feet:
+            slide.standing = slide.standing + dt if touches else 0.0
+            if touches and self._slides_on(slide, one, moves):
+                slide.time += dt
+                slide.along += hypot(*one[:-1])
+                slide.normal += one[-1]
+                self._learn(slide)
+            else:
+                slide.end()
+        return self.coefficient != before
+
+    def _slides_on(self, slide: _Slide, force: list[float], speed: list[float]) -> bool:
+        """Whether a foot that touches the ground slides, so that friction holds it back."""
+        o = self.options
+        if slide.standing < o.settling or force[-1] < self._least:
+            return False
+        power = sum(f * v for f, v in zip(force[:-1], speed[:-1], strict=True))
+        return power < 0.0 and hypot(*speed[:-1]) > o.speed
+
+    def _learn(self, slide: _Slide) -> None:
+        o = self.options
+        if slide.time < o.duration:
+            return
+        ratio = max(slide.along / slide.normal, o.lowest)
+        if ratio < (1.0 - o.doubt) * self.coefficient:
+            self.coefficient = ratio

@@ -1,0 +1,73 @@
+"""The learners of a stride: when each of them learns, and what they know."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.learners.friction import FrictionEstimate
+from template_control.embedding.learners.lean import TrunkLean
+from template_control.embedding.learners.load import LoadEstimate
+from template_control.embedding.learners.momentum_trim import MomentumTrim
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.section_report import Learnt
+from template_control.embedding.stride_planning import StridePlanning
+from template_control.robot.biped import Biped
+from template_control.slip.maps.section import Section
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+
+class Learners:
+    """What is learnt from stride to stride.
+
+    Args:
+        options: of each, scaled to the template.
+        parameters: the template.
+        robot: the (nominal) model.
+
+    Attributes:
+        load: how much heavier the robot is than its model.
+        trim: what double stance adds to the template's forces.
+        lean: of the trunk.
+        friction: how slippery the ground is.
+    """
+
+    def __init__(self, options: EmbeddingOptions, parameters: SlipParameters, robot: Biped) -> None:
+        self.load = LoadEstimate(options.load, robot.gravity)
+        self.trim = MomentumTrim(parameters, options.trim)
+        self.lean = TrunkLean(options.lean, options.trunk_pitch)
+        weight = robot.mass * robot.gravity
+        self.friction = FrictionEstimate(options.slides, options.friction, weight)
+
+    @property
+    def learnt(self) -> Learnt:
+        """What they know now."""
+        return Learnt(self.load.factor, self.trim.acceleration, self.lean.correction)
+
+    def end_stride(self, section: Section, state: Array, nominal: bool) -> None:
+        """Learn from the stride that has just ended.
+
+        Args:
+            section: where it ended.
+            state: (4,) x, y, dx/dt, dy/dt there.
+            nominal: whether the stride went near the gait. Another one teaches nothing.
+        """
+        self.load.end_stride(nominal)
+        self.trim.end_stride(section.padded(section.of(state)), nominal)
+        self.lean.end_stride(nominal)
+
+    def begin_stride(self, planning: StridePlanning, trimmed: bool) -> None:
+        """Take note of the stride that begins.
+
+        Args:
+            planning: which has decided it.
+            trimmed: whether the momentum trim acts somewhere in it.
+        """
+        reports = planning.reports
+        if len({report.goal.stride for report in reports[-2:]}) > 1:
+            # A walk after a run stands up; one that leant had other drifts.
+            self.trim.forget()
+        self.lean.aim(reports[-1].goal)
+        self.trim.expect(planning.path if trimmed else None, planning.planner.gait)

@@ -1,0 +1,130 @@
+"""How long the robot's torques are under way: learnt from what they do, and reckoned with."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import NotNegative, Positive, Share
+from template_control.robot.biped import Biped
+from template_control.slip.similarity import RATE_SQUARED, TIME, tuned
+
+Array = NDArray[np.float64]
+
+_LOG = logging.getLogger(__name__)
+
+_BLOCK = 64  # ticks whose accelerations are compared at once
+
+
+@dataclass(frozen=True)
+class DelayOptions(Checked):
+    """What delays are looked for, and how soon one is believed.
+
+    Attributes:
+        longest: delay that is looked for; 0: none is, and none reckoned with [s].
+        memory: over which the errors of each delay are remembered [s]. A swing and a stance of each
+            leg tell delays apart; a shorter memory follows the noise.
+        most: error of a joint's acceleration that counts at most [rad/s^2]. Impacts say nothing
+            of delays.
+        margin: another delay is believed when its squared errors are less than those of the
+            present one by this share. Neighbours differ by 1 % at a noise of 0.5 mrad.
+
+    Raises:
+        ParameterError: if a value is of a wrong type or out of its range.
+    """
+
+    longest: NotNegative = tuned(0.008, TIME)
+    memory: Positive = tuned(0.5, TIME)
+    most: Positive = tuned(60.0, RATE_SQUARED)
+    margin: Share = tuned(0.01)
+
+
+class DelayCompensation:
+    """Tells the state in which the torques of this tick will act.
+
+    The torques of tick j act in the step after tick j + d. So the acceleration of the joints in
+    the step before tick k is the one expected at tick k - 1 - d, but for errors of the model:
+
+        d = argmin sum_k e^(-age_k / memory) |(v_k - v_{k-1}) / dt - a_{k-1-d}|^2,
+
+    each error clipped, over whole ticks d. The state when the torques act is then
+
+        v + dt (a_{k-d} + ... + a_{k-1}),
+        q + d dt v + dt^2 ((d - 1/2) a_{k-d} + ... + 1/2 a_{k-1}).
+
+    Args:
+        options: what is looked for.
+        robot: whose state.
+        dt: control period [s].
+    """
+
+    @checked
+    def __init__(self, options: DelayOptions, robot: Biped, dt: float) -> None:
+        self._options, self._robot, self._dt = options, robot, dt
+        self._most = round(options.longest / dt)
+        self._expected = np.zeros((self._most + 1 + _BLOCK, robot.nv))
+        self._measured = np.zeros((_BLOCK + 1, robot.nv))
+        self._errors = np.zeros(self._most + 1)
+        self._first = 0  # tick of the block
+        self._tick = 0
+        self.ticks = 0
+        """Of delay, as believed now."""
+
+    @property
+    def delay(self) -> float:
+        """As believed now [s]."""
+        return self.ticks * self._dt
+
+    def foresee(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """The state when this tick's torques will act; without delay the arrays that are given.
+
+        Args:
+            q: (nq,) measured configuration.
+            v: (nv,) measured velocity.
+        """
+        if self._most == 0:
+            return q, v
+        place = self._tick - self._first
+        self._measured[place] = v
+        if place == _BLOCK:
+            self._compare()
+            place = 0
+        d = self.ticks
+        if d == 0:
+            return q, v
+        dt, pending = self._dt, self._expected[place + self._most + 1 - d : place + self._most + 1]
+        ages = np.arange(d - 0.5, 0.0, -1.0)
+        step = (d * dt) * v + dt * dt * (ages @ pending)
+        return self._robot.moved(q, step), v + dt * pending.sum(axis=0)
+
+    def expect(self, acceleration: Array) -> None:
+        """Hear what this tick's torques are expected to do.
+
+        Args:
+            acceleration: (nv,) while they act [m/s^2, rad/s^2].
+        """
+        if self._most:
+            self._expected[self._tick - self._first + self._most + 1] = acceleration
+            self._tick += 1
+
+    def _compare(self) -> None:
+        """Take the block's errors for each delay, believe the likeliest one, and begin anew."""
+        o, joints = self._options, slice(self._robot.base_dof, None)
+        if self._first >= self._most:  # before, the first torques have no history
+            found = np.diff(self._measured[:, joints], axis=0) / self._dt
+            self._errors *= np.exp(-_BLOCK * self._dt / o.memory)
+            for d in range(self._most + 1):
+                first = self._most + 1 - d
+                errors = found - self._expected[first : first + _BLOCK, joints]
+                self._errors[d] += np.square(np.clip(errors, -o.most, o.most)).sum()
+            likeliest = int(self._errors.argmin())
+            if self._errors[likeliest] < (1.0 - o.margin) * self._errors[self.ticks]:
+                self.ticks = likeliest
+                _LOG.info("the torques act %.3g s after they are computed", self.delay)
+        self._expected[: self._most + 1] = self._expected[_BLOCK:].copy()
+        self._measured[0] = self._measured[_BLOCK]
+        self._first = self._tick

@@ -1,0 +1,99 @@
+"""What came of the disturbances: trials by level, and from which level on a robot breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from template_control.robustness.disturbance import Disturbance
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.running_gait import RunningGait
+
+_HALF = 0.5
+
+
+@dataclass(frozen=True)
+class Level:
+    """What came of one disturbance at one level.
+
+    Attributes:
+        level: the disturbance's size for this robot [SI].
+        succeeded, fell, astray: how many trials; astray is on its feet but not on its gait.
+    """
+
+    level: float
+    succeeded: int
+    fell: int
+    astray: int
+
+    @property
+    def rate(self) -> float:
+        """Share of the trials that succeeded."""
+        return self.succeeded / (self.succeeded + self.fell + self.astray)
+
+    @property
+    def standing(self) -> float:
+        """Share of the trials without a fall."""
+        return 1.0 - self.fell / (self.succeeded + self.fell + self.astray)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one disturbance does to a robot.
+
+    Attributes:
+        disturbance: the one that was raised.
+        levels: those tried, from mild to severe.
+    """
+
+    disturbance: Disturbance
+    levels: tuple[Level, ...] = ()
+
+    @property
+    def breaking_point(self) -> float | None:
+        """The severest level up to which every trial of each level succeeds, or None."""
+        return _last(self.levels, [level.rate >= 1.0 for level in self.levels])
+
+    @property
+    def half_point(self) -> float | None:
+        """The severest level up to which at least half of each level's trials succeed, or None."""
+        return _last(self.levels, [level.rate >= _HALF for level in self.levels])
+
+    @property
+    def standing_point(self) -> float | None:
+        """The severest level up to which no trial falls, or None."""
+        return _last(self.levels, [level.fell == 0 for level in self.levels])
+
+    @property
+    def broken(self) -> bool:
+        """Whether the disturbance need not be raised further.
+
+        All trials of the last level fell, or more than half of the trials at each of the last two.
+        """
+        rates = [level.standing for level in self.levels]
+        twice = len(rates) > 1 and max(rates[-2:]) < _HALF
+        return bool(rates) and (rates[-1] == 0.0 or twice)
+
+
+def _last(levels: Sequence[Level], good: Sequence[bool]) -> float | None:
+    """The level before the first that is not good; None where that is the first."""
+    count = next((i for i, fine in enumerate(good) if not fine), len(good))
+    return levels[count - 1].level if count else None
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """Findings for a robot.
+
+    Attributes:
+        robot: its name.
+        gait: that it kept.
+        speed_error, height_error: undisturbed, relative, as trials are judged.
+        findings: one a disturbance.
+    """
+
+    robot: str
+    gait: WalkingGait | RunningGait
+    speed_error: float
+    height_error: float
+    findings: tuple[Finding, ...]
