@@ -188,13 +188,17 @@ def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
     except BaseException:
-        # The executor forgets both when it is told to shut down.
+        # The executor forgets these when it is told to shut down.
         processes, results = list((pool._processes or {}).values()), pool._result_queue
+        manager: threading.Thread | None = pool._executor_manager_thread  # type: ignore[assignment]
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.kill()
         # Without a writer the executor's thread does not wait for the rest of half a result.
         results._writer.close()  # type: ignore[attr-defined]
+        # At Python's end it would be woken through a pipe that it may be closing meanwhile.
+        if manager is not None:
+            manager.join(_GRACE)
         raise
     finally:
         pool.shutdown(cancel_futures=True)
