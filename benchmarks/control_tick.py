@@ -23,7 +23,7 @@ from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.references.apex_pose import ApexStart, apex_pose
-from template_control.embedding.robot_template import template_for
+from template_control.embedding.robot_template import default_gait, template_for
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.robot.biped import Biped
@@ -67,7 +67,7 @@ def _timed(function: Callable[..., Any], into: list[float]) -> Callable[..., Any
 
 def _walking(robot: PlanarBiped) -> tuple[EmbeddingController, Any, Any]:
     """A controller that walks, started, and the state that it starts from."""
-    gait = gait_at(SlipParameters(mass=robot.mass), np.radians(66.0), 1.1)
+    gait = default_gait(robot)
     controller = EmbeddingController(robot, LqrPlanner(gait))
     q, v = state_at_vlo(robot, gait.vlo, 0, np.array([0.0, 0.05]), np.array([2.2, 0.0]))
     controller.start(0)

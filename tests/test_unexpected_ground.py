@@ -31,17 +31,17 @@ def test_a_wall_is_told_from_ground_by_the_direction_of_its_force():
     stumble = Stumble(StumbleOptions(), WEIGHT)
     stumble.feel(np.array([[-60.0, 100.0], [-100.0, 60.0]]), STILL, 1e-3)
     np.testing.assert_array_equal(stumble.slipping, [False, True])
-    np.testing.assert_array_equal(stumble.blocked, [False, True])
+    np.testing.assert_array_equal([stumble.blocked(foot) for foot in (0, 1)], [False, True])
     stumble.feel(np.array([[100.0, 0.0], [-10.0, 0.0]]), STILL, 1e-3)
     np.testing.assert_array_equal(stumble.slipping, [True, False])
-    assert not stumble.blocked[0], "a wall behind the foot is not in its way"
+    assert not stumble.blocked(0), "a wall behind the foot is not in its way"
 
 
 def test_a_wall_counts_for_a_while_after_its_last_force():
     stumble = Stumble(StumbleOptions(linger=0.01), WEIGHT)
     stumble.feel(np.array([[-100.0, 0.0], [0.0, 0.0]]), STILL, 1e-3)
     after = 0
-    while stumble.blocked[0]:
+    while stumble.blocked(0):
         stumble.feel(np.zeros((2, 2)), STILL, 1e-3)
         after += 1
     assert after == pytest.approx(10, abs=1)

@@ -126,10 +126,8 @@ class EmbeddingController:
     @property
     def template_com(self) -> tuple[float, float]:
         """The template's CoM at the robot's phase, in the world [m]."""
-        x, y = self.place.reference[:2]
-        place = np.array([self._origin + x, self.sensing.ground + y])
-        x, y = self.frame.world(place).tolist()
-        return x, y
+        x, y = self.place.reference.tolist()[:2]
+        return self.frame.point(self._origin + x, self.sensing.ground + y)
 
     @property
     def _origin(self) -> float:
@@ -359,11 +357,9 @@ class EmbeddingController:
 
     def _stance(self) -> Stance:
         """The feet on the ground, the template's forces on them, and how far they unload."""
-        station, forces = self.station, self.place.forces
+        station, forces, feet = self.station, self.place.forces, self.feet.of
         for leg in station.control.unloads:
             weight = self.robot.mass * self.robot.gravity
             station.cap[leg] = self.options.unload.cap(forces[leg, 1], weight)
         legs = station.stance
-        return Stance(
-            tuple(self.feet.of[leg] for leg in legs), forces[: len(legs)].ravel(), station.cap
-        )
+        return Stance(tuple([feet[leg] for leg in legs]), forces[: len(legs)].ravel(), station.cap)

@@ -100,7 +100,9 @@ class Sensing:
 
     def foresee(self, dt: float) -> None:
         """Reckon with the speed that the next tick has in ``dt`` if nothing hits the robot."""
-        self.unhit[:] = self.now.state[2:] + self.now.acceleration * dt
+        _, _, dx, dy = self.now.state.tolist()
+        ddx, ddy = self.now.acceleration.tolist()
+        self.unhit[0], self.unhit[1] = dx + ddx * dt, dy + ddy * dt
 
     def take_roles(self, rolls: bool) -> None:
         """The feet have changed their roles, or one of them has lifted off.

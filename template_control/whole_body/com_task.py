@@ -41,13 +41,13 @@ class ComTask(Checked):
     def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
         (kp, kd), ref, now = self.gains, wanted.com.tolist(), wanted.com_now.tolist()
-        height = now[1]
+        height, rise = now[1], robot.com_velocity.tolist()[1]
         moment = robot.mass * height
         rows.jacobian[:] = robot.com_jacobian
         rows.jacobian[0] += robot.angular_momentum_jacobian / moment
         rows.bias[:] = robot.com_bias
         rows.bias[0] += (
-            robot.angular_momentum_bias - robot.angular_momentum * robot.com_velocity[1] / height
+            robot.angular_momentum_bias - robot.angular_momentum * rise / height
         ) / moment
         rows.desired[0] = ref[4] + kp * (ref[0] - now[0]) + kd * (ref[2] - now[2]) + wanted.com_push
         rows.desired[1] = ref[5] + self.lift(wanted)

@@ -39,8 +39,10 @@ class MomentumTask(Checked):
 
     def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
-        inertia = robot.mass * wanted.com_now[1] ** 2
+        # Lists: arithmetic on an array's single numbers is slow.
+        height, angle = wanted.com_now.tolist()[1], wanted.pitch_now.tolist()[0]
+        inertia = robot.mass * (height * height)
         rows.jacobian[0] = robot.angular_momentum_jacobian / inertia
         rows.bias[0] = robot.angular_momentum_bias / inertia
-        turning = self.turning * (wanted.pitch - wanted.pitch_now[0])
+        turning = self.turning * (wanted.pitch - angle)
         rows.desired[0] = self.bandwidth * (turning - robot.angular_momentum / inertia)

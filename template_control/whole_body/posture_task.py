@@ -36,6 +36,6 @@ class PostureTask(Checked):
     def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
         kp, kd = self.gains
-        angle, rate = wanted.pitch_now
+        angle, rate = wanted.pitch_now.tolist()
         rows.jacobian[0, _PITCH] = 1.0
         rows.desired[0] = kp * (wanted.pitch - angle) - kd * rate

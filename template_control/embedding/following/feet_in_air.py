@@ -59,7 +59,7 @@ class FeetInAir:
             swing = feet.swing[foot]
             landing = planning.landing(foot)
             foothold, due = landing.x, landing.time - time
-            if self._stumble.blocked[foot]:
+            if self._stumble.blocked(foot):
                 swing.meet_wall(robot.foot_position[foot], due, dt)
             elif planning.reaching and leg == station.awaited:
                 swing.drop(dt)

@@ -111,10 +111,9 @@ class FrictionEstimate:
     def _slides_on(self, slide: _Slide, force: list[float], speed: list[float]) -> bool:
         """Whether a foot that touches the ground slides, so that friction holds it back."""
         o = self.options
-        if slide.standing < o.settling or force[-1] < self._least:
+        if slide.standing < o.settling or force[-1] < self._least or hypot(*speed[:-1]) <= o.speed:
             return False
-        power = sum(f * v for f, v in zip(force[:-1], speed[:-1], strict=True))
-        return power < 0.0 and hypot(*speed[:-1]) > o.speed
+        return sum(f * v for f, v in zip(force[:-1], speed[:-1], strict=True)) < 0.0
 
     def _learn(self, slide: _Slide) -> None:
         o = self.options

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from itertools import combinations
+from statistics import median
 from typing import Annotated
 
 import numpy as np
@@ -84,7 +85,7 @@ class SlopeEstimate:
             for near, far in combinations(self._places, 2)
             if abs(far[0] - near[0]) > o.shortest * self._length
         ]
-        found = float(np.arctan(np.median(slopes))) if slopes else self.slope
+        found = float(np.arctan(median(slopes))) if slopes else self.slope
         found = min(max(found, -o.steepest), o.steepest)
         if abs(found - self.slope) > o.change:
             self.slope = found

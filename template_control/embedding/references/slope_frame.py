@@ -37,6 +37,7 @@ class SlopeFrame:
         self.angle = 0.0
         self._turn = np.eye(_BASE)
         self._shift = np.zeros(_BASE)
+        self._level = True  # these are the world's axes
         if self._planar is not None:
             self._planar.turn_gravity(0.0)
 
@@ -59,6 +60,7 @@ class SlopeFrame:
         c, s = cos(angle), sin(angle)
         self._turn = np.array([[c, s], [-s, c]])
         self._shift = place - self._turn @ fixed
+        self._level = angle == 0.0 and not self._shift.any()
         self._planar.turn_gravity(angle)
 
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -84,6 +86,12 @@ class SlopeFrame:
         """(..., 2) places in the world, from these axes [m]."""
         return place if self._level else (place - self._shift) @ self._turn
 
+    def point(self, x: float, y: float) -> tuple[float, float]:
+        """As :meth:`world`, of one place."""
+        if not self._level:
+            x, y = self.world(np.array([x, y])).tolist()
+        return x, y
+
     def outward(self, vector: Array) -> Array:
         """(..., n) vectors in the world's axes; their first two numbers are turned."""
         if self.angle == 0.0:
@@ -91,7 +99,3 @@ class SlopeFrame:
         turned = vector.copy()
         turned[..., :_BASE] = vector[..., :_BASE] @ self._turn
         return turned
-
-    @property
-    def _level(self) -> bool:
-        return self.angle == 0.0 and not self._shift.any()

@@ -53,10 +53,9 @@ class Stumble:
         self._touching = [0.0, 0.0]
         self.slipping = np.zeros(2, dtype=bool)
 
-    @property
-    def blocked(self) -> NDArray[np.bool_]:
-        """(2,) whether a wall is in front of each foot."""
-        return np.array(self._left) > 0.0
+    def blocked(self, foot: int) -> bool:
+        """Whether a wall is in front of a foot."""
+        return self._left[foot] > 0.0
 
     def feel(self, force: Array, rising: Array, dt: float) -> None:
         """Look at what acts on the feet, and how they move.

@@ -82,6 +82,17 @@ class Automaton:
         Raises:
             ParameterError: if no section ends it.
         """
+        found = self._sections.get(start)
+        if found is None:
+            found = self._sections[start] = self._find_sections(start)
+        return found
+
+    @cached_property
+    def _sections(self) -> dict[str, tuple[Event, Event]]:
+        """Those found so far: a robot's plans ask for them several times a stride."""
+        return {}
+
+    def _find_sections(self, start: str) -> tuple[Event, Event]:
         begin = _BEGINS[self.node(start).phase]
         ends = [edge.event for node in self.stride(start) for edge in node.edges if edge.section]
         if not ends:
