@@ -125,6 +125,7 @@ def test_description_survives_json(automaton):
     assert reasons == {outcome.reason for outcome in ends}
 
 
+@pytest.mark.slow(seconds=5)
 def test_table_names_every_node_guard_and_failure(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["automaton"]) == 0
@@ -169,6 +170,7 @@ def test_file_holds_every_node_guard_and_no_more_arrows(automaton, tmp_path):
     assert len(arrows(figure)) == len(edges) + len(choices(automaton))
 
 
+@pytest.mark.slow(seconds=4)
 def test_arrows_run_from_rim_to_rim_of_their_nodes():
     centre = layout(AUTOMATON)
     for (a, b, _), ends in zip(successions(AUTOMATON), arrows(drawn(AUTOMATON)), strict=False):

@@ -220,6 +220,7 @@ def test_energies_are_shown_around_both_transitions(record):
         assert all(line.get_ydata()[0] == 0.0 for line in axes.lines)
 
 
+@pytest.mark.slow(seconds=3)
 def test_the_files_are_not_empty_and_a_walk_has_no_transitions(
     record, template, short_walk, tmp_path
 ):

@@ -66,6 +66,7 @@ duration = 1.0
 """
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_scenario_that_walks_is_walked(tmp_path, capfd):
     path = tmp_path / "slower.toml"
     path.write_text(SCENARIO)

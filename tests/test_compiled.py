@@ -74,6 +74,7 @@ def call(package, run=_RUN, **environment):
     return value, hits, path and Path(path)
 
 
+@pytest.mark.slow(seconds=3)
 def test_a_caller_is_compiled_with_what_the_cache_has_of_its_callee(toy):
     value, _, folder = call(toy(2.0))
     for kept in folder.glob("caller.scaled*"):
@@ -83,6 +84,7 @@ def test_a_caller_is_compiled_with_what_the_cache_has_of_its_callee(toy):
     assert list(folder.glob("caller.scaled*.nbc"))
 
 
+@pytest.mark.slow(seconds=8)
 def test_a_caller_is_compiled_anew_when_what_it_calls_changes(toy):
     assert call(toy(2.0))[:2] == (2.0, 0)
     assert call(toy(2.0))[:2] == (2.0, 1)
@@ -92,6 +94,7 @@ def test_a_caller_is_compiled_anew_when_what_it_calls_changes(toy):
     assert call(toy(2.0))[:2] == (2.0, 1)
 
 
+@pytest.mark.slow(seconds=8)
 def test_folders_of_old_contents_do_not_pile_up(toy):
     for factor in range(5):
         value, _, path = call(toy(float(factor)))
@@ -100,6 +103,7 @@ def test_folders_of_old_contents_do_not_pile_up(toy):
     assert len(list(path.parent.iterdir())) <= 4
 
 
+@pytest.mark.slow(seconds=3)
 def test_where_the_package_is_read_only_the_cache_is_the_users(toy, tmp_path):
     package = toy(2.0)
     (package / "__pycache__").write_text("a file: no folder can be made here")
@@ -117,6 +121,7 @@ def test_where_nothing_is_writable_functions_work_without_a_cache(toy, tmp_path)
     assert call(toy(2.0), NUMBA_CACHE_DIR=str(blocked)) == (2.0, 0, None)
 
 
+@pytest.mark.slow(seconds=3)
 def test_a_script_is_its_own_source(toy, tmp_path):
     script = tmp_path / "script.py"
     for value in (2.0, 3.0):

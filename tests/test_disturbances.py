@@ -75,6 +75,7 @@ def test_momentum_changes_by_the_forces_on_both_levels(on_step, robot):
     assert np.quantile(np.abs(residual), 0.99) < 10.0
 
 
+@pytest.mark.slow(seconds=2)
 def test_an_edge_out_of_reach_changes_nothing(robot, default_gait, short_walk):
     def towards(height):
         plant = PlantOptions(ground_step=GroundStep(height, 50.0))

@@ -86,6 +86,7 @@ def test_without_noise_a_walk_is_told_as_it_is(long_walk):
     assert missed[:, 7:9].max() < 5e-3
 
 
+@pytest.mark.slow(seconds=4)
 def test_with_noise_the_speed_is_better_than_the_sensors(long_walk):
     found, truth = estimated(long_walk, ImuOptions(seed=4))
     missed = found - truth

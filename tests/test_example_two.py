@@ -78,6 +78,7 @@ def test_liftoff_waits_for_the_predefined_direction():
             assert template.fired(liftoff, ahead, due) is (due <= 0.0)
 
 
+@pytest.mark.slow(seconds=3)
 def test_an_earlier_liftoff_is_rougher_with_smaller_amplitudes(first_steps):
     """The paper's words for Fig. 13(c)."""
     template, predefined = liftoff(first_steps()), liftoff(first_steps(EARLIER))

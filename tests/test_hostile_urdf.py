@@ -226,6 +226,7 @@ def test_a_urdf_is_read_in_its_own_encoding(load, five_link, encoding):
     assert load(changed(text, '"five-link"', '"fünf"'), encoding).name == "fünf"
 
 
+@pytest.mark.slow(seconds=4)
 def test_a_urdf_in_utf_8_walks_where_the_locale_is_ascii(command, tmp_path, five_link):
     path = tmp_path / "robot.urdf"
     path.write_text(changed(five_link, '"five-link"', '"fünf"'), encoding="utf-8")

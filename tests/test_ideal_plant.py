@@ -263,6 +263,7 @@ def test_joints_stay_within_their_limits(record):
     assert np.abs(record.q[:, [3, 5]]).max() < 1.5
 
 
+@pytest.mark.slow(seconds=7)
 def test_a_fall_ends_the_run(robot, gait):
     options = SimulationOptions(
         steps=10, plant=IdealOptions(), pushes=(Push(-200.0, step=1),), record_every=10

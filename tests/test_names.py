@@ -38,6 +38,7 @@ def test_a_robot_s_name_is_printed_as_it_is(name, short_walk, capsys):
     assert f"{name}.npz" in out
 
 
+@pytest.mark.slow(seconds=6)
 def test_a_folder_s_name_is_printed_as_it_is(tmp_path, capsys):
     assert main(["gaits", "--output", str(tmp_path / "[b]"), "--no-figures"]) == 0
     assert main(["automaton", "--output", str(tmp_path / "[/b].png")]) == 0

@@ -201,6 +201,7 @@ def test_where_nothing_can_be_kept_the_process_compiles_for_itself(toy, tmp_path
     assert len(compiled_by_all(tmp_path)) == 5
 
 
+@pytest.mark.slow(seconds=3)
 def test_what_a_killed_helper_had_taken_is_done_all_the_same(toy, tmp_path):
     ended(toy("stays", "dies"))
     assert (tmp_path / "toy" / "helper").exists()

@@ -58,6 +58,7 @@ def test_every_run_has_every_figure(record, gait, kind, tmp_path):
         assert np.mean(picture.min(axis=2) < 0.8) > 0.005, f"{path} is empty"
 
 
+@pytest.mark.slow(seconds=5)
 def test_the_command_draws_beside_the_run(record, tmp_path, capfd):
     run = record.save(tmp_path / "run.npz")
     assert main(["plots", str(run)]) == 0

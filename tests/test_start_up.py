@@ -62,6 +62,7 @@ def test_importing_the_library_imports_nothing_heavy():
     assert imported_by("import template_control as tc; dir(tc), tc.slip.__all__") == set()
 
 
+@pytest.mark.slow(seconds=3)
 def test_a_name_brings_what_it_needs_and_no_more():
     assert imported_by("import template_control as tc; tc.SlipParameters") <= {"numpy"}
     assert "matplotlib" not in imported_by("import template_control as tc; tc.simulate")
@@ -176,6 +177,7 @@ def test_a_function_named_as_its_module_stays_a_function(first):
     assert done.stdout == "True True\n", done.stderr
 
 
+@pytest.mark.slow(seconds=3)
 def test_where_no_folder_takes_a_cache_everything_is_imported_and_compiles(tmp_path):
     code = """
 import template_control as tc

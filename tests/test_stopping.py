@@ -5,17 +5,19 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from sweep_work import alive, hold, wait_until
+from sweep_work import alive, hold, square, wait_until
 
 import template_control as tc
 from template_control.cli.main import main
 from template_control.cli.report import kept
 from template_control.run.record import Record, RunInterrupted
+from template_control.sweep import executor
 from template_control.sweep.executor import workers
 
 SECONDS = 2.0
@@ -79,6 +81,23 @@ def test_an_error_kills_workers_whatever_they_do():
     with pytest.raises(KeyboardInterrupt):
         work()
     wait_until(lambda: not any(map(alive, pids)), allowed())
+
+
+def test_a_worker_that_dies_at_an_interrupt_leaves_no_traceback(monkeypatch):
+    broken = []
+    monkeypatch.setattr(threading, "excepthook", broken.append)
+    # The executor's thread is to notice before it is told of the end.
+    monkeypatch.setattr(executor, "wait", lambda *_: time.sleep(0.2))
+
+    def impatient(*_):
+        for process in pool._processes.values():
+            process.kill()
+        raise KeyboardInterrupt
+
+    calls = ((i, {"x": i}) for i in range(50))
+    with pytest.raises(KeyboardInterrupt), workers(1) as pool:
+        executor.run_calls(square, calls, pool, 40, impatient, lambda: None)
+    assert not broken
 
 
 def test_workers_end_with_their_parent_even_in_compiled_code():

@@ -98,12 +98,13 @@ def run_calls(
                 keep(under_way[future], _outcome(future))
                 del under_way[future]
         except SweepError:
-            _cancel(under_way)
+            _cancel(under_way, pool)
             raise
         except BaseException:
-            _cancel(under_way)
+            _cancel(under_way, pool)
             # Our own processes are ended next: what needs little more time gets it.
-            wait(under_way, _GRACE if executor is None else 0.0)
+            running = [future for future in under_way if future.running()]
+            wait(running, _GRACE if executor is None else 0.0)
             for future, index in under_way.items():
                 if future.done() and not future.cancelled() and future.exception() is None:
                     keep(index, future.result())
@@ -158,10 +159,19 @@ def _outcome(future: Future[Outcome]) -> Outcome:
     return Outcome(None, _reason(error))
 
 
-def _cancel(under_way: Iterable[Future[Outcome]]) -> None:
-    """Give up what has not begun."""
-    for future in under_way:
-        future.cancel()
+class _Workers(ProcessPoolExecutor):
+    """Processes of our own, which end with the ``with`` block of :func:`workers`."""
+
+
+def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
+    """Give up what has not begun.
+
+    Our own workers are ended next, and their executor cancels what is left. Where one of them
+    dies meanwhile, it fails at a future that somebody else has cancelled.
+    """
+    if not isinstance(pool, _Workers):
+        for future in under_way:
+            future.cancel()
 
 
 @contextmanager
@@ -184,7 +194,7 @@ def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
     Args:
         count: how many; None for one a core.
     """
-    pool = ProcessPoolExecutor(count, initializer=_obey_parent_only, initargs=(True,))
+    pool = _Workers(count, initializer=_obey_parent_only, initargs=(True,))
     try:
         yield pool
     except BaseException:
