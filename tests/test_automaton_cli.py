@@ -214,7 +214,11 @@ def test_transitions_are_chosen_at_their_own_section():
     }
 
 
-@pytest.mark.parametrize("automaton", [AUTOMATON, HOPPER], ids=["library", "hopper"])
+@pytest.mark.parametrize(
+    "automaton",
+    [pytest.param(AUTOMATON, marks=pytest.mark.slow(seconds=2)), HOPPER],
+    ids=["library", "hopper"],
+)
 def test_nothing_hides_anything(automaton):
     figure = drawn(automaton)
     axes = figure.axes[0]

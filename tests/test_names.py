@@ -45,15 +45,15 @@ def test_a_folder_s_name_is_printed_as_it_is(tmp_path, capsys):
     assert "[/b].png" in capsys.readouterr().out.replace("\n", "")
 
 
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow(seconds=15)
 def test_names_are_drawn_as_they_are(short_walk, tmp_path):
     robot = tc.load_robot("runner")
     planner = tc.RunningPlanner(running_gait(tc.template_for(robot), 3.0))
     short_run = tc.simulate(robot, planner, tc.SimulationOptions(steps=3))
     assert figures_of(short_run) == FIGURES
-    for name in ("$x^{", r"\frac$", "a\nb"):
-        for record in (renamed(short_walk, name), renamed(short_run, name)):
-            for draw in figures_of(record).values():
-                draw(record).savefig(tmp_path / "a.png", dpi=20)
+    name = "$x^{\\frac$\nb"  # between dollars Matplotlib reads mathematics, which these are not
+    for record in (renamed(short_walk, name), renamed(short_run, name)):
+        for draw in figures_of(record).values():
+            draw(record).savefig(tmp_path / "a.png", dpi=20)
     record = simulate_scenario(Scenario((Segment("walk", speed=1.1, steps=2),), name="$x^{"))
     assert save_scenario_figures(record, tmp_path)

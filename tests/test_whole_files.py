@@ -140,7 +140,12 @@ def test_a_walk_on_a_full_disk_keeps_the_last_one_and_prints_its_table(tmp_path,
 @pytest.mark.parametrize(
     ("words", "table", "size"),
     [
-        (["automaton", "--output", "{}/automaton.png"], "successor", 80_000),
+        pytest.param(
+            ["automaton", "--output", "{}/automaton.png"],
+            "successor",
+            80_000,
+            marks=pytest.mark.slow(seconds=5),
+        ),
         pytest.param(["slip", "{}", "--output", "{}"], "duration", 5_000, marks=pytest.mark.slow),
         (["gaits", "--limits", "825", "826", "--output", "{}"], "stability", 10_000),
         pytest.param(
@@ -183,6 +188,7 @@ def test_output_that_takes_nothing_is_one_line(command, words, device):
         )
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_full_standard_error_ends_no_walk(command, tmp_path):
     words = ["walk", "--steps", "1", "--no-figures", "--output", str(tmp_path)]
     with Path("/dev/full").open("w") as full:
