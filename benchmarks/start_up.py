@@ -171,7 +171,7 @@ def main() -> None:
         table.add_column(heading, justify="left" if i < 2 else "right", no_wrap=True)
     for row in rows:
         table.add_row(*(f"{v:.3g}" if isinstance(v, float) else str(v or "") for v in row.values()))
-    Console().print(table)
+    Console(width=130).print(table)
 
 
 if __name__ == "__main__":
