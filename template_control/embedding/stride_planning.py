@@ -173,11 +173,15 @@ class StridePlanning(PlannedPath):
             sensed: the robot's state.
             now: time [s].
         """
-        self._hold(choosing_again.landed(self._rest, node, sensed, self.reports[-1]))
+        self.hold(choosing_again.landed(self._rest, node, sensed, self.reports[-1]))
         self.follow(node, sensed, now)
 
-    def _hold(self, decision: Decision | None) -> None:
-        """From now on this decision holds, if it is one."""
+    def hold(self, decision: Decision | None) -> None:
+        """From now on this decision holds for the present stride, if it is one.
+
+        Args:
+            decision: for it; None: the one so far.
+        """
         if decision is not None:
             self.reports[-1] = replace(self.reports[-1], decision=decision)
 
@@ -194,7 +198,7 @@ class StridePlanning(PlannedPath):
         if isinstance(planner, SlopePlanner):
             ground = planner.on_slope(slope)
         if self._rest.stand_on(ground):
-            self._hold(replace(report.decision, nominal=False))
+            self.hold(replace(report.decision, nominal=False))
         return ground.slope
 
     @property
@@ -223,7 +227,7 @@ class StridePlanning(PlannedPath):
         """
         if abs(height) > self.options.ground.height and node.name not in self.curved:
             rest, report = self._rest, self.reports[-1]
-            self._hold(choosing_again.landed_off(rest, node, sensed, report, height))
+            self.hold(choosing_again.landed_off(rest, node, sensed, report, height))
         return self.follow(node, sensed, now)
 
     def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
@@ -302,12 +306,12 @@ class StridePlanning(PlannedPath):
             return other
         lasting = True
         if node.name != self.automaton.starts[report.goal.stride] or node.name in self.curved:
-            self._hold(choosing_again.stiffnesses(rest, node, sensed, report))
+            self.hold(choosing_again.stiffnesses(rest, node, sensed, report))
         else:
             to_go = self.due(Event.TOUCHDOWN) - phase_time
             angles = reachable_angles(rest, node, sensed, report, to_go)
             decision = choosing_again.all_controls(rest, node, sensed, report, angles)
-            self._hold(decision)
+            self.hold(decision)
             lasting = decision is None or decision.lasting
         node = self.follow(node, sensed, now)
         return node if lasting and self._whole else self._break(node, sensed, 0.0, now)

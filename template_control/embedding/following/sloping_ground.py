@@ -72,5 +72,5 @@ class SlopingGround:
 
     def _foothold(self, foot: int) -> tuple[float, float]:
         """x and height of a foot in the world [m]."""
-        x, y = self.frame.world(self._robot.foot_position[foot]).tolist()
-        return x, y
+        x, y = self._robot.foot_position[foot].tolist()
+        return self.frame.point(x, y)

@@ -132,7 +132,7 @@ class FreeController(EmbeddingController):
     def _follow(self, decision: Decision) -> None:
         """Take another decision for the present step, and the path that follows it."""
         planning, sensed = self.planning, self.sensing.now
-        planning.reports[-1] = replace(planning.reports[-1], decision=decision)
+        planning.hold(decision)
         self._enter(planning.follow(self.node, sensed, self.time).name)
         self.place.restart()
 
