@@ -282,7 +282,7 @@ class StridePlanning(PlannedPath):
         if abs(deviation) > o.speed and phase_time > o.interval:
             self._excess += deviation
             return True
-        return self._broken and not self._whole
+        return not self._whole and (self._broken or not self.reports[-1].decision.feasible)
 
     def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.

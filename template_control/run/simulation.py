@@ -289,6 +289,8 @@ def _fallen(
     hip = controller.robot.hip_height(q) - o.plant.ground_height(q[0])
     if hip < falls.height * length:
         return f"the hip was {hip:.2f} m above the ground"
+    if not hip < falls.flight * length:
+        return f"the simulation diverged, with the hip {hip:.3g} m above the ground,"
     if controller.robot.tilt(q) > falls.pitch:
         return f"the trunk tilted to {np.degrees(controller.robot.tilt(q)):.0f} degrees"
     patience = falls.patience * controller.planner.gait.step_duration

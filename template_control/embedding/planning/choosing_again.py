@@ -5,6 +5,9 @@ Until a leg lands these are all its controls, from then on the stiffnesses of wh
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from template_control.embedding.planners.planner import Decision, LandingPlanner, PricingPlanner
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.planning.unexpected_ground import choose_legs
@@ -12,6 +15,8 @@ from template_control.embedding.section_report import SectionReport
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.touchdown import flown_angle, free_controls
 from template_control.slip.automaton.hybrid import Node
+
+Array = NDArray[np.float64]
 
 
 def all_controls(
@@ -23,6 +28,8 @@ def all_controls(
 ) -> Decision | None:
     """Decide anew at the section state from which the template would have come to here.
 
+    Where no stride goes on from there, the gait's legs may have led to here from another one.
+
     Args:
         rest: of the present stride.
         node: of the automaton, the first one of a stride.
@@ -33,10 +40,18 @@ def all_controls(
     Returns:
         None where the template cannot have come from a section.
     """
-    z = rest.back_to_section(node, report, sensed)
-    if z is None:
-        return None
-    return rest.planners.of(report.goal).decide(z, report.goal.target, angles)
+    planner = rest.planners.of(report.goal)
+
+    def decide(so_far: Array) -> Decision | None:
+        z = rest.back_to_section(node, so_far, sensed)
+        return None if z is None else planner.decide(z, report.goal.target, angles)
+
+    decision = decide(report.decision.controls)
+    if decision is not None and decision.feasible:
+        return decision
+    # The template would have flown or sunk with the legs so far; the robot's motors are weaker.
+    other = decide(planner.gait.controls)
+    return decision if other is None else other
 
 
 def stiffnesses(

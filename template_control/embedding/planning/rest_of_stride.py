@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import Ahead, CurvePlanner, Decision, Planner
 from template_control.embedding.planning.route_planners import RoutePlanners
-from template_control.embedding.section_report import SectionReport
 from template_control.embedding.sensing import Sensed
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -145,7 +144,7 @@ class RestOfStride:
 
         return ahead
 
-    def back_to_section(self, node: Node, report: SectionReport, sensed: Sensed) -> Array | None:
+    def back_to_section(self, node: Node, controls: Array, sensed: Sensed) -> Array | None:
         """The section state from which the template would have come to where the robot is.
 
         The template's dynamics are the same forward and backward: its past is the mirror
@@ -153,7 +152,7 @@ class RestOfStride:
 
         Args:
             node: of the automaton, the robot's.
-            report: of the present stride.
+            controls: (NUM_SLOTS,) that the stride so far had.
             sensed: the robot's state.
 
         Returns:
@@ -161,14 +160,15 @@ class RestOfStride:
         """
         x, y, dx, dy = sensed.state
         before = self.automaton.before(node.name)
-        u = report.decision.controls.copy()
+        u = controls.copy()
         if before.rear is not None and node.rear is not None:
             u[before.rear] = u[node.rear]
         mirrored = [sensed.toes[0] - x, y, dx, -dy]
         past = self._mirrored.run(before.name, mirrored, u)
         if not past.completed:
             return None
-        return report.section.mirror(report.section.of(past.state))
+        section = section_of(self.automaton.sections(before.name)[1])
+        return section.mirror(section.of(past.state))
 
 
 def _toes(sensed: Sensed) -> tuple[float, float]:

@@ -23,6 +23,7 @@ from template_control.embedding.planners.walking.step_search import (
     FALL_PRICE,
     Grid,
     Law,
+    Strain,
     Trust,
     choose,
 )
@@ -143,6 +144,8 @@ class LqrPlanner:
             top_margin=o.top_margin,
             earliest=min(o.earliest_touchdown, o.earliest_share * self.gait.step_duration),
             stiffness=p.leg_stiffness,
+            softest=o.softest_rest,
+            strain=Strain(o.strain.reach, o.strain.moment * p.mass * p.gravity, o.strain.price),
             kernel=stride_kernel(p, self._here.stride),
         )
 

@@ -98,6 +98,24 @@ class PushOffOptions(Checked):
     )
 
 
+@dataclass(frozen=True)
+class StrainOptions(Checked):
+    """What a searched step costs whose leg forces are more than a robot's knees carry.
+
+    The numbers are five-link's: 350 N m, and the knee torques of its walks.
+
+    Attributes:
+        reach: length of the template's leg at which the knee is straight: it ends above the hip.
+        moment: of the leg force about the knee, over the weight, from which on a step costs more
+            [m].
+        price: of twice that moment; the LQR's cost-to-go is the unit.
+    """
+
+    reach: Positive = tuned(1.095, LENGTH)
+    moment: Positive = tuned(0.446, LENGTH)
+    price: NotNegative = tuned(100.0)
+
+
 _VLO_STATE = (SPEED, LENGTH, SPEED)
 
 
@@ -119,6 +137,8 @@ class LqrOptions(Checked):
         control_weight: of the settled controls' squared changes [rad, share of k0], where
             an error of ``tolerance`` in a state counts as 1.
         stiffness_range: kappa_1 and kappa_2 over k0.
+        softest_rest: least of them that is chosen for the rest of a step that has begun: a loaded
+            leg that gets softer sinks so low that the knee does not lift it again.
         angle_range: touchdown angle relative to the gait's [rad]; steeper ones make steps
             too short in time for the swing leg, flatter ones let the CoM sink lower than the
             knees can carry it.
@@ -135,6 +155,7 @@ class LqrOptions(Checked):
             to the gait's [rad], kappa_1 and kappa_2 over k0. A leg that is stiffer before its
             virtual bottom than after takes energy out, the reverse puts some in.
         push_off: tuning of the fourth control, in steps that have it.
+        strain: what bounds the leg forces of steps that are searched for.
     """
 
     kind: ClassVar[str] = "lqr"
@@ -149,6 +170,7 @@ class LqrOptions(Checked):
     tolerance: tuple[Positive, Positive, Positive] = tuned((0.011, 0.005, 0.03), *_VLO_STATE)
     control_weight: Positive = tuned(100.0)
     stiffness_range: Interval = tuned((0.5, 1.5))
+    softest_rest: NotNegative = tuned(0.75)
     angle_range: Interval = tuned((-0.12, 0.065))
     top_margin: NotNegative = tuned(0.01)
     earliest_touchdown: NotNegative = tuned(0.12, TIME)
@@ -168,3 +190,4 @@ class LqrOptions(Checked):
         )
     )
     push_off: PushOffOptions = field(default_factory=PushOffOptions)
+    strain: StrainOptions = field(default_factory=StrainOptions)

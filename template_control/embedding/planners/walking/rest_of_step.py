@@ -73,7 +73,7 @@ def choose_rest(law: Law, costs: Array, ahead: Ahead, controls: Array, free: Seq
         slots=slots,
         base=controls[slots],
         change=law.stiffness / np.sqrt(costs[places]),
-        lower=law.lower[places] * law.stiffness,
+        lower=np.maximum(law.lower[places], law.softest) * law.stiffness,
         upper=law.upper[places] * law.stiffness,
         rounds=_ROUNDS,
     )

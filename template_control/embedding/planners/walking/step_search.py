@@ -48,6 +48,20 @@ class Grid(NamedTuple):
     narrowing: float
 
 
+class Strain(NamedTuple):
+    """What a step costs whose leg forces are more than a knee carries.
+
+    Attributes:
+        reach: length of the leg at which the knee is straight [m].
+        most: moment of the leg force about the knee from which on a step costs more [N m].
+        price: of a moment that is twice as much.
+    """
+
+    reach: float
+    most: float
+    price: float
+
+
 class Law(NamedTuple):
     """A bounded linear law u = u_s - K (z - z_s) and what it needs to be judged.
 
@@ -69,6 +83,8 @@ class Law(NamedTuple):
         top_margin: alpha stays this far [rad] below asin(y / l0).
         earliest: alpha also stays below asin(y / l0) this long after VLO [s].
         stiffness: k0 [N/m].
+        softest: least stiffness/k0 that is chosen for the rest of a step.
+        strain: what a step costs that strains the knees.
         kernel: the template's walking step.
     """
 
@@ -88,6 +104,8 @@ class Law(NamedTuple):
     top_margin: float
     earliest: float
     stiffness: float
+    softest: float
+    strain: Strain
     kernel: Kernel
 
 
@@ -106,7 +124,7 @@ class Trust(NamedTuple):
 @callee
 def _copy(source: Array, target: Array) -> None:
     """A slice would take Numba seconds to compile: it prepares what to say of wrong shapes."""
-    for i in range(source.shape[0]):
+    for i in range(target.shape[0]):
         target[i] = source[i]
 
 
@@ -148,7 +166,7 @@ def linear(law: Law, z: Array, u: Array) -> None:
 
 
 @callee
-def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, z_next: Array) -> int:
+def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -> int:
     """Take one walking step of the template, and add the robot's offset to where it ends.
 
     Args:
@@ -157,10 +175,10 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, z_next: Array) -
         s: overwritten.
         z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
         u: (c,) alpha [rad], stiffnesses/k0.
-        z_next: (3,) overwritten with the next VLO state.
+        result: (RESULTS,) overwritten: the next VLO state first; see :func:`~.one_stride`.
 
     Returns:
-        The Outcome's value; ``z_next`` means nothing where that is not SECTION.
+        The Outcome's value; ``result`` means nothing where that is not SECTION.
     """
     # The template's leg would pull at the ground, which no robot's does.
     if z[1] + max(z[2], 0.0) ** 2 / (2.0 * law.kernel.gravity) > law.highest:
@@ -168,14 +186,36 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, z_next: Array) -
     controls = np.zeros(NUM_SLOTS)
     for i in range(u.shape[0]):
         controls[law.slots[i]] = u[i] if i == 0 else u[i] * law.stiffness
-    result = np.empty(RESULTS)
     if exact:
         outcome = one_stride(law.kernel, None, z, controls, s, result)
     else:
         outcome = one_stride(law.kernel, _FAST, z, controls, s, result)
     for i in range(3):
-        z_next[i] = result[i] + law.offset[i]
+        result[i] += law.offset[i]
     return outcome
+
+
+@callee
+def strain(law: Law, u: Array, result: Array) -> float:
+    """What the knees make a step cost, where the legs are shortest.
+
+    A leg of length l bends a knee half-way up it, which is then sqrt(reach^2 - l^2) / 2 beside it.
+
+    Args:
+        law: its ``strain`` and ``stiffness`` count.
+        u: (c,) alpha [rad], stiffnesses/k0.
+        result: (RESULTS,) of the step.
+    """
+    total, l0 = 0.0, law.kernel.rest_length
+    for leg in range(2):
+        length = result[4 + leg]
+        # The rear leg has kappa_1 until the front one lands, and then kappa_p.
+        k = max(u[1], u[u.shape[0] - 1]) if leg == 0 and u.shape[0] > 3 else u[1]
+        arm = 0.5 * np.sqrt(max(law.strain.reach**2 - length**2, 0.0))
+        excess = k * law.stiffness * (l0 - length) * arm / law.strain.most - 1.0
+        if excess > 0.0:
+            total += law.strain.price * excess**2
+    return total
 
 
 @callee
@@ -203,11 +243,12 @@ def price(
         limit: a cost known to be too much; the second step is not looked at beyond it.
         first: (3,) overwritten with the state after one step.
     """
-    second, u2 = np.empty(3), np.empty(u.shape[0])
-    if step(law, exact, s, z, u, first) != 0:
+    result, u2 = np.empty(RESULTS), np.empty(u.shape[0])
+    if step(law, exact, s, z, u, result) != 0:
         return 2.0 * FALL_PRICE
+    _copy(result, first)
     here = _cost_to_go(law.target, law.cost, first)
-    share = law.first_weight * here
+    share = law.first_weight * here + strain(law, u, result)
     for i in range(u.shape[0]):
         share += law.effort[i] * (u[i] - law.control[i]) ** 2
     if share >= limit:
@@ -222,8 +263,9 @@ def price(
                 break
             _copy(law.second_steps[i], u2)
             bounded(law, first, u2)
-        if step(law, exact, s, first, u2, second) == 0:
-            best = min(best, _cost_to_go(law.target, law.cost, second) + share)
+        if step(law, exact, s, first, u2, result) == 0:
+            cost = _cost_to_go(law.target, law.cost, result) + strain(law, u2, result)
+            best = min(best, cost + share)
     return best
 
 

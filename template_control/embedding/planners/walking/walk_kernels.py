@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.embedding.planners.gauss_newton import improve
-from template_control.embedding.planners.walking.step_search import Grid, Law, Trust, choose
+from template_control.embedding.planners.walking.step_search import Grid, Law, Strain, Trust, choose
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.swing_foot import quintic_step
 from template_control.embedding.references.template_path import LOCATE
@@ -98,6 +98,8 @@ def step_search() -> None:
         top_margin=0.01,
         earliest=0.0,
         stiffness=_K0,
+        softest=0.5,
+        strain=Strain(1.1, 350.0, 1.0),
         kernel=stride_kernel(_TEMPLATE, "w"),
     )
     scratch, u, first = new_scratch(), np.ones(3), np.empty(3)
