@@ -86,8 +86,10 @@ ROWS = {
     "catch, runner, 80": Row("walk", "runner", pushes(80.0)),
     "catch, five-link, 60": Row("walk", "five-link", pushes(60.0)),
     "catch, five-link, 80": Row("walk", "five-link", pushes(80.0)),
-    "hard, five-link, 35": Row("walk", "five-link", pushes(35.0, phases=20)),
-    "hard, five-link, -50": Row("walk", "five-link", pushes(-50.0, phases=20)),
+    **{
+        f"hard, five-link, {j}": Row("walk", "five-link", pushes(float(j), phases=20))
+        for j in (35, 45, -50, -65)
+    },
     **{
         f"walk at {v}": Row(f"at {v}", "five-link", pushes(15.0, -15.0))
         for v in (0.4, 0.6, 0.8, 1.0, 1.2, 1.4)

@@ -32,9 +32,9 @@ class Row:
 
 
 ROWS = {
-    "steps-3": Row("one step of 3 cm, up and down in turn, anywhere", 100, round(LAST) + AFTER),
-    "steps-5": Row("one step of 5 cm, up and down in turn, anywhere", 20, round(LAST) + AFTER),
-    "treads": Row("treads of 0.3 to 0.6 m, each within 2 cm of level", 5, 200),
+    "steps-3": Row("one step of 3 cm, up and down in turn, anywhere", 200, round(LAST) + AFTER),
+    "steps-5": Row("one step of 5 cm, up and down in turn, anywhere", 40, round(LAST) + AFTER),
+    "treads": Row("treads of 0.3 to 0.6 m, each within 2 cm of level", 20, 200),
     "slopes": Row("slopes of 4 degrees, up and down", 2, 100),
 }
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+import template_control as tc
 from template_control.embedding.learners.momentum_trim import (
     MomentumTrim,
     TrimOptions,
@@ -220,6 +221,82 @@ def test_surprise_is_a_large_deviation_some_time_after_the_last_plan(gait):
     assert not planning.surprised(0.04, phase_time=0.1, now=0.1)
     assert not planning.surprised(0.06, phase_time=0.01, now=0.1)
     assert not planning.surprised(0.06, phase_time=0.1, now=0.01)
+
+
+def test_a_step_that_does_not_go_on_is_tried_again_and_again(gait):
+    planning = planned(gait)
+    sensed = Sensed(VLO.state(np.array([0.2, 0.85, 0.0])), np.zeros(2))  # it falls back
+    node = planning.decide(VLO, sensed, 0.0, NOTHING)
+    assert not planning.reports[0].decision.feasible
+    assert not planning.surprised(0.0, phase_time=0.01, now=0.01), "this was just planned"
+    assert planning.surprised(0.0, phase_time=0.03, now=0.03)
+    stride = simulate_stride(P, node.name, VLO.state(gait.vlo), gait.controls)
+    sensed.state[:] = stride.sample(0.05)[0][:4]
+    planning.reconsider(node, sensed, 0.03, 0.03)
+    assert planning.reports[0].decision.feasible
+    assert not planning.surprised(0.0, phase_time=0.03, now=0.06)
+
+
+def test_a_stride_may_have_come_here_on_the_legs_of_the_gait(gait):
+    """With legs so stiff the CoM was in the air before."""
+    node, planning = AUTOMATON.node(STRIDE_START["w"]), planned(gait)
+    sensed = Sensed(VLO.state(gait.vlo), np.zeros(2))
+    planning.decide(VLO, sensed, 0.0, NOTHING)
+    stiff = planning.reports[0].decision.controls.copy()
+    stiff[Slot.K_SC] *= 4.0
+    planning.hold(replace(planning.reports[0].decision, controls=stiff))
+    stride = simulate_stride(P, node.name, VLO.state(gait.vlo), gait.controls)
+    sensed.state[:] = stride.sample(0.1)[0][:4]
+    planning.reconsider(node, sensed, 0.1, 0.1)
+    decision = planning.reports[0].decision
+    assert decision.feasible
+    np.testing.assert_allclose(decision.predicted, gait.vlo, atol=1e-3)
+
+
+def knee_moment(gait, z, controls):
+    """Of the stiffest leg's force about its knee at the virtual bottom, at most [N m]."""
+    stride = simulate_stride(gait.parameters, STRIDE_START[gait.stride], VLO.state(z), controls)
+    bottom = next(e for e in stride.events if e.event is Event.VIRTUAL_BOTTOM).state
+    toes = 0.0, stride.toes[0]  # the front leg of the step is the rear one after it
+    moments = []
+    for toe, slots in zip(toes, ((Slot.K_SC, Slot.K_PUSH), (Slot.K_SC,)), strict=True):
+        length = np.hypot(bottom[0] - toe, bottom[1])
+        force = max(controls[slot] for slot in slots) * (gait.parameters.rest_length - length)
+        moments.append(force * 0.5 * np.sqrt(1.095**2 - length**2))
+    return max(moments)
+
+
+@pytest.mark.parametrize(
+    "z", [(0.784, 0.993, 0.05), (0.768, 0.974, 0.298), (0.756, 0.98, 0.156), (0.679, 0.964, 0.283)]
+)
+def test_a_slow_robot_gets_no_step_that_its_knees_do_not_carry(z):
+    """Two-link legs, whose knees are straight at 1.095 m, and 350 N m: five-link's."""
+    gait, free = tc.default_gait(tc.load_robot("five-link")), LqrOptions()
+    free = replace(free, strain=replace(free.strain, price=0.0))
+    z = np.array(z)
+    without, bounded = (LqrPlanner(gait, o).decide(z) for o in (free, LqrOptions()))
+    assert knee_moment(gait, z, without.controls) > 400.0
+    assert knee_moment(gait, z, bounded.controls) < 360.0
+    assert bounded.lasting
+
+
+def test_the_rest_of_a_slow_step_is_not_made_soft():
+    """What brakes takes energy out; that of a fast step may."""
+    gait = tc.default_gait(tc.load_robot("five-link"))
+    planner = LqrPlanner(gait)
+    k0, slots = gait.parameters.leg_stiffness, [int(Slot.K_SD)]
+    for speed, least in ((0.3, 0.75), (1.5, 0.5)):
+        slower = gait.vlo + [speed - gait.vlo[0], 0.0, 0.0]
+
+        def ahead(u, end=slower):
+            # A softer leg always ends nearer to the gait.
+            return end + (gait.vlo - end) * 2.0 * (1.0 - u[Slot.K_SD] / k0), Outcome.SECTION
+
+        decision = planner.decide(gait.vlo)
+        found = planner.land(ahead, decision, gait.vlo, slots)
+        assert found.controls[Slot.K_SD] >= least * k0 - 1.0
+        assert found.controls[Slot.K_SD] < k0
+    assert found.controls[Slot.K_SD] < 0.75 * k0
 
 
 def test_trim_goes_against_the_drift_that_no_control_takes_away(gait):

@@ -44,3 +44,20 @@ def test_the_fastest_walk_does_not_sway_more_and_more():
     error = record.section_state[-20:] - gait.vlo
     assert np.all(np.abs(error.mean(axis=0)) < [0.0145, 0.003, 0.02])
     assert np.all(error.std(axis=0) < [0.03, 0.004, 0.04])
+
+
+@pytest.mark.slow(seconds=20)
+@pytest.mark.parametrize(
+    # Steps that bent the knees to their limit; a leg that sank, and a planner that gave up then.
+    ("impulse", "phase"),
+    [(-50.0, 0.0), (-50.0, 0.1), (-50.0, 0.2), (-50.0, 0.6), (45.0, 0.3)],
+)
+def test_the_default_walk_takes_a_hard_push(impulse, phase):
+    robot = tc.load_robot("five-link")
+    planner = tc.LqrPlanner(tc.default_gait(robot))
+    options = tc.SimulationOptions(
+        steps=18, pushes=(tc.Push(impulse, step=4, phase=phase),), record_every=5
+    )
+    record = tc.simulate(robot, planner, options)
+    assert (record.steps, record.fell) == (18, False)
+    assert record.section_state[-1, 0] == pytest.approx(planner.gait.vlo[0], rel=0.03)

@@ -120,9 +120,22 @@ def test_the_snippet_of_the_documentation_runs(capfd):
 
 @pytest.mark.slow(seconds=40)
 def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
-    (line,) = (x for x in commands() if "--quick" in x and not {"--gait", "--free"} & {*x.split()})
+    others = {"--gait", "--free", "--plant"}
+    (line,) = (x for x in commands() if "--quick" in x and not others & {*x.split()})
     monkeypatch.chdir(tmp_path)
     assert main(shlex.split(line)[1:]) == 0
     assert (tmp_path / "runs" / "robustness" / "five-link" / "robustness.png").is_file()
     out = capfd.readouterr().out
     assert all(d.title in out for d in DISTURBANCES)
+
+
+@pytest.mark.slow(seconds=10)
+def test_the_command_of_the_documentation_for_another_engine_runs(tmp_path, monkeypatch, capfd):
+    (line,) = (x for x in commands() if "--plant" in x)
+    monkeypatch.chdir(tmp_path)
+    assert main([*shlex.split(line)[1:], "--json"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["plant"] == "mujoco"
+    assert (tmp_path / "runs" / "robustness" / "five-link-mujoco").is_dir()
+    (level, _) = found["disturbances"]["noise"]["levels"]
+    assert level["interval"] == [pytest.approx(0.342, abs=1e-3), 1.0]  # two of two

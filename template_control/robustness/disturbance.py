@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import Planner
+from template_control.plant.bullet import PlantOptions
 from template_control.robot.biped import Biped
 from template_control.run.options import SimulationOptions
 from template_control.run.simulation import simulate
@@ -27,11 +28,13 @@ class Situation:
         robot: the model; its last update is overwritten.
         gait: the gait that is kept.
         planner: that keeps it.
+        plant: the world without a disturbance.
     """
 
     robot: Biped
     gait: WalkingGait | RunningGait
     planner: Planner
+    plant: PlantOptions = field(default_factory=PlantOptions)
 
     @property
     def scale(self) -> Scale:
@@ -49,7 +52,8 @@ class Situation:
             (n,) x of the footholds [m], the last step's last; the gait's own if the robot falls,
             as it will then fall with the disturbance as well.
         """
-        record = simulate(self.robot, self.planner, SimulationOptions(steps=steps, start=start))
+        options = SimulationOptions(steps=steps, start=start, plant=self.plant)
+        record = simulate(self.robot, self.planner, options)
         if record.fell:
             return self.gait.step_length * np.arange(steps + 1.0)
         # The last section may round to just after the last sample.
@@ -93,6 +97,8 @@ class Disturbance:
         passing: whether it comes only once: the robot must then be back on its gait at the end.
             Otherwise it lasts from the start, and the robot must only go on.
         grain: levels are whole multiples of it, at least one; 0 for any levels [SI].
+        kick: what a level adds at once to dx/dt, y, dy/dt of the template at its section; None
+            where it is no change of the state.
     """
 
     name: str
@@ -104,6 +110,7 @@ class Disturbance:
     options: Callable[[Situation, float, int], SimulationOptions]
     passing: bool = False
     grain: float = 0.0
+    kick: Callable[[Situation, float], NDArray[np.float64]] | None = None
 
     def levels_for(self, parameters: SlipParameters) -> list[float]:
         """The levels for a template [SI]."""

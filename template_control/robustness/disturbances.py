@@ -7,7 +7,10 @@ weaker motors, which is what its torque limits are for.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.options import EmbeddingOptions
@@ -70,7 +73,15 @@ def pushed(where: Situation, level: float, trial: int, direction: float = 0.0) -
         direction: of a free robot, from forward to the left [rad].
     """
     push = Push(level, BEGIN, trial / PHASES, PUSH_SECONDS * where.scale.time, direction)
-    return SimulationOptions(steps=BEGIN + 1 + AFTER, pushes=(push,))
+    return SimulationOptions(steps=BEGIN + 1 + AFTER, pushes=(push,), plant=where.plant)
+
+
+def _kicked(where: Situation, level: float) -> NDArray[np.float64]:
+    return np.array([level / where.gait.parameters.mass, 0.0, 0.0])
+
+
+def _kicked_back(where: Situation, level: float) -> NDArray[np.float64]:
+    return _kicked(where, -level)
 
 
 def _pushed_back(where: Situation, level: float, trial: int) -> SimulationOptions:
@@ -81,7 +92,7 @@ def _stepped(where: Situation, level: float, trial: int) -> SimulationOptions:
     start = perturbed_start(where.gait, trial)
     before, beyond = where.footholds(start, _SOON + 1)[-2:]
     step = GroundStep(level, float(before + _EDGES[trial] * (beyond - before)))
-    plant = PlantOptions(ground_step=step)
+    plant = replace(where.plant, ground_step=step)
     return SimulationOptions(steps=_SOON + 1 + AFTER, plant=plant, start=start)
 
 
@@ -92,14 +103,14 @@ def _stepped_down(where: Situation, level: float, trial: int) -> SimulationOptio
 def _lasting(
     where: Situation,
     trial: int,
-    plant: PlantOptions | None = None,
     embedding: EmbeddingOptions | None = None,
     sensors: SensorOptions | None = None,
     delay: float = 0.0,
+    plant: PlantOptions | None = None,
 ) -> SimulationOptions:
     return SimulationOptions(
         steps=AFTER,
-        plant=plant or PlantOptions(),
+        plant=plant or where.plant,
         embedding=embedding or EmbeddingOptions(),
         start=perturbed_start(where.gait, trial),
         sensors=sensors or SensorOptions(),
@@ -108,11 +119,11 @@ def _lasting(
 
 
 def _slippery(where: Situation, level: float, trial: int) -> SimulationOptions:
-    return _lasting(where, trial, plant=PlantOptions(friction=level))
+    return _lasting(where, trial, plant=replace(where.plant, friction=level))
 
 
 def _other_mass(where: Situation, level: float, trial: int) -> SimulationOptions:
-    return _lasting(where, trial, plant=PlantOptions(mass_scale=1.0 + level))
+    return _lasting(where, trial, plant=replace(where.plant, mass_scale=1.0 + level))
 
 
 def _weak(where: Situation, level: float, trial: int) -> SimulationOptions:
@@ -154,6 +165,7 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         impulse_unit,
         pushed,
         passing=True,
+        kick=_kicked,
     ),
     Disturbance(
         "push-backward",
@@ -164,6 +176,7 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         impulse_unit,
         _pushed_back,
         passing=True,
+        kick=_kicked_back,
     ),
     Disturbance(
         "step-up", "step up", _CENTIMETRES, _HEIGHTS, len(_EDGES), _length, _stepped, passing=True

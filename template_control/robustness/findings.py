@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from template_control.plant.bullet import PlantOptions
 from template_control.robustness.disturbance import Disturbance
+from template_control.robustness.wilson import wilson_interval
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
 
@@ -27,14 +29,24 @@ class Level:
     astray: int
 
     @property
+    def trials(self) -> int:
+        """How many there were."""
+        return self.succeeded + self.fell + self.astray
+
+    @property
     def rate(self) -> float:
         """Share of the trials that succeeded."""
-        return self.succeeded / (self.succeeded + self.fell + self.astray)
+        return self.succeeded / self.trials
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval of that share."""
+        return wilson_interval(self.succeeded, self.trials)
 
     @property
     def standing(self) -> float:
         """Share of the trials without a fall."""
-        return 1.0 - self.fell / (self.succeeded + self.fell + self.astray)
+        return 1.0 - self.fell / self.trials
 
 
 @dataclass(frozen=True)
@@ -44,10 +56,12 @@ class Finding:
     Attributes:
         disturbance: the one that was raised.
         levels: those tried, from mild to severe.
+        template: the template's own limit; see :func:`~.template_limit.template_limit`.
     """
 
     disturbance: Disturbance
     levels: tuple[Level, ...] = ()
+    template: float | None = None
 
     @property
     def breaking_point(self) -> float | None:
@@ -90,6 +104,7 @@ class Robustness:
         gait: that it kept.
         speed_error, height_error: undisturbed, relative, as trials are judged.
         findings: one a disturbance.
+        plant: the engine that it went in.
     """
 
     robot: str
@@ -97,3 +112,4 @@ class Robustness:
     speed_error: float
     height_error: float
     findings: tuple[Finding, ...]
+    plant: str = PlantOptions.kind

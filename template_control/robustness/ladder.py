@@ -17,16 +17,15 @@ import numpy as np
 
 from template_control import settings
 from template_control.checks.checked import checked
-from template_control.embedding.planners.running import RunningOptions
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.robustness.aside import ALL
 from template_control.robustness.disturbance import Disturbance, Situation
 from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES
 from template_control.robustness.findings import Finding, Level, Robustness
 from template_control.robustness.fingerprint import fingerprint
-from template_control.run.choices.gait import GaitChoice
+from template_control.robustness.subject import Engine, Subject
+from template_control.robustness.template_limit import template_limit
 from template_control.run.choices.robot import RobotChoice
-from template_control.run.config import RunConfig
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
@@ -59,14 +58,8 @@ def off_gait(record: Record, gait: Gait) -> tuple[float, float]:
     return float(speed / pace - 1.0), float(height / gait.state[1] - 1.0)
 
 
-def _situation(choice: RobotChoice, speed: float | None) -> Situation:
-    """The robot and its gait: a walk, of a free robot at ``speed``, or a run with it at apex."""
-    if speed is None or choice.free:
-        config = RunConfig(choice, GaitChoice(speed=speed))
-    else:
-        config = RunConfig(choice, GaitChoice("run", speed), RunningOptions())
-    ready = config.prepare()
-    return Situation(ready.robot, ready.gait, ready.planners[ready.gait.stride])
+def _situation(subject: Subject) -> Situation:
+    return subject.situation()
 
 
 @checked
@@ -76,6 +69,7 @@ def trial(
     level: float,
     number: int,
     speed: float | None = None,
+    plant: Engine = "pybullet",
 ) -> dict[str, Any]:
     """One walk or run under one disturbance, as a sweep's worker runs it.
 
@@ -84,13 +78,13 @@ def trial(
         disturbance: name of the disturbance.
         level: the disturbance's size for this robot [SI].
         number: of the trial, from 0; trials of a level differ by it.
-        speed: as for :func:`measure`.
+        speed, plant: as of a :class:`~.subject.Subject`.
 
     Returns:
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
     """
     choice = RobotChoice(robot) if isinstance(robot, str) else _choice(robot)
-    where = _situation(choice, speed)
+    where = _situation(Subject(choice, speed, plant))
     options = _BY_NAME[disturbance].options(where, level, number)
     record = simulate(where.robot, where.planner, options)
     errors = (None, None) if record.fell else off_gait(record, where.gait)
@@ -109,18 +103,17 @@ def _choice(table: dict[str, Any]) -> RobotChoice:
 
 @checked
 def measure(
-    robot: str | RobotChoice,
+    robot: str | RobotChoice | Subject,
     names: Sequence[str] | None = None,
     folder: Path | None = None,
     executor: Executor | None = None,
     quick: bool = False,
     progress: bool = True,
-    speed: float | None = None,
 ) -> Robustness:
     """Raise disturbances until the robot's walk or run breaks.
 
     Args:
-        robot: name or URDF path, or which one.
+        robot: name or URDF path, or which one; or what it keeps and where, as well.
         names: of the disturbances; None for all that it can have.
         folder: for the trials' results, from which the same call goes on; None keeps them in
             memory. They are those of this code and this URDF: after a change of either all
@@ -128,8 +121,6 @@ def measure(
         executor: where to run the trials; None for one process a core.
         quick: two levels of two trials each, to see that everything works.
         progress: show a bar a level on stderr.
-        speed: of a run, dx/dt at apex [m/s]; of a free robot, which walks, its mean speed. None:
-            the robot walks its own gait.
 
     Raises:
         ParameterError: if there is no such disturbance, or a planar robot cannot have it.
@@ -137,21 +128,27 @@ def measure(
         GaitError: if no run has this speed.
         SweepError: if a trial fails for another reason than a fall, or files do not fit.
     """
-    choice = RobotChoice(robot) if isinstance(robot, str) else robot
+    subject = _subject(robot)
+    choice = subject.robot
     known = {d.name: d for d in (ALL if choice.free else DISTURBANCES)}
     wanted = set(known if names is None else names)
     if not wanted or not wanted <= set(known):
         raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(known)}")
-    where = _situation(choice, speed)
+    where = _situation(subject)
     model, gait = where.robot, where.gait
     undisturbed = _undisturbed(choice.model, where)
     chosen = [_shortened(d, quick) for name, d in known.items() if name in wanted]
     levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
     called = choice.model if choice == RobotChoice(choice.model) else settings.to_table(choice)
-    moving: Item = {} if speed is None else {"speed": speed}
+    moving: Item = {} if subject.speed is None else {"speed": subject.speed}
+    if subject.plant != Subject.plant:
+        moving["plant"] = subject.plant
     trials = [(d.name, d.levels, d.trials) for d in chosen]
     stem = fingerprint(model, trials, moving, choice.free)
-    found = {d.name: Finding(d) for d in chosen}
+    found = {
+        d.name: Finding(d, template=template_limit(known[d.name], where, AFTER, SETTLED))
+        for d in chosen
+    }
     for index in range(max(len(of) for of in levels.values())):
         going = [d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken]
         items: list[Item] = [
@@ -180,13 +177,21 @@ def measure(
         for d in going:
             of_level = [next(results) for _ in range(d.trials)]
             level = _judged(d, levels[d.name][index], of_level)
-            found[d.name] = Finding(d, (*found[d.name].levels, level))
+            found[d.name] = replace(found[d.name], levels=(*found[d.name].levels, level))
     errors = off_gait(undisturbed, gait)
-    return Robustness(model.name, gait, *errors, findings=tuple(found[d.name] for d in chosen))
+    findings = tuple(found[d.name] for d in chosen)
+    return Robustness(model.name, gait, *errors, findings, subject.plant)
+
+
+def _subject(robot: str | RobotChoice | Subject) -> Subject:
+    if isinstance(robot, Subject):
+        return robot
+    return Subject(RobotChoice(robot) if isinstance(robot, str) else robot)
 
 
 def _undisturbed(robot: str, where: Situation) -> Record:
-    record = simulate(where.robot, where.planner, SimulationOptions(steps=BEGIN + 1 + AFTER))
+    options = SimulationOptions(steps=BEGIN + 1 + AFTER, plant=where.plant)
+    record = simulate(where.robot, where.planner, options)
     if record.fell:
         raise RobotError(
             f"{robot} falls without a disturbance ({record.metadata['fall_reason']}):"

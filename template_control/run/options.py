@@ -52,15 +52,15 @@ class FallOptions(Checked):
             the rattle of a contact solver.
         height: share of the template's rest length. A robot whose hips are nearer to the ground
             has fallen.
-        flight: share of the template's rest length. Hips that are further above the ground were
-            thrown there by a simulation that diverged.
+        thrown: multiple of sqrt(g l0). Where the base is said to move faster, the simulation or
+            what is sensed of it has diverged.
         pitch: a trunk that leans further than this has fallen [rad].
         patience: number of the gait's step durations that may pass without a section.
     """
 
     contact_force: NotNegative = tuned(0.005)
     height: NotNegative = tuned(0.35)
-    flight: Positive = tuned(10.0)
+    thrown: Positive = tuned(30.0)
     pitch: Positive = tuned(float(np.radians(60.0)))
     patience: Positive = tuned(4.0)
 

@@ -13,6 +13,7 @@ from template_control import settings
 from template_control.cli.options.ranges import check_ranges
 from template_control.cli.options.robot import add_robot_options, robot_choice
 from template_control.cli.trials.common import (
+    add_engine,
     add_gait,
     add_printed,
     add_workers,
@@ -21,7 +22,7 @@ from template_control.cli.trials.common import (
     worker_count,
 )
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.robustness.campaign import (
+from template_control.robustness.campaigns.campaign import (
     ASTRAY,
     Campaign,
     Conditions,
@@ -29,7 +30,7 @@ from template_control.robustness.campaign import (
     run_campaign,
     save_falls,
 )
-from template_control.robustness.mix import FREE_MIX, Mix
+from template_control.robustness.campaigns.mix import FREE_MIX, Mix
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
 from template_control.storage import Files, writable, write_text
@@ -54,9 +55,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     add_robot_options(parser)
     add_gait(parser, "of the gait, as walk or run take it")
-    parser.add_argument(
-        "--plant", choices=("pybullet", "mujoco"), default="pybullet", help="physics engine"
-    )
+    add_engine(parser)
     parser.add_argument("--trials", type=int, default=100, metavar="N", help="how many")
     parser.add_argument(
         "--mix",

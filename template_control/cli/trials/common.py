@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from template_control.cli.report.output import INTERRUPTED
 from template_control.errors import ParameterError
+from template_control.robustness.subject import ENGINES, Subject
 from template_control.view.figure_file import save_figure
 
 _MOST = 1000
@@ -27,6 +28,17 @@ def add_gait(parser: argparse.ArgumentParser, speed: str) -> None:
     """
     parser.add_argument("--gait", choices=("walk", "run"), default="walk", help="what it keeps")
     parser.add_argument("--speed", type=float, metavar="M/S", help=speed)
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """Add ``--plant``.
+
+    Args:
+        parser: of the command.
+    """
+    parser.add_argument(
+        "--plant", choices=tuple(ENGINES), default=Subject.plant, help="physics engine"
+    )
 
 
 def add_printed(parser: argparse.ArgumentParser) -> None:

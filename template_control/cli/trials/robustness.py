@@ -13,6 +13,7 @@ from template_control.cli.options.gait import SPEEDS
 from template_control.cli.options.ranges import check_ranges
 from template_control.cli.options.robot import add_robot
 from template_control.cli.trials.common import (
+    add_engine,
     add_gait,
     add_printed,
     add_workers,
@@ -26,6 +27,7 @@ from template_control.robustness.aside import ALL
 from template_control.robustness.disturbances import AFTER
 from template_control.robustness.findings import Finding, Robustness
 from template_control.robustness.ladder import SETTLED, measure
+from template_control.robustness.subject import Subject
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
 from template_control.slip.gaits.running_gait import RunningGait
@@ -39,8 +41,10 @@ _COLUMNS = (
     "disturbance",
     "trials",
     "all succeed up to",
+    "with 95 %",
     "half succeed up to",
     "none falls up to",
+    "template, at its section",
     "first failures",
 )
 
@@ -69,6 +73,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"only this one; may be given several times. One of {', '.join(_NAMES)}",
     )
+    add_engine(parser)
     parser.add_argument(
         "--quick", action="store_true", help="two levels of two trials each, to see that it works"
     )
@@ -77,7 +82,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=Path,
         help="folder for the trials and the figure; by default runs/robustness/ROBOT, with -run of"
-        " a run and -free of a free robot",
+        " a run, -free of a free robot, and the engine's name if it is not PyBullet",
     )
     add_printed(parser)
 
@@ -93,10 +98,12 @@ def run(options: argparse.Namespace) -> int:
     choice = RobotChoice(options.robot, free=options.free)
     speed, name = _speed(options, choice), Path(options.robot).stem
     name += "-free" * choice.free + "-run" * (options.gait == "run")
+    name += f"-{options.plant}" * (options.plant != Subject.plant)
+    subject = Subject(choice, speed, options.plant)
     folder = writable(options.output or Path("runs/robustness") / name)
     try:
         with workers(count) as pool, stdout_to_stderr():
-            found = measure(choice, options.disturbance, folder, pool, options.quick, speed=speed)
+            found = measure(subject, options.disturbance, folder, pool, options.quick)
     except KeyboardInterrupt:
         return kept(folder)
     files = Files()
@@ -132,14 +139,15 @@ def data(found: Robustness) -> dict[str, Any]:
     """The findings as plain data; levels and breaking points in SI units.
 
     Returns:
-        robot, gait (mean_speed, and vlo_height or, of a run, apex_height), undisturbed
+        robot, plant, gait (mean_speed, and vlo_height or, of a run, apex_height), undisturbed
         (speed_error, height_error), disturbances: by name trials, breaking_point, half_point,
-        standing_point (null where the mildest level is beyond it) and levels (level,
-        success_rate, fell, astray).
+        standing_point (null where the mildest level is beyond it), template (its own limit; null
+        without one) and levels (level, success_rate, interval with 95 %, fell, astray).
     """
     height = "apex_height" if isinstance(found.gait, RunningGait) else "vlo_height"
     return {
         "robot": found.robot,
+        "plant": found.plant,
         "gait": {"mean_speed": found.gait.mean_speed, height: float(found.gait.state[1])},
         "undisturbed": {"speed_error": found.speed_error, "height_error": found.height_error},
         "disturbances": {
@@ -148,10 +156,12 @@ def data(found: Robustness) -> dict[str, Any]:
                 "breaking_point": f.breaking_point,
                 "half_point": f.half_point,
                 "standing_point": f.standing_point,
+                "template": f.template,
                 "levels": [
                     {
                         "level": level.level,
                         "success_rate": level.rate,
+                        "interval": level.interval,
                         "fell": level.fell,
                         "astray": level.astray,
                     }
@@ -173,8 +183,28 @@ def _row(finding: Finding) -> tuple[str, ...]:
 
     after = next((x for x in finding.levels if x.rate < 1.0), None)
     beyond = "" if after is None else f"{d.shown(after.level)}: {_told(after.fell, after.astray)}"
-    points = (finding.breaking_point, finding.half_point, finding.standing_point)
-    return d.title, str(d.trials), *map(point, points), beyond
+    all_good, half, standing = map(
+        point, (finding.breaking_point, finding.half_point, finding.standing_point)
+    )
+    return d.title, str(d.trials), all_good, _sure(finding), half, standing, _limit(finding), beyond
+
+
+def _sure(finding: Finding) -> str:
+    """How many trials of the breaking point's level would succeed, with 95 % confidence."""
+    for level in finding.levels:
+        if level.level == finding.breaking_point:
+            return f"{100 * level.interval[0]:.0f} to {100 * level.interval[1]:.0f} %"
+    return ""
+
+
+def _limit(finding: Finding) -> str:
+    """The template's own limit."""
+    d, most = finding.disturbance, finding.template
+    if most is None:
+        return ""
+    if most == 0.0:
+        return f"not {d.shown(finding.levels[0].level)}"
+    return d.shown(most)
 
 
 def _told(fell: int, astray: int) -> str:
@@ -184,7 +214,7 @@ def _told(fell: int, astray: int) -> str:
 
 def _title(found: Robustness) -> str:
     return (
-        f"{found.robot} at {found.gait.mean_speed:.3f} m/s; undisturbed it is"
+        f"{found.robot} at {found.gait.mean_speed:.3f} m/s in {found.plant}; undisturbed it is"
         f" {100 * found.speed_error:+.2f} % in speed and {100 * found.height_error:+.2f} % in"
         " height from its gait"
     )

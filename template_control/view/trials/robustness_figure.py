@@ -6,12 +6,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from template_control.robustness.disturbances import AFTER
 from template_control.robustness.findings import Finding, Robustness
 from template_control.view.style import as_text
 
 _RATE, _STANDING, _POINT = "#2a6196", "0.6", "#db7321"
+_TEMPLATE = "#3d8a4f"
 _COLUMNS = 5
 
 
@@ -19,7 +21,8 @@ def robustness_figure(found: Robustness) -> Figure:
     """Success rate in per cent over the levels, severity growing to the right.
 
     The dashed line is the breaking point: the last level up to which all trials succeed. Grey:
-    trials without a fall, where success asks for more.
+    trials without a fall, where success asks for more. The band holds the true rate with 95 %
+    confidence. Dotted: what the template alone takes at its section.
     """
     columns = min(_COLUMNS, len(found.findings))
     rows = -(-len(found.findings) // columns)
@@ -30,13 +33,19 @@ def robustness_figure(found: Robustness) -> Figure:
     for axes in panels[len(found.findings) :]:
         axes.set_visible(False)
     figure.supylabel("success rate [%]", fontsize=9)
-    figure.suptitle(f"{as_text(found.robot)}: success over {AFTER} steps", fontsize=10)
+    figure.suptitle(
+        f"{as_text(found.robot)} in {found.plant}: success over {AFTER} steps", fontsize=10
+    )
     marks = (
         Line2D([], [], color=_RATE, marker="o", markersize=3.5, label="success"),
         Line2D([], [], color=_STANDING, label="no fall"),
         Line2D([], [], color=_POINT, linestyle="--", label="breaking point"),
+        Patch(color=_RATE, alpha=0.15, label="95 % confidence"),
+        Line2D([], [], color=_TEMPLATE, linestyle=":", label="the template alone"),
     )
-    figure.legend(handles=marks, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    figure.legend(
+        handles=marks, loc="outside lower center", ncols=len(marks), fontsize=8, frameon=False
+    )
     return figure
 
 
@@ -47,7 +56,12 @@ def _panel(axes: Axes, finding: Finding) -> None:
     if d.passing:
         standing = 100.0 * np.array([level.standing for level in finding.levels])
         axes.plot(levels, standing, ".-", color=_STANDING, linewidth=1.2)
+    sure = 100.0 * np.array([level.interval for level in finding.levels])
+    axes.fill_between(levels, *sure.T, color=_RATE, alpha=0.15, linewidth=0.0)
     axes.plot(levels, rates, "o-", color=_RATE, markersize=3.5, linewidth=1.2)
+    if finding.template:
+        limit = d.unit.factor * finding.template
+        axes.axvline(limit, color=_TEMPLATE, linestyle=":", linewidth=1.2)
     if finding.breaking_point is not None:
         axes.axvline(
             d.unit.factor * finding.breaking_point, color=_POINT, linestyle="--", linewidth=1.0

@@ -137,8 +137,9 @@ class LqrOptions(Checked):
         control_weight: of the settled controls' squared changes [rad, share of k0], where
             an error of ``tolerance`` in a state counts as 1.
         stiffness_range: kappa_1 and kappa_2 over k0.
-        softest_rest: least of them that is chosen for the rest of a step that has begun: a loaded
-            leg that gets softer sinks so low that the knee does not lift it again.
+        softest_rest: least of them that is chosen for the rest of a step that has begun and ends
+            slow: a loaded leg that gets softer takes energy out, and sinks so low that the knee
+            does not lift it again.
         angle_range: touchdown angle relative to the gait's [rad]; steeper ones make steps
             too short in time for the swing leg, flatter ones let the CoM sink lower than the
             knees can carry it.

@@ -20,6 +20,7 @@ from template_control.slip.automaton.vocabulary import Outcome
 
 Array = NDArray[np.float64]
 
+_FLIES = Outcome.UNWANTED_FLIGHT
 _ROUNDS = 6  # of Gauss and Newton's method; most choices take three
 
 
@@ -66,6 +67,9 @@ def choose_rest(law: Law, costs: Array, ahead: Ahead, controls: Array, free: Seq
         controls: (NUM_SLOTS,) that hold so far.
         free: slots of the stiffnesses that the rest depends on.
     """
+    before, outcome = ahead(controls)
+    slow = before[0] < law.target[0] if outcome is Outcome.SECTION else outcome is not _FLIES
+    softest = law.softest if slow else 0.0
     places = [place for place, slot in enumerate(law.slots) if place and slot in free]
     slots = [int(law.slots[place]) for place in places]
     prior = Prior(
@@ -73,7 +77,7 @@ def choose_rest(law: Law, costs: Array, ahead: Ahead, controls: Array, free: Seq
         slots=slots,
         base=controls[slots],
         change=law.stiffness / np.sqrt(costs[places]),
-        lower=np.maximum(law.lower[places], law.softest) * law.stiffness,
+        lower=np.maximum(law.lower[places], softest) * law.stiffness,
         upper=law.upper[places] * law.stiffness,
         rounds=_ROUNDS,
     )
@@ -83,5 +87,4 @@ def choose_rest(law: Law, costs: Array, ahead: Ahead, controls: Array, free: Seq
     if weighed is None:
         return Rest(u, None, None)
     end: Array = np.linalg.solve(root, weighed).astype(np.float64)
-    before, outcome = ahead(controls)
     return Rest(u, end, end - before if outcome is Outcome.SECTION else None)

@@ -83,7 +83,7 @@ class Law(NamedTuple):
         top_margin: alpha stays this far [rad] below asin(y / l0).
         earliest: alpha also stays below asin(y / l0) this long after VLO [s].
         stiffness: k0 [N/m].
-        softest: least stiffness/k0 that is chosen for the rest of a step.
+        softest: least stiffness/k0 that is chosen for the rest of a slow step.
         strain: what a step costs that strains the knees.
         kernel: the template's walking step.
     """
@@ -196,17 +196,22 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -
 
 
 @callee
-def strain(law: Law, u: Array, result: Array) -> float:
+def strain(law: Law, z: Array, u: Array, result: Array) -> float:
     """What the knees make a step cost, where the legs are shortest.
 
     A leg of length l bends a knee half-way up it, which is then sqrt(reach^2 - l^2) / 2 beside it.
+    A robot that is fast may strain its knees: legs that brake as they can slow it down all the
+    same. One that is slow sinks.
 
     Args:
-        law: its ``strain`` and ``stiffness`` count.
+        law: its ``strain``, ``stiffness`` and ``target`` count.
+        z: (3,) VLO state that the step begins in.
         u: (c,) alpha [rad], stiffnesses/k0.
         result: (RESULTS,) of the step.
     """
     total, l0 = 0.0, law.kernel.rest_length
+    if z[0] >= law.target[0]:
+        return total
     for leg in range(2):
         length = result[4 + leg]
         # The rear leg has kappa_1 until the front one lands, and then kappa_p.
@@ -248,7 +253,7 @@ def price(
         return 2.0 * FALL_PRICE
     _copy(result, first)
     here = _cost_to_go(law.target, law.cost, first)
-    share = law.first_weight * here + strain(law, u, result)
+    share = law.first_weight * here + strain(law, z, u, result)
     for i in range(u.shape[0]):
         share += law.effort[i] * (u[i] - law.control[i]) ** 2
     if share >= limit:
@@ -264,7 +269,7 @@ def price(
             _copy(law.second_steps[i], u2)
             bounded(law, first, u2)
         if step(law, exact, s, first, u2, result) == 0:
-            cost = _cost_to_go(law.target, law.cost, result) + strain(law, u2, result)
+            cost = _cost_to_go(law.target, law.cost, result) + strain(law, first, u2, result)
             best = min(best, cost + share)
     return best
 

@@ -8,7 +8,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from math import radians
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from template_control import settings
 from template_control.checks.checked import Checked, checked
@@ -16,14 +16,13 @@ from template_control.checks.ranges import Count, Index
 from template_control.embedding.planners.running import RunningOptions
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.errors import ParameterError, SweepError
-from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
-from template_control.plant.mujoco import MujocoOptions
+from template_control.robustness.campaigns.first_wrong import first_wrong
+from template_control.robustness.campaigns.mix import Draw, Mix
 from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
 from template_control.robustness.fingerprint import fingerprint
-from template_control.robustness.first_wrong import first_wrong
 from template_control.robustness.ladder import off_gait
-from template_control.robustness.mix import Draw, Mix
+from template_control.robustness.subject import ENGINES, Engine
 from template_control.robustness.wilson import wilson_interval
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
@@ -35,8 +34,6 @@ from template_control.sweep.sweep import Item, SweepOptions, item_seed, sweep
 
 ASTRAY = 0.03
 """Share of the gait's mean speed beyond which a robot is off its gait after the last step."""
-
-_PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions)}
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,7 @@ class Conditions(Checked):
 
     robot: RobotChoice = field(default_factory=RobotChoice)
     gait: GaitChoice = field(default_factory=GaitChoice)
-    plant: Literal["pybullet", "mujoco"] = "pybullet"
+    plant: Engine = "pybullet"
     mix: Mix = field(default_factory=Mix)
     seed: Index = 0
 
@@ -91,7 +88,7 @@ class Conditions(Checked):
         ready = config.prepare()
         gait, draw = ready.gait, self.draw(number)
         scale = Scale.of(gait.parameters)
-        plant = _PLANTS[self.plant](
+        plant = ENGINES[self.plant](
             friction=draw.friction,
             mass_scale=1.0 + draw.mass,
             ground_step=_ground_step(draw, scale.length, gait.step_length),

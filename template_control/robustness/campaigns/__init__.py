@@ -1,0 +1,1 @@
+"""Many trials with everything disturbed at once: how sure a gait is."""

@@ -1,0 +1,51 @@
+"""What is disturbed: the robot, what it keeps, and the engine that it goes in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from template_control.checks.checked import Checked
+from template_control.embedding.planners.running import RunningOptions
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.mujoco import MujocoOptions
+from template_control.robustness.disturbance import Situation
+from template_control.run.choices.gait import GaitChoice
+from template_control.run.choices.robot import RobotChoice
+from template_control.run.config import RunConfig
+
+Engine = Literal["pybullet", "mujoco"]
+"""A physics engine, by the ``kind`` of its options."""
+
+ENGINES: dict[str, type[PlantOptions]] = {o.kind: o for o in (PlantOptions, MujocoOptions)}
+"""Options of each."""
+
+
+@dataclass(frozen=True)
+class Subject(Checked):
+    """What is disturbed.
+
+    Attributes:
+        robot: which one.
+        speed: of a run, dx/dt at apex [m/s]; of a free robot, which walks, its mean speed. None:
+            the robot walks its own gait.
+        plant: the engine.
+    """
+
+    robot: RobotChoice = field(default_factory=RobotChoice)
+    speed: float | None = None
+    plant: Engine = "pybullet"
+
+    def situation(self) -> Situation:
+        """The robot with its gait and planner, and the world.
+
+        Raises:
+            TemplateControlError: if robot or gait is not to be had.
+        """
+        if self.speed is None or self.robot.free:
+            config = RunConfig(self.robot, GaitChoice(speed=self.speed))
+        else:
+            config = RunConfig(self.robot, GaitChoice("run", self.speed), RunningOptions())
+        ready = config.prepare()
+        planner = ready.planners[ready.gait.stride]
+        return Situation(ready.robot, ready.gait, planner, ENGINES[self.plant]())
