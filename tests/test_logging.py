@@ -58,7 +58,7 @@ def told_of(impulse, robot, gait, caplog):
 
 
 def test_every_section_is_told(robot, default_gait, caplog):
-    record, told = told_of(-40.0, robot, default_gait, caplog)
+    record, told = told_of(-60.0, robot, default_gait, caplog)
     texts = [m.getMessage() for m in told if m.levelno == logging.DEBUG]
     assert sum("wanted" in text for text in texts) == record.steps == 4
     # What a section decided; a plan between two sections may replace it in the record.
@@ -68,6 +68,6 @@ def test_every_section_is_told(robot, default_gait, caplog):
 
 
 def test_a_stride_that_the_template_cannot_make_is_told(robot, default_gait, caplog):
-    _, told = told_of(-60.0, robot, default_gait, caplog)
+    _, told = told_of(-90.0, robot, default_gait, caplog)
     (refused,) = [m for m in told if "no stride of the template" in m.getMessage()]
     assert refused.levelno == logging.WARNING

@@ -1,5 +1,6 @@
 """Files of records: what is read back, and how a file that is none is told."""
 
+import io
 import json
 import zipfile
 from dataclasses import fields
@@ -7,6 +8,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+import template_control as tc
 from template_control.errors import RecordError
 from template_control.run.record import Record
 from template_control.slip.scenario.record import ScenarioRecord
@@ -14,18 +16,38 @@ from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import example_one
 
 
-@pytest.fixture
-def saved(short_walk, tmp_path):
-    return short_walk.save(tmp_path / "run.npz")
+@pytest.fixture(scope="module")
+def short_walk(default_gait):
+    """A step with few samples: here it is written and read hundreds of times."""
+    options = tc.SimulationOptions(steps=1, record_every=20)
+    return tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(default_gait), options)
+
+
+@pytest.fixture(scope="module")
+def content(short_walk, tmp_path_factory):
+    return short_walk.save(tmp_path_factory.mktemp("record") / "run.npz").read_bytes()
 
 
 @pytest.fixture
-def rewritten(saved):
+def saved(content, tmp_path):
+    path = tmp_path / "run.npz"
+    path.write_bytes(content)
+    return path
+
+
+@pytest.fixture(scope="module")
+def written(content):
+    """The file's fields."""
+    with np.load(io.BytesIO(content)) as data:
+        return {name: data[name] for name in data.files}
+
+
+@pytest.fixture
+def rewritten(saved, written):
     """Writes the run anew with other fields, and other entries of the metadata."""
 
     def rewrite(metadata=None, **changes):
-        with np.load(saved) as data:
-            values = {name: data[name] for name in data.files}
+        values = dict(written)
         told = json.loads(str(values["metadata"]))
         told.update(metadata or {})
         np.savez(saved, **{**values, "metadata": np.array(json.dumps(told)), **changes})
@@ -71,9 +93,8 @@ def test_a_damaged_field_is_named(saved):
 
 
 @pytest.mark.parametrize("name", [f.name for f in fields(Record)])
-def test_a_missing_field_is_named(saved, name):
-    with np.load(saved) as data:
-        np.savez(saved, **{key: data[key] for key in data.files if key != name})
+def test_a_missing_field_is_named(saved, written, name):
+    np.savez(saved, **{key: value for key, value in written.items() if key != name})
     with pytest.raises(RecordError, match=rf"no recorded run \(it lacks {name}\)"):
         Record.load(saved)
 
