@@ -12,7 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.planner import Decision, Planner, Planners, SlopePlanner
+from template_control.embedding.planners.planner import (
+    CurvePlanner,
+    Decision,
+    Planner,
+    Planners,
+    SlopePlanner,
+)
 from template_control.embedding.planning import choosing_again
 from template_control.embedding.planning.breaking import find_break
 from template_control.embedding.planning.planned_path import PlannedPath
@@ -269,7 +275,8 @@ class StridePlanning(PlannedPath):
     def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
         """Whether a disturbance has carried the robot away from its path.
 
-        Where the robot has broken into a stride, a path that leads nowhere is one as well.
+        Where the robot has broken into a stride, or no stride went on, a path that leads nowhere is
+        one as well.
 
         Args:
             deviation: of the forward speed from the path's [m/s].
@@ -282,7 +289,11 @@ class StridePlanning(PlannedPath):
         if abs(deviation) > o.speed and phase_time > o.interval:
             self._excess += deviation
             return True
-        return not self._whole and (self._broken or not self.reports[-1].decision.feasible)
+        return not self._whole and (self._broken or self._gave_up())
+
+    def _gave_up(self) -> bool:
+        """Whether no stride went on; one along a curve is left to it."""
+        return not (self.reports[-1].decision.feasible or isinstance(self.planner, CurvePlanner))
 
     def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.
