@@ -102,7 +102,8 @@ class PushOffOptions(Checked):
 class StrainOptions(Checked):
     """What a searched step costs whose leg forces are more than a robot's knees carry.
 
-    The numbers are five-link's: 350 N m, and the knee torques of its walks.
+    The numbers are five-link's: its knees have 350 N m, and its walks need some of them for the
+    other leg's swing.
 
     Attributes:
         reach: length of the template's leg at which the knee is straight: it ends above the hip.
@@ -112,7 +113,7 @@ class StrainOptions(Checked):
     """
 
     reach: Positive = tuned(1.095, LENGTH)
-    moment: Positive = tuned(0.446, LENGTH)
+    moment: Positive = tuned(0.41, LENGTH)
     price: NotNegative = tuned(100.0)
 
 
