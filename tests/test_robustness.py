@@ -20,7 +20,7 @@ from template_control.robustness.disturbance import Situation
 from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES
 from template_control.robustness.findings import Finding, Level
 from template_control.robustness.ladder import SETTLED, measure, off_gait, trial
-from template_control.robustness.subject import ENGINES
+from template_control.robustness.subject import ENGINES, Subject
 from template_control.robustness.template_limit import template_limit
 from template_control.robustness.wilson import wilson_interval
 from template_control.run.choices.robot import RobotChoice
@@ -264,7 +264,7 @@ def test_files_are_of_this_robot_and_these_trials(cheap, tmp_path, monkeypatch):
     stiff.urdf += "<!-- another -->"
     gait = tc.default_gait(stiff)
     where = Situation(stiff, gait, LqrPlanner(gait))
-    monkeypatch.setattr(robustness, "_situation", lambda *_: where)
+    monkeypatch.setattr(Subject, "situation", lambda _: where)
     cheap(["heavier"], tmp_path, quick=True)
     third = set(tmp_path.glob("*.jsonl")) - first - second
     assert len(first) == len(second) == len(third) == 2

@@ -58,10 +58,6 @@ def off_gait(record: Record, gait: Gait) -> tuple[float, float]:
     return float(speed / pace - 1.0), float(height / gait.state[1] - 1.0)
 
 
-def _situation(subject: Subject) -> Situation:
-    return subject.situation()
-
-
 @checked
 def trial(
     robot: str | dict[str, Any],
@@ -84,7 +80,7 @@ def trial(
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
     """
     choice = RobotChoice(robot) if isinstance(robot, str) else _choice(robot)
-    where = _situation(Subject(choice, speed, plant))
+    where = Subject(choice, speed, plant).situation()
     options = _BY_NAME[disturbance].options(where, level, number)
     record = simulate(where.robot, where.planner, options)
     errors = (None, None) if record.fell else off_gait(record, where.gait)
@@ -134,7 +130,7 @@ def measure(
     wanted = set(known if names is None else names)
     if not wanted or not wanted <= set(known):
         raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(known)}")
-    where = _situation(subject)
+    where = subject.situation()
     model, gait = where.robot, where.gait
     undisturbed = _undisturbed(choice.model, where)
     chosen = [_shortened(d, quick) for name, d in known.items() if name in wanted]
