@@ -238,6 +238,7 @@ def test_nothing_hides_anything(automaton):
     assert min(apart) > 2 * radius
 
 
+@pytest.mark.slow(seconds=2)
 def test_section_edges_stand_out():
     figure = drawn(AUTOMATON)
     patches = [p for p in figure.axes[0].patches if isinstance(p, FancyArrowPatch)]

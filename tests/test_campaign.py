@@ -154,10 +154,25 @@ def test_shares_and_figure_of_a_campaign():
     assert found.reasons == {"slip": 4}
     low, high = found.interval(found.fell)
     assert low < 0.1 < high
-    panels = [axes for axes in campaign_figure(found).axes if axes.get_visible()]
+    panels = _panels(found)
     assert len(panels) == 8  # severity, and seven ranges with a width
-    no_fall = [line.get_ydata() for line in panels[0].containers[0].lines[:1]]
-    assert 0.0 <= float(no_fall[0][0]) <= 100.0
+    marks, _, _ = panels[0].containers[0].lines
+    assert 0.0 <= float(marks.get_ydata()[0]) <= 100.0
+    # Where nearly all go well, a scale from 0 to 100 % would hide the intervals.
+    sure = replace(found, trials=tuple(t for t in trials if t.good))
+    for campaign in (found, sure):
+        lows = [
+            container.lines[2][0].get_segments()[0][0, 1]
+            for panel in _panels(campaign)
+            for container in panel.containers
+        ]
+        bottom, top = _panels(campaign)[0].get_ylim()
+        assert min(lows) - 10.0 < bottom < min(lows)
+        assert 100.0 < top < 110.0
+
+
+def _panels(campaign):
+    return [axes for axes in campaign_figure(campaign).axes if axes.get_visible()]
 
 
 def test_what_went_wrong_first(long_walk):

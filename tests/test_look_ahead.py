@@ -141,6 +141,7 @@ def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
     assert decision.accepted == pytest.approx(there)
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_plan_that_is_not_cheap_gives_way_to_a_search():
     hasty = AheadPlanner(P, AheadOptions(cheap=1e-9))
     z = row_at(TABLE, 0.9)[STATE : STATE + 3] + [0.1, 0.0, 0.0]

@@ -188,6 +188,7 @@ def test_processes_that_start_together_compile_each_function_once(toy, tmp_path)
     assert compiled_by_all(tmp_path) == sorted([*lines, "script"])
 
 
+@pytest.mark.slow(seconds=2)
 def test_one_core_has_no_helper(toy, tmp_path):
     ended(toy("real_one", "real_two", cores=1))
     assert len(compiled_by_all(tmp_path)) == 5

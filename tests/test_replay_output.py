@@ -176,6 +176,7 @@ def coloured(picture, red, green, blue):
     return int(np.sum((picture @ wanted > 0.985 * size) & (size > 0.3)))
 
 
+@pytest.mark.slow(seconds=4)
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
 def test_page_shows_a_walking_robot_in_a_browser_without_network(record, tmp_path):
     page = tc.save_html(record, tmp_path / "walk.html")

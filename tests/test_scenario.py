@@ -144,6 +144,7 @@ def test_unreachable_apex_is_named_with_its_segment():
         simulate_scenario(scenario)
 
 
+@pytest.mark.slow(seconds=2)
 def test_slip_command(tmp_path, capfd):
     arguments = ["slip", str(EXAMPLE), "--map", "improved", "--output", str(tmp_path)]
     assert main([*arguments, "--json"]) == 0

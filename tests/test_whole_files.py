@@ -120,6 +120,7 @@ def test_a_full_disk_leaves_the_old_file(short_walk, tmp_path, name):
     assert contents(tmp_path) == before
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_walk_on_a_full_disk_keeps_the_last_one_and_prints_its_table(tmp_path, capfd):
     arguments = ["walk", "--steps", "1", "--output", str(tmp_path)]
     assert main([*arguments, "--no-figures"]) == 0

@@ -32,8 +32,8 @@ def campaign_figure(campaign: Campaign) -> Figure:
     """Shares of trials, by severity and by each number that is drawn.
 
     Each mark is a sixth of the trials, at their mean: the share without a fall, and the share on
-    the gait. Bars are Wilson's 95 % intervals. Pushes, lengths and times are those of the
-    reference template.
+    the gait. Bars are Wilson's 95 % intervals; the scale begins below the lowest of them. Pushes,
+    lengths and times are those of the reference template.
 
     Args:
         campaign: with at least one trial.
@@ -52,7 +52,9 @@ def campaign_figure(campaign: Campaign) -> Figure:
         panel.set_xlabel(title, fontsize=9)
     for panel in axes[len(panels) :]:
         panel.set_visible(False)
-    axes[0].legend(fontsize=8, loc="lower left")
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), fontsize=8, loc="outside lower center", ncols=2
+    )
     figure.supylabel("share of the trials [%]", fontsize=9)
     robot, plant = as_text(campaign.conditions.robot.model), campaign.conditions.plant
     figure.suptitle(f"{robot} in {plant}: {len(campaign.trials)} trials, all disturbed at once")
@@ -83,5 +85,4 @@ def _panel(axes: Axes, values: NDArray[np.float64], trials: Sequence[Trial]) -> 
                     label=label,
                 )
                 label = "_"
-    axes.set_ylim(-5.0, 105.0)
     axes.tick_params(labelsize=8)
