@@ -177,9 +177,7 @@ def _row(finding: Finding) -> tuple[str, ...]:
     d, last = finding.disturbance, finding.levels[-1]
 
     def point(level: float | None) -> str:
-        if level is None:
-            return f"not {d.shown(finding.levels[0].level)}"
-        return d.shown(level) + (" or more" if level == last.level else "")
+        return _up_to(finding, level) + (" or more" if level == last.level else "")
 
     after = next((x for x in finding.levels if x.rate < 1.0), None)
     beyond = "" if after is None else f"{d.shown(after.level)}: {_told(after.fell, after.astray)}"
@@ -199,12 +197,14 @@ def _sure(finding: Finding) -> str:
 
 def _limit(finding: Finding) -> str:
     """The template's own limit."""
-    d, most = finding.disturbance, finding.template
-    if most is None:
-        return ""
-    if most == 0.0:
-        return f"not {d.shown(finding.levels[0].level)}"
-    return d.shown(most)
+    most = finding.template
+    return "" if most is None else _up_to(finding, most or None)
+
+
+def _up_to(finding: Finding, level: float | None) -> str:
+    """A level of the finding; without one, that it is not even the mildest."""
+    shown = finding.disturbance.shown
+    return f"not {shown(finding.levels[0].level)}" if level is None else shown(level)
 
 
 def _told(fell: int, astray: int) -> str:
