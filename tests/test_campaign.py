@@ -160,13 +160,13 @@ def test_shares_and_figure_of_a_campaign():
     assert 0.0 <= float(marks.get_ydata()[0]) <= 100.0
     # Where nearly all go well, a scale from 0 to 100 % would hide the intervals.
     sure = replace(found, trials=tuple(t for t in trials if t.good))
-    for campaign in (found, sure):
+    for shown in (panels, _panels(sure)):
         lows = [
             container.lines[2][0].get_segments()[0][0, 1]
-            for panel in _panels(campaign)
+            for panel in shown
             for container in panel.containers
         ]
-        bottom, top = _panels(campaign)[0].get_ylim()
+        bottom, top = shown[0].get_ylim()
         assert min(lows) - 10.0 < bottom < min(lows)
         assert 100.0 < top < 110.0
 
