@@ -52,6 +52,16 @@ def test_the_force_is_averaged_over_a_slide():
     assert 0.85 * TRUE < friction.coefficient < 1.05 * TRUE
 
 
+@pytest.mark.parametrize(("up", "learns"), [(0.003, True), (0.006, False)])
+def test_a_foot_that_chatters_slides_on(up, learns):
+    """A light foot that slides leaves the ground every other millisecond."""
+    friction, none = estimate(settling=0.01), np.zeros(2, dtype=bool)
+    for _ in range(10):
+        feel(friction, 0.002, (-TRUE * 300.0, 300.0), (0.2, 0.0))
+        assert not feel(friction, up, (0.0, 0.0), (0.4, 0.0), contact=none), "no force, no ratio"
+    assert np.isclose(friction.coefficient, TRUE if learns else TOLD)
+
+
 @pytest.mark.parametrize(
     ("seconds", "force", "speed"),
     [

@@ -24,6 +24,8 @@ class FrictionOptions(Checked):
             stands are noise; 0.5 mrad of it is about 0.02 m/s there, which never stays this
             large, and against the force, for ``duration``.
         duration: a foot has to slide for so long to tell anything [s].
+        pause: a foot that is off the ground for no longer has not lifted off [s]. A light foot that
+            slides chatters: every other millisecond it does not touch.
         settling: for so long after a touchdown nothing is learnt [s]. The force is the impact's.
         load: share of the weight that a foot carries at least. Of a small force the direction is
             not known well.
@@ -34,6 +36,7 @@ class FrictionOptions(Checked):
 
     speed: Positive = tuned(0.05, SPEED)
     duration: NotNegative = tuned(0.008, TIME)
+    pause: NotNegative = tuned(0.004, TIME)
     settling: NotNegative = tuned(0.005, TIME)
     load: Positive = tuned(0.05)
     doubt: Share = tuned(0.03)
@@ -46,14 +49,23 @@ class _Slide:
 
     Attributes:
         standing: time since touchdown [s].
-        time: since it began to slide [s].
+        lifted: time since it touched the ground last [s].
+        time: that it has slid for [s].
         along, normal: sums of the ground's forces [N].
     """
 
     standing: float = 0.0
+    lifted: float = 0.0
     time: float = 0.0
     along: float = 0.0
     normal: float = 0.0
+
+    def lift(self, dt: float, pause: float) -> None:
+        """The foot does not touch the ground; after ``pause`` [s] it has lifted off."""
+        self.lifted += dt
+        if self.lifted > pause:
+            self.standing = 0.0
+            self.end()
 
     def end(self) -> None:
         """The foot slides no longer."""
@@ -98,8 +110,11 @@ class FrictionEstimate:
         # Number by number: arrays of two would take five times as long, at every tick.
         feet = zip(self._slides, contact.tolist(), force.tolist(), speed.tolist(), strict=True)
         for slide, touches, one, moves in feet:
-            slide.standing = slide.standing + dt if touches else 0.0
-            if touches and self._slides_on(slide, one, moves):
+            if not touches:
+                slide.lift(dt, self.options.pause)
+                continue
+            slide.standing, slide.lifted = slide.standing + dt, 0.0
+            if self._slides_on(slide, one, moves):
                 slide.time += dt
                 slide.along += hypot(*one[:-1])
                 slide.normal += one[-1]
