@@ -1,14 +1,19 @@
 """The swing foot's path: clearance, reach, a slow landing, and ground that comes late."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from template_control.embedding.following.feet_in_air import FeetInAir
+from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.swing_choice import HIGH_SWING
 from template_control.embedding.references.swing_foot import (
     SwingFoot,
     SwingOptions,
     quintic_step,
 )
+from template_control.slip.automaton.vocabulary import Leg
 
 
 def test_quintic_arrives():
@@ -106,6 +111,27 @@ def test_a_foot_that_meets_a_wall_late_goes_down_before_it():
         swing.meet_wall(np.array([0.5, 0.02]), 0.02, 1e-3)
     assert swing.x[0] == 0.5
     assert swing.y[0] < 0.03 - 0.5 * 0.02
+
+
+@pytest.mark.parametrize("reaching", [False, True])
+def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(reaching):
+    """The path of an overdue foot knows a later touchdown, of lower ground."""
+    feet = Feet(SwingOptions(), np.zeros((2, 2, 3)))
+    swing = feet.swing[1]
+    swing.start(np.array([0.57, -0.004]), np.array([0.0, -0.2]))
+    landing = SimpleNamespace(x=0.58, time=0.13)
+    in_air = FeetInAir(
+        SimpleNamespace(foot_position=np.array([[0.0, 0.0], [0.57, -0.006]]), leg_length=1.0),
+        feet,
+        SimpleNamespace(blocked=lambda foot: True),
+        SimpleNamespace(furthest=np.zeros(2)),
+    )
+    planning = SimpleNamespace(reaching=reaching, landing=lambda foot: landing)
+    station = SimpleNamespace(swings=(Leg.FRONT,), awaited=Leg.FRONT)
+    for _ in range(10):
+        in_air.advance(station, planning, None, 0.0, np.array([0.25, 0.9]), 1e-3)
+    assert swing.x[0] == 0.57
+    assert (swing.y[0] < -0.006) if reaching else (swing.y[0] > 0.0)
 
 
 def test_a_foot_that_is_held_comes_down_late():

@@ -59,9 +59,11 @@ class FeetInAir:
             swing = feet.swing[foot]
             landing = planning.landing(foot)
             foothold, due = landing.x, landing.time - time
+            overdue = planning.reaching and leg == station.awaited
             if self._stumble.blocked(foot):
-                swing.meet_wall(robot.foot_position[foot], due, dt)
-            elif planning.reaching and leg == station.awaited:
+                # The path goes on as if an overdue foot had time; it has none to go up again.
+                swing.meet_wall(robot.foot_position[foot], 0.0 if overdue else due, dt)
+            elif overdue:
                 swing.drop(dt)
             else:
                 if not isfinite(foothold):
