@@ -64,7 +64,7 @@ def test_undisturbed_it_asks_what_the_route_asks_that_it_follows():
 def test_it_runs_until_it_is_slow_and_walks_on():
     route = catching(walkable=1.45, slow=1.35)
     walk = route.next(VLO, WALK.vlo, 0.0)
-    run = route.instead(walk, speed=2.0, excess=0.9)
+    (run,) = route.instead(walk, speed=2.0, excess=0.9)
     assert (run.stride, run.then) == ("wr", "r")
     assert run.target[0] == 2.0
     assert asked(route, (VLO, WALK.vlo)) == ["w"], "naming a way does not go it"
@@ -75,7 +75,7 @@ def test_it_runs_until_it_is_slow_and_walks_on():
     assert (back.stride, back.then) == ("rw", "w")
     np.testing.assert_array_equal(back.target, WALK.vlo)
     assert asked(route, (VLO, WALK.vlo)) == ["w"]
-    route.take(route.instead(walk, 2.0, 0.9))
+    route.take(*route.instead(walk, 2.0, 0.9))
     route.reset()
     assert asked(route, (VLO, WALK.vlo)) == ["w"]
 
@@ -84,14 +84,14 @@ def test_only_a_walk_that_is_much_too_fast_is_caught():
     route = catching(excess=0.42, fast=9.0)
     walk = route.next(VLO, WALK.vlo, 0.0)
     slowest, fastest = running_speeds(P)
-    assert route.instead(walk, 2.0, 0.41) is None
-    assert route.instead(walk, slowest - 1e-6, 0.5) is None, "no run is that slow"
-    assert route.instead(walk, 9.0, 8.0).target[0] == fastest
+    assert not route.instead(walk, 2.0, 0.41)
+    assert not route.instead(walk, slowest - 1e-6, 0.5), "no run is that slow"
+    assert route.instead(walk, 9.0, 8.0)[0].target[0] == fastest
     changing = replace(walk, stride="wr")
-    assert route.instead(changing, 2.0, 0.9) is None, "a transition that was planned goes on"
-    route.take(route.instead(walk, 2.0, 0.9))
-    assert route.instead(changing, 2.0, 0.0).stride == "wr", "pushed again, it aims again"
-    assert route.instead(replace(walk, stride="r"), 2.0, 0.9) is None
+    assert not route.instead(changing, 2.0, 0.9), "a transition that was planned goes on"
+    route.take(*route.instead(walk, 2.0, 0.9))
+    assert route.instead(changing, 2.0, 0.0)[0].stride == "wr", "pushed again, it aims again"
+    assert not route.instead(replace(walk, stride="r"), 2.0, 0.9)
 
 
 def test_a_walk_that_is_about_to_take_off_is_caught():
@@ -99,8 +99,8 @@ def test_a_walk_that_is_about_to_take_off_is_caught():
     walk = route.next(VLO, WALK.vlo, 0.0)
     left = 1.49 - float(walk.target[0])
     assert 0.3 < left < 0.42
-    assert route.instead(walk, 1.6, left - 0.01) is None
-    assert route.instead(walk, 1.6, left + 0.01).stride == "wr"
+    assert not route.instead(walk, 1.6, left - 0.01)
+    assert route.instead(walk, 1.6, left + 0.01)[0].stride == "wr"
 
 
 def test_a_scenario_goes_on_after_the_catch():
@@ -108,7 +108,7 @@ def test_a_scenario_goes_on_after_the_catch():
     route = CatchingRoute(ScenarioRoute(Scenario(segments=segments)))
     assert not route.endless
     walk = route.next(VLO, WALK.vlo, 0.0)
-    route.take(route.instead(walk, 2.0, 0.9))
+    route.take(*route.instead(walk, 2.0, 0.9))
     assert asked(route, (APEX, FAST), (APEX, SLOW), (VLO, WALK.vlo)) == ["r", "rw", "w"]
     assert asked(route, (VLO, WALK.vlo), (APEX, FAST)) == ["wr", "r"], "the scenario's own run"
     assert route.next(APEX, SLOW, 9.0) is None
@@ -119,7 +119,7 @@ def test_a_catch_tells_no_duration_of_a_step():
     route = CatchingRoute(ScenarioRoute(Scenario(segments=segments, start=(0.9, 0.98, 0.0))))
     route.next(VLO, WALK.vlo, 0.0)
     walk = route.next(VLO, WALK.vlo, 0.5)
-    run = route.instead(walk, 2.0, 1.0)
+    (run,) = route.instead(walk, 2.0, 1.0)
     assert (walk.segment, run.segment) == (1, 1)
     route.take(run)
     assert asked(route, (APEX, FAST), (APEX, SLOW)) == ["r", "rw"]
@@ -200,6 +200,8 @@ def test_a_push_within_a_step_is_answered_by_a_walk_or_by_a_run():
     assert report.decision.feasible
     assert report.target[2] == 0.0, "of an apex"
     assert planning.path.outcome is Outcome.SECTION
+    planning.steady(node, Sensed(VLO.state(WALK.vlo), np.zeros(2)))
+    assert planning.assist == 0.0, "a planner that knows no slopes has no assist"
     _, node = pushed(0.9, SteadyRoute.of(WALK))
     assert node.name == "SS_av^w", "this route knows no other way"
 

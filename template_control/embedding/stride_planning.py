@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import (
+    BreakingPlanner,
     CurvePlanner,
     Decision,
     Planner,
@@ -215,9 +216,10 @@ class StridePlanning(PlannedPath):
     def steady(self, node: Node, sensed: Sensed) -> None:
         """Choose the assist of a double stance that begins on ground that was not expected.
 
-        Arguments as for :meth:`follow`.
+        Arguments as for :meth:`follow`. The assist is a slope's: it is left to planners of slopes.
         """
-        steady(self._rest, node, sensed, self.reports[-1], self.options.ground.assist)
+        if isinstance(self.planner, SlopePlanner):
+            steady(self._rest, node, sensed, self.reports[-1], self.options.ground.assist)
 
     def land_off(self, node: Node, sensed: Sensed, now: float, height: float) -> Node:
         """A foot has landed where the ground may be higher or lower than it was thought.
@@ -252,8 +254,7 @@ class StridePlanning(PlannedPath):
         self.reports[-1] = found.report
         self._broken = True
         self.route.take(found.goal)
-        self.follow(found.node, sensed, now)
-        return found.node
+        return self.follow(found.node, sensed, now)
 
     def overdue(self, node: Node, phase_time: float) -> bool:
         """Whether the swing foot should have found the ground by now.
@@ -275,8 +276,8 @@ class StridePlanning(PlannedPath):
     def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
         """Whether a disturbance has carried the robot away from its path.
 
-        Where the robot has broken into a stride, or no stride went on, a path that leads nowhere is
-        one as well.
+        A path that leads nowhere is one as well, but for one along a curve; that is left to it
+        where the robot has not broken into its stride.
 
         Args:
             deviation: of the forward speed from the path's [m/s].
@@ -289,11 +290,7 @@ class StridePlanning(PlannedPath):
         if abs(deviation) > o.speed and phase_time > o.interval:
             self._excess += deviation
             return True
-        return not self._whole and (self._broken or self._gave_up())
-
-    def _gave_up(self) -> bool:
-        """Whether no stride went on; one along a curve is left to it."""
-        return not (self.reports[-1].decision.feasible or isinstance(self.planner, CurvePlanner))
+        return not self._whole and (self._broken or not isinstance(self.planner, CurvePlanner))
 
     def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.
@@ -312,9 +309,11 @@ class StridePlanning(PlannedPath):
         rest, report = self._rest, self.reports[-1]
         if self._broken:
             other = self._break(node, sensed, phase_time, now)
-            if self._planned_at < now:
-                self.follow(node, sensed, now)
-            return other
+            if self._planned_at == now:
+                return other
+            if not isinstance(self.planner, BreakingPlanner):
+                self.hold(choosing_again.stiffnesses(rest, node, sensed, report))
+            return self.follow(node, sensed, now)
         lasting = True
         if node.name != self.automaton.starts[report.goal.stride] or node.name in self.curved:
             self.hold(choosing_again.stiffnesses(rest, node, sensed, report))

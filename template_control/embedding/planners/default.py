@@ -16,7 +16,11 @@ from template_control.embedding.planners.transition import (
     TransitionPlanner,
 )
 from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.standing.default import gaits_by_speed, standing_planners
+from template_control.embedding.standing.default import (
+    carrying_planners,
+    gaits_by_speed,
+    standing_planners,
+)
 from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
@@ -32,6 +36,8 @@ from template_control.slip.similarity import REFERENCE
 # A slow stride lasts 1.3 sqrt(l0 / g); a run that is behind its profile must be able to catch up.
 _STRIDE = 1.9
 _CATCHING = RunningOptions(pace=0.12)  # a run that only catches a walk is to be over soon
+# A leg that is left behind may be longer than a walk's, and there is no time to set off from rest.
+_CARRYING = StandingOptions(reach=1.06, slack=0.03)
 _GENTLE = 0.05  # of g: up to this acceleration moderate controls keep up
 
 
@@ -116,5 +122,6 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
         "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
         "r": run,
         "rw": TransitionPlanner("rw", run, walks, RUN_TO_WALK),
+        **carrying_planners(walk, _CARRYING),
         **standing,
     }

@@ -31,6 +31,7 @@ class ReplanOptions(Checked):
         calmer: shares of dy/dt, tried in turn, of the states that a path starts from where the
             template cannot go on from the robot's: its leg cannot pull, the robot's can.
         highest: height over l0 above which no such path starts.
+        legs: stiffnesses over k0 with which a slow walk is tried before the robot comes to a stand.
         ground: how the legs are chosen where a foot lands higher or lower than it was to.
         path: how the robot's place on the path is looked for.
     """
@@ -45,5 +46,6 @@ class ReplanOptions(Checked):
     soonest_share: Share = tuned(0.08)
     calmer: tuple[Share, ...] = tuned((0.5, 0.0))
     highest: Positive = tuned(0.99)
+    legs: tuple[Positive, ...] = tuned((0.4, 0.6, 0.8, 1.1))
     ground: UnexpectedGroundOptions = field(default_factory=UnexpectedGroundOptions)
     path: PathOptions = field(default_factory=PathOptions)

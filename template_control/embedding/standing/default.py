@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from template_control.checks.checked import checked
-from template_control.embedding.planners.planner import Planner
+from template_control.embedding.planners.planner import LandingPlanner, Planner
+from template_control.embedding.standing.carrying import CarryingPlanner
 from template_control.embedding.standing.options import StandingOptions
 from template_control.embedding.standing.planners import (
     ChangePlanner,
@@ -31,6 +32,27 @@ def gaits_by_speed(parameters: SlipParameters) -> Family:
     unit = parameters.speed_unit
     ends = (float(chain.vlo_speed[0]) * unit, float(chain.vlo_speed[-1]) * unit)
     return Family(partial(chain.gait, parameters), ends)
+
+
+@checked
+def carrying_planners(walk: Planner, options: StandingOptions) -> dict[str, Planner]:
+    """Planners of what a slow walk breaks into: it is carried on, or stands and starts again.
+
+    Args:
+        walk: the walk's planner.
+        options: tuning, for the reference template.
+    """
+    p = walk.gait.parameters
+    vaults = Vaults(p, scaled(options, Scale.of(p)), gaits_by_speed(p))
+    change = ChangePlanner(vaults)
+    if isinstance(walk, LandingPlanner):
+        change = CarryingPlanner(vaults, walk)
+    return {
+        "ww": change,
+        "ws": StopPlanner(vaults),
+        "sb": StepPlanner(vaults, "sb"),
+        "sw": StartPlanner(vaults),
+    }
 
 
 @checked

@@ -16,6 +16,7 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
 from template_control.slip.dynamics.stride import Stride, controls
+from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
 
@@ -70,7 +71,7 @@ class Curves:
     def __init__(self, vaults: Vaults, automaton: Automaton = AUTOMATON) -> None:
         self.parameters, self.options = vaults.parameters, vaults.options
         self.vaults, self.automaton = vaults, automaton
-        self.gait = StandingGait.of(self.parameters, self.options)
+        self.gait: Gait = StandingGait.of(self.parameters, self.options)
         self.offset: Array = np.zeros(PADDED)
 
     def reset(self) -> None:

@@ -132,16 +132,21 @@ class StepPlanner(Curves):
     def _swing(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
     ) -> tuple[Decision, Stride]:
-        """One foot stands: to the landing after which the CoM comes to rest best."""
+        """One foot stands: to the landing after which the CoM comes to rest best.
+
+        The foot cannot take it up where the CoM falls to the other side. A leg whose stiffness
+        nobody has chosen yet carries the weight.
+        """
         ahead = self._turned(start)
-        stiffness = float(decision.controls[Slot.K_SC])
         foot = (self._way * toes[0], self._way * toes[1])
+        stiffness = float(decision.controls[Slot.K_SC]) or self.passes.carrying(ahead, foot[0])
         best = self.passes.best(ahead, stiffness, foot)
         u = decision.controls
         if best is not None:
             u = self._controls(best.angle, stiffness)
         stride, landed = self._landed(start[:, :2].T.ravel(), u, np.array(toes))
-        return replace(decision, controls=u, feasible=landed), stride
+        falls = self.passes.capture(ahead) > foot[0]
+        return replace(decision, controls=u, feasible=landed and falls), stride
 
     def _rest(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision

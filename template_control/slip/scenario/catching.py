@@ -1,7 +1,11 @@
-"""A route that breaks into a run where its walk cannot go on, slows down, and walks on."""
+"""A route whose walk breaks into another stride where it cannot go on, and walks on after it.
+
+Too fast, it runs until it is slow; too slow, both feet carry it on.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
@@ -11,15 +15,18 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
-from template_control.slip.maps.section import APEX, Section
+from template_control.slip.maps.section import APEX, REST, Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, StrideGoal
-from template_control.slip.similarity import SPEED, Scale, scaled, tuned
+from template_control.slip.scenario.scenario import STAND_HEIGHT
+from template_control.slip.similarity import REFERENCE, SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
 
 _WALKS = ("w", "wp")
 _BREAKS, _RUNS, _SLOWS = "wr", "r", "rw"
+_CARRIES, _STARTS = "ww", "sw"
+_STOPS = ("ws", "sb")
 
 CATCHING_STRIDES = frozenset((_BREAKS, _RUNS, _SLOWS))
 """The strides of a run that catches a walk; each needs a planner."""
@@ -27,7 +34,7 @@ CATCHING_STRIDES = frozenset((_BREAKS, _RUNS, _SLOWS))
 
 @dataclass(frozen=True)
 class CatchOptions(Checked):
-    """When a run catches a walk, and when it is over.
+    """When a run catches a walk and when it is over, and when both feet carry a walk on.
 
     Attributes:
         excess: a walk that is faster than wanted by less than this is left to its planner,
@@ -35,20 +42,23 @@ class CatchOptions(Checked):
         walkable: at an apex with at most this speed the robot walks again.
         slow: dx/dt at apex that the run slows down to; less than ``walkable``, as no run settles
             on its speed exactly.
+        lag: a walk whose CoM moves slower than its wanted speed at VLO by at least this is carried
+            on by both feet; the slowest steps of the planner lag less in their double stance.
     """
 
     excess: NotNegative = tuned(0.42, SPEED)
     fast: Positive = tuned(1.45, SPEED)
     walkable: Positive = tuned(1.45, SPEED)
     slow: Positive = tuned(1.35, SPEED)
+    lag: NotNegative = tuned(0.25, SPEED)
 
 
 @runtime_checkable
 class BreakingRoute(Route, Protocol):
     """A route that knows another way where a stride cannot go on."""
 
-    def instead(self, goal: StrideGoal, speed: float, excess: float) -> StrideGoal | None:
-        """What the robot can break into within a stride; the route does not go on.
+    def instead(self, goal: StrideGoal, speed: float, excess: float) -> Sequence[StrideGoal]:
+        """What the robot can break into within a stride, the best first; the route does not go on.
 
         Args:
             goal: of that stride.
@@ -57,7 +67,7 @@ class BreakingRoute(Route, Protocol):
                 target's, and what disturbances have added since.
 
         Returns:
-            None where there is nothing.
+            Empty where there is nothing.
         """
 
     def take(self, goal: StrideGoal) -> None:
@@ -65,11 +75,14 @@ class BreakingRoute(Route, Protocol):
 
 
 class CatchingRoute:
-    """Follows another route; where its walk cannot go on, the robot runs until it is slow.
+    """Follows another route; where its walk cannot go on, another stride does.
+
+    A walk that is too fast runs until it is slow; one that is too slow is carried on in its double
+    stance, along a curve.
 
     Args:
         route: that is followed.
-        options: when the run is over.
+        options: when it breaks into what, and when the run is over.
     """
 
     @checked
@@ -80,7 +93,7 @@ class CatchingRoute:
         self.start: Array = route.start
         self.options = scaled(options or CatchOptions(), Scale.of(route.parameters))
         self._walk: StrideGoal | None = None
-        self._caught = False
+        self._caught = ""  # the stride that was broken into
 
     @property
     def endless(self) -> bool:
@@ -90,43 +103,60 @@ class CatchingRoute:
     def reset(self) -> None:
         """See :class:`~.route.Route`."""
         self.followed.reset()
-        self._walk, self._caught = None, False
+        self._walk, self._caught = None, ""
 
     def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
         """See :meth:`~.route.Route.next`."""
-        on = self._run_on(section, z)
+        on = self._go_on(section, z)
         if on is not None:
             return on
-        self._caught = False
+        self._caught = ""
         goal = self.followed.next(section, z, now)
         self._walk = goal if goal is not None and goal.stride in _WALKS else None
         return goal
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
         """See :meth:`~.route.Route.ahead`."""
-        return self._run_on(section, z) or self.followed.ahead(section, z, now)
+        return self._go_on(section, z) or self.followed.ahead(section, z, now)
 
-    def instead(self, goal: StrideGoal, speed: float, excess: float) -> StrideGoal | None:
-        """See :meth:`BreakingRoute.instead`: a run, for a walk that is fast enough for it."""
+    def instead(self, goal: StrideGoal, speed: float, excess: float) -> Sequence[StrideGoal]:
+        """See :meth:`BreakingRoute.instead`: a run, or for a slow walk what goes slower."""
         slowest, fastest = running_speeds(self.parameters)
         o, at_vlo = self.options, float(goal.target[0]) + excess
-        walks = goal.stride in _WALKS and (excess >= o.excess or at_vlo >= o.fast)
-        on = self._caught and goal.stride == _BREAKS
-        if speed < slowest or not (walks or on):
-            return None
-        return self._run(goal, _BREAKS, min(speed, fastest), _RUNS)
+        walk = goal.stride in _WALKS
+        carried = self._caught == goal.stride == _CARRIES
+        if (walk or carried) and speed <= goal.target[0] - o.lag:
+            after = goal.then if carried else goal.stride
+            rest = replace(goal, target=self._stand(), then=_STARTS)
+            stops = [replace(rest, stride=stop) for stop in _STOPS]
+            return replace(goal, stride=_CARRIES, then=after), *stops
+        fast = walk and (excess >= o.excess or at_vlo >= o.fast)
+        on = self._caught == goal.stride == _BREAKS
+        if speed < slowest or not (fast or on):
+            return ()
+        return (self._run(goal, _BREAKS, min(speed, fastest), _RUNS),)
 
     def take(self, goal: StrideGoal) -> None:
         """See :meth:`BreakingRoute.take`."""
-        self._caught = True
+        self._caught = goal.stride
 
-    def _run_on(self, section: Section, z: Array) -> StrideGoal | None:
-        """The stride that begins at an apex of the run that catches a walk."""
-        if not self._caught or section is not APEX or self._walk is None:
+    def _go_on(self, section: Section, z: Array) -> StrideGoal | None:
+        """The stride that begins where a catch has led to, at an apex or at rest."""
+        walk = self._walk
+        if walk is None:
+            return None
+        if self._caught in _STOPS and section is REST:
+            return replace(walk, stride=_STARTS, then=walk.stride)
+        if self._caught != _BREAKS or section is not APEX:
             return None
         if z[0] > self.options.walkable:
-            return self._run(self._walk, _RUNS, self.options.slow, _SLOWS)
-        return replace(self._walk, stride=_SLOWS, then=self._walk.stride)
+            return self._run(walk, _RUNS, self.options.slow, _SLOWS)
+        return replace(walk, stride=_SLOWS, then=walk.stride)
+
+    def _stand(self) -> Array:
+        """A stand's state at rest."""
+        p = self.parameters
+        return np.array([0.0, STAND_HEIGHT / REFERENCE.rest_length * p.rest_length, 0.0])
 
     def _run(self, walk: StrideGoal, stride: str, speed: float, then: str) -> StrideGoal:
         p = self.parameters

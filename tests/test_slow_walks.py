@@ -1,0 +1,158 @@
+"""A walk that is too slow to go on is carried on by both feet, or steps back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.embedding.planners.default import default_planners
+from template_control.embedding.planning.replan_options import ReplanOptions
+from template_control.embedding.section_report import Learnt
+from template_control.embedding.sensing import Sensed
+from template_control.embedding.stride_planning import StridePlanning
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.breaking import BREAKS
+from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.maps.section import REST, VLO
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.catching import CatchingRoute, CatchOptions
+from template_control.slip.scenario.route import SteadyRoute
+
+P = SlipParameters()
+WALK = walking_gait(P, 1.1)
+STILL = np.array([0.0, 0.97, 0.0])
+NOTHING = Learnt(load=1.0, trim=0.0, lean=0.0)
+CURVED = {"DS_bl^ww", "DS_br^ws", "SS_bt^sb", "DS_br^sb"}
+
+
+def catching(**options):
+    return CatchingRoute(SteadyRoute.of(WALK), CatchOptions(**options))
+
+
+def kinds(goals):
+    return [goal.stride for goal in goals]
+
+
+def test_only_a_walk_that_lags_is_carried_or_steps_back():
+    route = catching(lag=0.25)
+    walk = route.next(VLO, WALK.vlo, 0.0)
+    limit = float(walk.target[0]) - 0.25
+    assert not route.instead(walk, limit + 1e-6, 0.0)
+    carried, stop, back = route.instead(walk, limit, 0.0)
+    assert (carried.stride, carried.then) == ("ww", "w")
+    np.testing.assert_array_equal(carried.target, walk.target)
+    assert [(goal.stride, goal.then) for goal in (stop, back)] == [("ws", "sw"), ("sb", "sw")]
+    assert back.target[0] == back.target[2] == 0.0
+    for kind in ("wr", "r", "rw", "ww"):
+        assert not route.instead(replace(walk, stride=kind), 0.1, 0.0), "it is no walk"
+
+
+def test_carried_on_it_walks_or_may_still_step_back():
+    route = catching()
+    walk = route.next(VLO, WALK.vlo, 0.0)
+    carried = route.instead(walk, 0.3, -0.8)[0]
+    route.take(carried)
+    assert kinds(route.instead(carried, 0.3, -0.8)) == ["ww", "ws", "sb"]
+    assert all(goal.then in ("w", "sw") for goal in route.instead(carried, 0.3, -0.8))
+    assert route.next(VLO, WALK.vlo, 1.0).stride == "w"
+    assert not route.instead(carried, 0.3, -0.8), "that is over"
+
+
+@pytest.mark.parametrize("way", [1, 2])
+def test_from_a_stand_it_starts_to_walk_again(way):
+    route = catching()
+    walk = route.next(VLO, WALK.vlo, 0.0)
+    stop = route.instead(walk, 0.3, -0.8)[way]
+    route.take(stop)
+    assert route.ahead(REST, STILL, 1.0).stride == "sw"
+    start = route.next(REST, STILL, 1.0)
+    assert (start.stride, start.then) == ("sw", "w")
+    np.testing.assert_array_equal(start.target, walk.target)
+    assert route.next(VLO, WALK.vlo, 2.0).stride == "w"
+    route.take(stop)
+    route.reset()
+    assert route.next(VLO, WALK.vlo, 0.0).stride == "w"
+
+
+@pytest.mark.parametrize("kind", BREAKS)
+def test_the_same_legs_stand_where_a_walk_breaks_into_another_stride(kind):
+    for walks, other in BREAKS[kind].items():
+        before, after = AUTOMATON.node(walks), AUTOMATON.node(other)
+        assert before.stance == after.stance
+        assert after in AUTOMATON.stride(AUTOMATON.starts[kind])
+
+
+def slow(node, place, toes, speed):
+    """Plan a step, put the robot into a double or single stance, slow, and plan again."""
+    route = catching()
+    planning = StridePlanning(
+        route, default_planners(route), ReplanOptions(), AUTOMATON, frozenset(CURVED)
+    )
+    planning.begin(VLO)
+    sensed = Sensed(VLO.state(WALK.vlo), np.zeros(2))
+    planning.decide(VLO, sensed, 0.0, NOTHING)
+    sensed.state[:] = place, 0.955, speed, 0.0
+    sensed.toes[:] = toes
+    sensed.acceleration = np.zeros(2)
+    assert planning.surprised(-0.5, 0.3, 0.3)
+    return planning, planning.reconsider(AUTOMATON.node(node), sensed, 0.3, 0.3)
+
+
+@pytest.mark.parametrize("node", BREAKS["ww"])
+def test_a_slow_double_stance_is_carried_to_the_next_vlo(node):
+    planning, after = slow(node, 0.3, (0.0, 0.5), 0.6)
+    assert after.name == "DS_bl^ww"
+    report = planning.reports[-1]
+    assert (len(planning.reports), report.goal.stride) == (1, "ww")
+    assert report.decision.feasible
+    np.testing.assert_array_equal(report.target, WALK.vlo)
+    assert planning.path.outcome is Outcome.SECTION
+    _, after = slow(node, 0.3, (0.0, 0.5), float(WALK.vlo[0]))
+    assert after.name == node, "fast enough, it walks"
+
+
+@pytest.mark.parametrize("node", BREAKS["sb"])
+def test_a_walk_that_falls_back_sets_its_foot_down_behind(node):
+    planning, after = slow(node, -0.29, (0.0, -0.5), 0.7)
+    assert after.name == "SS_bt^sb"
+    report = planning.reports[-1]
+    assert report.goal.stride == "sb"
+    np.testing.assert_array_equal(report.target, report.goal.target)
+    foothold = planning.landing(planning.feet[1]).x
+    assert foothold < -0.29, "behind the CoM"
+    _, after = slow(node, -0.19, (0.0, -0.5), 0.84)
+    assert after.name == node, "it passes over its foot"
+
+
+def test_a_double_stance_that_falls_back_comes_to_a_stand():
+    planning, after = slow("DS_sd^w", 0.1, (0.0, 0.45), -0.2)
+    assert after.name == "DS_br^ws"
+    assert planning.reports[-1].goal.stride == "ws"
+    assert planning.reports[-1].decision.feasible
+
+
+def strides(record):
+    return [record.metadata["strides"][i] for i in record.stride[:-1]]
+
+
+@pytest.mark.slow(seconds=12)
+@pytest.mark.parametrize(("phase", "caught"), [(0.3, ["ww"]), (0.6, ["sb", "sw"])])
+def test_a_robot_that_is_pushed_back_hard_walks_on(phase, caught):
+    robot = tc.load_robot("five-link")
+    planner = tc.LqrPlanner(tc.default_gait(robot))
+    pushes = (tc.Push(-65.0, step=4, phase=phase),)
+    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=18, pushes=pushes))
+    assert record.metadata["fall_reason"] == ""
+    assert strides(record) == ["wp"] * 4 + caught + ["wp"] * (14 - len(caught))
+    assert np.all(np.abs(record.torque) <= record.metadata["torque_limit"])
+    assert record.push.sum() * 1e-3 == pytest.approx(-65.0, rel=1e-6)
+    assert record.section_state[-1, 0] == pytest.approx(1.1, abs=0.011)
+    left = tc.simulate(
+        robot,
+        planner,
+        tc.SimulationOptions(steps=18, pushes=pushes, embedding=tc.EmbeddingOptions(catches=False)),
+    )
+    assert left.fell
+    assert set(strides(left)) == {"wp"}
