@@ -44,7 +44,8 @@ class EmbeddingOptions(QpOptions):
         replan: when a stride is planned anew.
         load: tuning of the load estimate.
         trim: tuning of the momentum trim.
-        catches: whether a walk breaks into a run where it cannot go on, kept or of a scenario.
+        catches: whether a walk breaks into another stride where it cannot go on, kept or of a
+            scenario: a run where it is too fast, a stand where it is too slow.
         lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
         delay: how the delay from measurement to torque is learnt and reckoned with, where a planar
             robot's whole state is measured; a run is told it, not the controller.

@@ -82,7 +82,7 @@ def simulate(
         robot: model of the controller, and whose URDF the plant loads.
         route: which stride comes next and towards which state; or a scenario, which is put on
             the robot's template; or a planner, whose gait the robot keeps. A walk of a scenario
-            or of a planner breaks into a run where it cannot go on, and walks again
+            or of a planner breaks into another stride where it cannot go on, and walks again
             (:class:`~template_control.slip.scenario.catching.CatchingRoute`).
         options: how the run goes.
         progress: called with the number of completed steps after each.
@@ -154,7 +154,7 @@ def _controller(
     options: EmbeddingOptions,
     automaton: Automaton,
 ) -> EmbeddingController:
-    """Follows a route or keeps a planner's gait; a walk that cannot go on breaks into a run."""
+    """Follows a route or keeps a planner's gait; a walk may break into other strides."""
     catches = options.catches and automaton is AUTOMATON
     if isinstance(route, Planner):
         steady = SteadyRoute.of(route.gait, automaton)

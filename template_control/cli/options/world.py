@@ -127,8 +127,8 @@ def add_catch_option(parser: argparse.ArgumentParser) -> None:
         dest="catches",
         action="store_const",
         const=False,
-        help="let a walk that is pushed too hard fall; without this it breaks into a run, slows"
-        " down and walks on",
+        help="let a walk that is pushed too hard fall; without this it breaks into a run where it"
+        " is too fast, and is carried on, stops or steps back where it is too slow",
     )
 
 

@@ -1,6 +1,6 @@
 """A route whose walk breaks into another stride where it cannot go on, and walks on after it.
 
-Too fast, it runs until it is slow; too slow, both feet carry it on.
+Too fast, it runs until it is slow; too slow, both feet carry it on, or it stands and starts again.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ CATCHING_STRIDES = frozenset((_BREAKS, _RUNS, _SLOWS))
 
 @dataclass(frozen=True)
 class CatchOptions(Checked):
-    """When a run catches a walk and when it is over, and when both feet carry a walk on.
+    """When a walk breaks into another stride, and when a run that catches it is over.
 
     Attributes:
         excess: a walk that is faster than wanted by less than this is left to its planner,
@@ -43,7 +43,8 @@ class CatchOptions(Checked):
         slow: dx/dt at apex that the run slows down to; less than ``walkable``, as no run settles
             on its speed exactly.
         lag: a walk whose CoM moves slower than its wanted speed at VLO by at least this is carried
-            on by both feet; the slowest steps of the planner lag less in their double stance.
+            on by both feet, comes to a stand or steps back. While both feet stand, a walk that is
+            not disturbed is faster than at VLO.
     """
 
     excess: NotNegative = tuned(0.42, SPEED)
@@ -77,8 +78,8 @@ class BreakingRoute(Route, Protocol):
 class CatchingRoute:
     """Follows another route; where its walk cannot go on, another stride does.
 
-    A walk that is too fast runs until it is slow; one that is too slow is carried on in its double
-    stance, along a curve.
+    A walk that is too fast runs until it is slow. One that is too slow is carried on in its double
+    stance, or comes to a stand there; on one leg it steps back. From a stand it starts again.
 
     Args:
         route: that is followed.
@@ -126,10 +127,7 @@ class CatchingRoute:
         walk = goal.stride in _WALKS
         carried = self._caught == goal.stride == _CARRIES
         if (walk or carried) and speed <= goal.target[0] - o.lag:
-            after = goal.then if carried else goal.stride
-            rest = replace(goal, target=self._stand(), then=_STARTS)
-            stops = [replace(rest, stride=stop) for stop in _STOPS]
-            return replace(goal, stride=_CARRIES, then=after), *stops
+            return self._slower(goal, goal.then if carried else goal.stride)
         fast = walk and (excess >= o.excess or at_vlo >= o.fast)
         on = self._caught == goal.stride == _BREAKS
         if speed < slowest or not (fast or on):
@@ -153,10 +151,12 @@ class CatchingRoute:
             return self._run(walk, _RUNS, self.options.slow, _SLOWS)
         return replace(walk, stride=_SLOWS, then=walk.stride)
 
-    def _stand(self) -> Array:
-        """A stand's state at rest."""
-        p = self.parameters
-        return np.array([0.0, STAND_HEIGHT / REFERENCE.rest_length * p.rest_length, 0.0])
+    def _slower(self, goal: StrideGoal, walk: str | None) -> Sequence[StrideGoal]:
+        """On to the goal's target and the next stride of ``walk``, or to a stand."""
+        height = STAND_HEIGHT / REFERENCE.rest_length * self.parameters.rest_length
+        rest = replace(goal, target=np.array([0.0, height, 0.0]), then=_STARTS)
+        stops = [replace(rest, stride=stop) for stop in _STOPS]
+        return replace(goal, stride=_CARRIES, then=walk), *stops
 
     def _run(self, walk: StrideGoal, stride: str, speed: float, then: str) -> StrideGoal:
         p = self.parameters
