@@ -193,7 +193,7 @@ class EmbeddingController:
         self.robot.update(*self.ground.enter(q, v))
         if force is not None:
             force = self.frame.inward(force)
-            self._stumble.feel(force, self.robot.foot_velocity[:, 1], dt)
+            self._stumble.feel(force, self.robot.foot_velocity[:, 1], self.feet.landing_speeds, dt)
             contact = contact & ~self._stumble.slipping
             self._feel_friction(contact, force, dt)
         self.feet.swing_time += dt

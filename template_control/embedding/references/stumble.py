@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,8 @@ class StumbleOptions(Checked):
         linger: the wall counts for this long after its last force [s].
         sinking: a foot that still comes down faster than this has grazed an edge [m/s]. A swing
             ends with 0.2 m/s (``SwingOptions.landing_speed``).
+        overdue: a foot that came down faster than this many times its swing's landing speed is one
+            that found no ground where it was due. It may have hit an edge, and bounces off it.
         graze: a contact that lasts longer than this is none that grazes [s].
     """
 
@@ -32,6 +35,7 @@ class StumbleOptions(Checked):
     force: NotNegative = tuned(0.02)
     linger: NotNegative = tuned(0.015, TIME)
     sinking: NotNegative = tuned(0.3, SPEED)
+    overdue: Positive = tuned(1.5)
     graze: NotNegative = tuned(0.004, TIME)
 
 
@@ -51,18 +55,20 @@ class Stumble:
         self._least = options.force * weight
         self._left = [0.0, 0.0]
         self._touching = [0.0, 0.0]
+        self._came = [0.0, 0.0]  # upward speeds before the feet touched
         self.slipping = np.zeros(2, dtype=bool)
 
     def blocked(self, foot: int) -> bool:
         """Whether a wall is in front of a foot."""
         return self._left[foot] > 0.0
 
-    def feel(self, force: Array, rising: Array, dt: float) -> None:
+    def feel(self, force: Array, rising: Array, landing: Sequence[float], dt: float) -> None:
         """Look at what acts on the feet, and how they move.
 
         Args:
             force: (2, d) the ground's force on each foot, forward first and up last [N].
             rising: (2,) their upward speeds [m/s].
+            landing: downward speeds with which they are to touch down [m/s].
             dt: since the last look [s].
         """
         o = self._options
@@ -73,4 +79,7 @@ class Stumble:
             left = o.linger if wall and along < 0.0 else self._left[foot] - dt
             touching = self._touching[foot] + dt if up > 0.0 else 0.0
             self._left[foot], self._touching[foot] = left, touching
-            self.slipping[foot] = wall or (rises < -o.sinking and touching < o.graze)
+            if touching == 0.0:
+                self._came[foot] = rises
+            falls = rises < -o.sinking or self._came[foot] < -o.overdue * landing[foot]
+            self.slipping[foot] = wall or (falls and touching < o.graze)
