@@ -91,13 +91,15 @@ def slow(node, place, toes, speed):
         route, default_planners(route), ReplanOptions(), AUTOMATON, frozenset(CURVED)
     )
     planning.begin(VLO)
-    sensed = Sensed(VLO.state(WALK.vlo), np.zeros(2))
-    planning.decide(VLO, sensed, 0.0, NOTHING)
-    sensed.state[:] = place, 0.955, speed, 0.0
-    sensed.toes[:] = toes
-    sensed.acceleration = np.zeros(2)
+    planning.decide(VLO, Sensed(VLO.state(WALK.vlo), np.zeros(2)), 0.0, NOTHING)
     assert planning.surprised(-0.5, 0.3, 0.3)
+    sensed = standing(place, toes, speed)
     return planning, planning.reconsider(AUTOMATON.node(node), sensed, 0.3, 0.3)
+
+
+def standing(place, toes, speed):
+    """The CoM at ``place``, 0.955 m high."""
+    return Sensed(np.array([place, 0.955, speed, 0.0]), np.array(toes), acceleration=np.zeros(2))
 
 
 @pytest.mark.parametrize("node", BREAKS["ww"])
@@ -131,6 +133,10 @@ def test_a_double_stance_that_falls_back_comes_to_a_stand():
     assert after.name == "DS_br^ws"
     assert planning.reports[-1].goal.stride == "ws"
     assert planning.reports[-1].decision.feasible
+    pushed = standing(0.05, (0.0, 0.45), -0.5)
+    after = planning.reconsider(after, pushed, 0.1, 0.4)
+    assert after.name == "DS_al^sb", "pushed on, it steps"
+    assert planning.reports[-1].goal.stride == "sb"
 
 
 def strides(record):
