@@ -247,7 +247,7 @@ def test_ctrl_c_says_where_the_trials_are(tmp_path, monkeypatch, capfd):
 @pytest.mark.slow(seconds=60)
 def test_a_campaign_goes_on_and_its_falls_can_be_repeated(tmp_path, capfd):
     mix = tmp_path / "hard.toml"
-    mix.write_text("push = [-120.0, -119.0]\nwithin = [1, 2]\nafter = 5\n")
+    mix.write_text("push = [-160.0, -159.0]\nwithin = [1, 2]\nafter = 5\n")
     words = ["campaign", "--mix", str(mix), "--workers", "1", "--json"]
     words += ["--trials", "2", "--output", str(tmp_path / "out")]
     assert main(words) == 0

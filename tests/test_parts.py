@@ -248,6 +248,8 @@ robot = tc.load_robot("five-link")
 gait = tc.default_gait(robot)
 planner = tc.LqrPlanner(gait)
 tc.embedding.EmbeddingController(robot, planner)
+route = tc.slip.CatchingRoute(tc.slip.SteadyRoute.of(gait))
+tc.embedding.default_planners(route, planner)  # of what the walk may break into
 wanted = []
 load = compiled._Cache.load_overload
 

@@ -417,5 +417,5 @@ def test_a_base_that_no_leg_threw_so_fast_is_a_simulation_that_diverged(robot, g
 
 @pytest.mark.slow
 def test_a_trial_that_diverges_is_a_fall():
-    """With 11 ms of delay bolt was foreseen 1e16 m above the ground; the report ended there."""
-    assert trial("bolt", "delay", 0.011, 0)["fell"]
+    """With long delays bolt was foreseen 1e16 m above the ground; the report ended there."""
+    assert trial("bolt", "delay", 0.016, 0)["fell"]

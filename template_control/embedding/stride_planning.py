@@ -18,6 +18,7 @@ from template_control.embedding.planners.planner import (
     Decision,
     Planner,
     Planners,
+    PricingPlanner,
     SlopePlanner,
 )
 from template_control.embedding.planning import choosing_again
@@ -290,7 +291,16 @@ class StridePlanning(PlannedPath):
         if abs(deviation) > o.speed and phase_time > o.interval:
             self._excess += deviation
             return True
-        return not self._whole and (self._broken or not isinstance(self.planner, CurvePlanner))
+        return not self._whole and (self._broken or self._gave_up())
+
+    def _gave_up(self) -> bool:
+        """Whether no stride went on, or the planner knows what the next ones are worth.
+
+        Such a planner may find another way. One along a curve is left to it.
+        """
+        if isinstance(self.planner, CurvePlanner):
+            return False
+        return not self.reports[-1].decision.feasible or isinstance(self.planner, PricingPlanner)
 
     def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.

@@ -37,11 +37,6 @@ class Feet:
         self.of = (rear, 1 - rear)
         self.landed = rear
 
-    @property
-    def landing_speeds(self) -> list[float]:
-        """Downward speed with which each foot is to touch down [m/s]."""
-        return [swing.options.landing_speed for swing in self.swing]
-
     def lift(self, foot: int, robot: Biped, swung: float = 0.0) -> None:
         """Begin the swing of a foot that leaves the ground, or has left it already.
 

@@ -26,8 +26,8 @@ class StumbleOptions(Checked):
         linger: the wall counts for this long after its last force [s].
         sinking: a foot that still comes down faster than this has grazed an edge [m/s]. A swing
             ends with 0.2 m/s (``SwingOptions.landing_speed``).
-        overdue: a foot that came down faster than this many times its swing's landing speed is one
-            that found no ground where it was due. It may have hit an edge, and bounces off it.
+        overdue: a foot that found no ground where it was due, and came down faster than this many
+            times its swing's landing speed, may have hit an edge, and bounces off it.
         graze: a contact that lasts longer than this is none that grazes [s].
     """
 
@@ -68,7 +68,8 @@ class Stumble:
         Args:
             force: (2, d) the ground's force on each foot, forward first and up last [N].
             rising: (2,) their upward speeds [m/s].
-            landing: downward speeds with which they are to touch down [m/s].
+            landing: downward speeds with which they were to touch down [m/s], of those that are
+                overdue; inf of the others.
             dt: since the last look [s].
         """
         o = self._options
