@@ -277,8 +277,8 @@ class StridePlanning(PlannedPath):
     def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
         """Whether a disturbance has carried the robot away from its path.
 
-        A path that leads nowhere is one as well, but for one along a curve; that is left to it
-        where the robot has not broken into its stride.
+        A path that leads nowhere is one as well, where the robot has broken into its stride, no
+        stride went on, or the planner may find another way.
 
         Args:
             deviation: of the forward speed from the path's [m/s].
