@@ -21,20 +21,17 @@ In single stance the other foot lands next, whether VLO is past or not.
 
 _BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
 _BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
-_AFTER_VLO = ("SS_av^w", "SS_av^wp")
 
 BREAKS: Mapping[str, Mapping[str, str]] = {
     "wr": RUN_ON,
     "ww": dict.fromkeys(_BOTH_STAND, "DS_bl^ww"),
     "ws": dict.fromkeys(_BOTH_STAND, "DS_br^ws"),
-    "sf": dict.fromkeys((*_BEFORE_VLO, *_AFTER_VLO), "SS_bt^sf"),
     "sb": dict.fromkeys(_BEFORE_VLO, "SS_bt^sb"),
 }
 """By the kind of a stride that a walk can break into: from which nodes, and where it goes on.
 
-The last four are of a slow walk, whose springs would throw it back. A curve in time carries the CoM
-while both feet stand, on or to rest; the foot that is up is set down where the robot then comes to
-rest, in front or behind.
+The last three are of a slow walk, whose springs would throw it back. A curve in time carries the
+CoM while both feet stand, on or to rest; the foot that is up is set down behind again.
 """
 
 STEP_OUT: Mapping[str, tuple[str, ...]] = {
