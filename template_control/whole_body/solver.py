@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import proxsuite
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
@@ -21,6 +20,7 @@ from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import RATE, TIME, tuned
 from template_control.whole_body.joint_bounds import JointBounds, JointTuning
+from template_control.whole_body.portable_proxqp import load_proxqp
 from template_control.whole_body.problem import (
     Matrices,
     assemble,
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 
-_proxqp = proxsuite.proxqp
+_proxqp = load_proxqp()
 _SOLVED = _proxqp.QPSolverOutput.PROXQP_SOLVED
 
 
