@@ -8,7 +8,6 @@ looked up in the table of phases: the controller knows no gait.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,8 +41,6 @@ from template_control.whole_body.solver import Solution, Stance, WholeBodyQp
 from template_control.whole_body.wanted import Wanted
 
 Array = NDArray[np.float64]
-
-_IN_TIME = (np.inf, np.inf)  # landing speeds where no foot is overdue
 
 
 class EmbeddingController:
@@ -196,7 +193,8 @@ class EmbeddingController:
         self.robot.update(*self.ground.enter(q, v))
         if force is not None:
             force = self.frame.inward(force)
-            self._stumble.feel(force, self.robot.foot_velocity[:, 1], self._overdue(), dt)
+            landing = self._in_air.overdue_speeds(self.station, self.planning)
+            self._stumble.feel(force, self.robot.foot_velocity[:, 1], landing, dt)
             contact = contact & ~self._stumble.slipping
             self._feel_friction(contact, force, dt)
         self.feet.swing_time += dt
@@ -301,16 +299,6 @@ class EmbeddingController:
         self.ground.land(foot)
         leans = abs(off) > self.options.replan.ground.height
         return leans and self._lean(self.ground.slope.last, foot)
-
-    def _overdue(self) -> Sequence[float]:
-        """Landing speed of the foot that is overdue, inf of the others [m/s]."""
-        leg = self.station.awaited
-        if leg is None or not self.planning.reaching:
-            return _IN_TIME
-        speeds = list(_IN_TIME)
-        foot = self.feet.of[leg]
-        speeds[foot] = self.feet.swing[foot].options.landing_speed
-        return speeds
 
     def _feel_friction(self, contact: NDArray[np.bool_], force: Array, dt: float) -> None:
         """Let the cones be as narrow as the friction that sliding feet have felt."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from collections.abc import Sequence
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from template_control.slip.automaton.vocabulary import Leg, Slot
 from template_control.whole_body.wanted import Wanted
 
 Array = NDArray[np.float64]
+
+_IN_TIME = (inf, inf)  # landing speeds where no foot is overdue
 
 
 class FeetInAir:
@@ -54,12 +57,13 @@ class FeetInAir:
             dt: duration of the tick [s].
         """
         robot, feet = self._robot, self._feet
+        late = self._overdue(station, planning)
         for leg in station.swings:
             foot = feet.of[leg]
             swing = feet.swing[foot]
             landing = planning.landing(foot)
             foothold, due = landing.x, landing.time - time
-            overdue = planning.reaching and leg == station.awaited
+            overdue = foot == late
             if self._stumble.blocked(foot):
                 # The path goes on as if an overdue foot had time; it has none to go up again.
                 swing.meet_wall(robot.foot_position[foot], 0.0 if overdue else due, dt)
@@ -77,3 +81,21 @@ class FeetInAir:
                     foothold = rolled(foothold, angle, robot.foot_radius)
                 swing.advance(foothold, due, dt, sensing.ground)
             self._wanted.furthest[foot] = swing.furthest(hips, robot.leg_length)
+
+    def overdue_speeds(self, station: Station, planning: StridePlanning) -> Sequence[float]:
+        """Landing speed of the foot that is overdue, inf of the others [m/s].
+
+        Args:
+            station: of the robot.
+            planning: which knows where the feet land.
+        """
+        speeds = list(_IN_TIME)
+        late = self._overdue(station, planning)
+        if late is not None:
+            speeds[late] = self._feet.swing[late].options.landing_speed
+        return speeds
+
+    def _overdue(self, station: Station, planning: StridePlanning) -> int | None:
+        """The foot that should have found the ground by now."""
+        leg = station.awaited
+        return None if leg is None or not planning.reaching else self._feet.of[leg]
