@@ -93,7 +93,7 @@ def test_a_foot_that_meets_a_wall_goes_up_along_it_and_on_above_it():
         swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
     wall, below = np.array([-0.5, 0.07]), swing.y[0]
     for _ in range(20):
-        swing.meet_wall(wall, 0.28, 1e-3)
+        swing.meet_wall(wall, 0.6, 0.28, 1e-3)
     assert swing.x[0] == -0.5
     assert swing.x[1] == 0.0
     met = swing.y[0]
@@ -108,9 +108,21 @@ def test_a_foot_that_meets_a_wall_late_goes_down_before_it():
     swing = SwingFoot(SwingOptions())
     swing.start(np.array([0.5, 0.03]), np.array([0.3, -0.5]))
     for _ in range(20):
-        swing.meet_wall(np.array([0.5, 0.02]), 0.02, 1e-3)
+        swing.meet_wall(np.array([0.5, 0.02]), 0.6, 0.02, 1e-3)
     assert swing.x[0] == 0.5
     assert swing.y[0] < 0.03 - 0.5 * 0.02
+
+
+@pytest.mark.parametrize(
+    ("speed", "foothold", "rises"), [(-0.5, 0.53, False), (-0.5, 0.6, True), (0.5, 0.53, True)]
+)
+def test_a_foot_that_comes_down_and_is_nearly_there_is_set_down(speed, foothold, rises):
+    """One that rises only begins its swing, and a short step ends near its beginning."""
+    swing = SwingFoot(SwingOptions())
+    swing.start(np.array([0.5, 0.03]), np.array([0.3, speed]))
+    for _ in range(20):
+        swing.meet_wall(np.array([0.5, 0.02]), foothold, 0.07, 1e-3)
+    assert (swing.y[0] > 0.03) == rises
 
 
 @pytest.mark.parametrize("reaching", [False, True])
@@ -119,7 +131,7 @@ def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(reaching):
     feet = Feet(SwingOptions(), np.zeros((2, 2, 3)))
     swing = feet.swing[1]
     swing.start(np.array([0.57, -0.004]), np.array([0.0, -0.2]))
-    landing = SimpleNamespace(x=0.58, time=0.13)
+    landing = SimpleNamespace(x=0.7, time=0.13)
     in_air = FeetInAir(
         SimpleNamespace(foot_position=np.array([[0.0, 0.0], [0.57, -0.006]]), leg_length=1.0),
         feet,

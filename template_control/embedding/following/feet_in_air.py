@@ -66,7 +66,7 @@ class FeetInAir:
             overdue = foot == late
             if self._stumble.blocked(foot):
                 # The path goes on as if an overdue foot had time; it has none to go up again.
-                swing.meet_wall(robot.foot_position[foot], 0.0 if overdue else due, dt)
+                swing.meet_wall(robot.foot_position[foot], foothold, 0.0 if overdue else due, dt)
             elif overdue:
                 swing.drop(dt)
             else:

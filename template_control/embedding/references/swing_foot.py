@@ -41,6 +41,8 @@ class SwingOptions(Checked):
             comes down at rest relative to the ground.
         late: a foot that meets a wall less than this before its touchdown [s] is set down before
             it; earlier it goes up and over.
+        near: so is one that comes down already with less than this to go to its foothold [m]: it
+            would be late for the sake of little way.
         lift_speed: upwards, of a foot that has met a wall [m/s].
         margin: height over the place where it met the wall last that it then keeps [m].
         drop_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
@@ -55,6 +57,7 @@ class SwingOptions(Checked):
     horizon: Positive = tuned(0.02, TIME)
     early: NotNegative = tuned(0.01, TIME)
     late: NotNegative = tuned(0.06, TIME)
+    near: NotNegative = tuned(0.05, LENGTH)
     lift_speed: Positive = tuned(1.0, SPEED)
     margin: NotNegative = tuned(0.02, LENGTH)
     drop_acceleration: Positive = tuned(10.0, ACCELERATION)
@@ -142,17 +145,19 @@ class SwingFoot:
                 quintic_step(self.y, ground, -o.landing_speed, time_to_go, dt)
         self._elapsed += dt
 
-    def meet_wall(self, position: Array, time_to_go: float, dt: float) -> None:
+    def meet_wall(self, position: Array, foothold: float, time_to_go: float, dt: float) -> None:
         """Go up along a wall that the foot has met, and stay above it from then on; or down.
 
         Args:
             position: (2,) of the foot [m].
+            foothold: x of the foothold in the world [m]; not finite where there is none.
             time_to_go: time until the foot is due [s].
             dt: control period [s].
         """
         o = self.options
         self.x[:] = position[0], 0.0, 0.0
-        if time_to_go < o.late:
+        near = self.y[1] < 0.0 and abs(foothold - position[0]) < o.near
+        if near or time_to_go < o.late:
             self.drop(dt)
             return
         self.y[0] = max(self.y[0], position[1]) + o.lift_speed * dt
