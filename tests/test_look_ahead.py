@@ -28,7 +28,6 @@ from template_control.slip.scenario.speed_route import SpeedRoute
 
 P = tc.SlipParameters()
 OPTIONS = AheadOptions()
-TABLE = gait_table(P, OPTIONS)
 SCENARIO = """
 start = [0.4, 0.977, 0.0]
 [[segment]]
@@ -44,9 +43,14 @@ def planner():
     return AheadPlanner(P)
 
 
+def table():
+    """Of the planner's gaits; whoever asks first waits a second for it."""
+    return gait_table(P, OPTIONS)
+
+
 def plan_from(z, speed, steps=3, **changes):
     """A plan's cost, the plan, and what it was made with."""
-    known = prospect(P, replace(OPTIONS, **changes), TABLE)
+    known = prospect(P, replace(OPTIONS, **changes), table())
     plan = Plan(np.empty((steps + 1, 3)), np.empty((steps, CONTROLS)), np.empty(WIDTH))
     work = Workspace(new_scratch(), new_scratch(complex))
     aim = Aim(speed, np.zeros(3), ANY_ANGLE)
@@ -54,7 +58,7 @@ def plan_from(z, speed, steps=3, **changes):
 
 
 def test_derivatives_are_those_of_the_residuals():
-    z = row_at(TABLE, 0.8)[STATE : STATE + 3] + [0.03, 0.002, 0.16]
+    z = row_at(table(), 0.8)[STATE : STATE + 3] + [0.03, 0.002, 0.16]
     _, plan, (known, work, aim) = plan_from(z, 0.9, rounds=1)
     target, factor = np.empty(7), np.empty((3, 3))
     aimed(known, aim, plan, target, factor)
@@ -80,7 +84,7 @@ def test_derivatives_are_those_of_the_residuals():
 
 @pytest.mark.parametrize("speed", [0.2, 0.36, 0.8, 1.3])
 def test_a_gait_is_kept(planner, speed):
-    row = row_at(TABLE, speed)
+    row = row_at(table(), speed)
     z = row[STATE : STATE + 3]
     decision = planner.decide(z, z)
     assert decision.accepted is None
@@ -94,7 +98,7 @@ def test_a_gait_is_kept(planner, speed):
 def test_a_plan_stays_within_its_bounds(seed):
     rng = np.random.default_rng(seed)
     speed = rng.uniform(0.3, 1.2)
-    z = row_at(TABLE, speed)[STATE : STATE + 3] + rng.uniform(-1, 1, 3) * [0.15, 0.006, 0.15]
+    z = row_at(table(), speed)[STATE : STATE + 3] + rng.uniform(-1, 1, 3) * [0.15, 0.006, 0.15]
     cost, plan, (known, *_) = plan_from(z, speed)
     if not np.isfinite(cost):
         pytest.skip("no plan from there")
@@ -108,7 +112,7 @@ def test_a_plan_stays_within_its_bounds(seed):
 
 
 def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
-    z = row_at(TABLE, 0.9)[STATE : STATE + 3]
+    z = row_at(table(), 0.9)[STATE : STATE + 3]
     free = planner.decide(z, z + [0.1, 0.0, 0.0])
     angle = free.controls[0] + 0.01
     held = planner.decide(z, z + [0.1, 0.0, 0.0], (angle, angle + 1e-9))
@@ -116,7 +120,7 @@ def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
 
 
 def test_dy_dt_costs_above_its_bound():
-    z = row_at(TABLE, 0.9)[STATE : STATE + 3]
+    z = row_at(table(), 0.9)[STATE : STATE + 3]
     below, *_ = plan_from(z + [0.0, 0.0, 0.1], 0.9, rounds=1)
     calm, plan, _ = plan_from(z + [0.0, 0.0, 0.1], 0.9)
     assert calm <= below
@@ -124,7 +128,7 @@ def test_dy_dt_costs_above_its_bound():
 
 
 def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
-    z = row_at(TABLE, 0.9)[STATE : STATE + 3]
+    z = row_at(table(), 0.9)[STATE : STATE + 3]
     taken = planner.decide(z, z + [0.05, 0.0, 0.0])
     assert taken.accepted is None
     reduced = planner.decide(z, z + [0.5, 0.0, 0.0])
@@ -136,7 +140,7 @@ def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
 @pytest.mark.parametrize(("wanted", "end"), [(0.02, 0), (3.0, 1)])
 def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
     there = planner.speeds[end]
-    z = row_at(TABLE, there)[STATE : STATE + 3]
+    z = row_at(table(), there)[STATE : STATE + 3]
     decision = planner.decide(z, np.array([wanted, z[1], 0.0]))
     assert decision.accepted == pytest.approx(there)
 
@@ -144,7 +148,7 @@ def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
 @pytest.mark.slow(seconds=2)
 def test_a_plan_that_is_not_cheap_gives_way_to_a_search():
     hasty = AheadPlanner(P, AheadOptions(cheap=1e-9))
-    z = row_at(TABLE, 0.9)[STATE : STATE + 3] + [0.1, 0.0, 0.0]
+    z = row_at(table(), 0.9)[STATE : STATE + 3] + [0.1, 0.0, 0.0]
     decision = hasty.decide(z, z)
     assert decision.feasible
     assert decision.lasting
@@ -170,7 +174,7 @@ def test_a_table_scales_with_the_template():
     small = replace(P, mass=10.0, rest_length=0.3)
     unit = np.sqrt(0.3)
     low, high = AheadPlanner(small).speeds
-    assert (low / unit, high / unit) == pytest.approx((TABLE.speed[0], TABLE.speed[-1]))
+    assert (low / unit, high / unit) == pytest.approx((table().speed[0], table().speed[-1]))
 
 
 def test_a_rehearsal_refuses_what_cannot_be_had(planner):
