@@ -25,7 +25,7 @@ def load_proxqp() -> Any:
     """
     if "proxsuite" not in sys.modules:
         none = ModuleType(_CHECKS)
-        vars(none).update(has_AVX512F=bool, has_AVX2=bool)
+        vars(none).update(has_AVX512F=bool, has_AVX2=bool)  # called without arguments: False
         sys.modules[_CHECKS] = none
         try:
             import_module("proxsuite")
