@@ -158,7 +158,6 @@ def test_trials_of_a_run_succeed_and_know_its_speed():
 
 
 def test_trials_fall_alike():
-    # What ProxQP returns where it fails depends on where its memory lies: here it does not fail.
     bad = trial("five-link", "torque", 0.5, 0)
     assert bad["fell"]
     assert bad["reason"]
