@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import cos, sin
 from typing import ClassVar
 
 import numpy as np
@@ -104,7 +105,7 @@ class IdealPlant:
         self._push = 0.0
         self._feet = RollingFeet(self.robot, options.ground)
         self._impulse = np.zeros((2, 2))
-        self._trunk_corners = trunk_corners(self.robot)
+        self._trunk_corners = tuple(trunk_corners(self.robot).T.tolist())
 
     @property
     def time_step(self) -> float:
@@ -142,12 +143,12 @@ class IdealPlant:
 
     def trunk_touches_ground(self) -> bool:
         """True where the box around the trunk's collision shapes reaches the ground."""
-        x, z = self._trunk_corners
-        sine, cosine = np.sin(self._q[2]), np.cos(self._q[2])
-        height = self._q[1] - x * sine + z * cosine
-        place = self._q[0] + x * cosine + z * sine
-        ground = [self.ground_height(corner) for corner in place.tolist()]
-        return bool(np.any(height <= ground))
+        x, y, pitch = self._q[:BASE_DOF].tolist()
+        sine, cosine = sin(pitch), cos(pitch)
+        return any(
+            y - along * sine + up * cosine <= self.ground_height(x + along * cosine + up * sine)
+            for along, up in self._trunk_corners
+        )
 
     def step(self, torque: Array, push: float = 0.0) -> None:
         """Advance one time step.
@@ -177,7 +178,7 @@ class IdealPlant:
             left -= self._to_event(left)
             if left <= 0.0:
                 return
-        self._commit(*self._flow(left))
+        self._commit(*self._flow(left, self._rates(self._q, self._v)))
 
     def close(self) -> None:
         """See :class:`~.plant.Plant`; there is nothing to give back."""
@@ -196,7 +197,7 @@ class IdealPlant:
         if self._push:
             x, _, z = self.robot.model.inertias[BASE_DOF].lever
             right[0] += self._push
-            right[2] += self._push * (z * np.cos(q[2]) - x * np.sin(q[2]))
+            right[2] += self._push * (z * cos(q[2]) - x * sin(q[2]))
         return right
 
     def _rates(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -205,10 +206,13 @@ class IdealPlant:
         r.update(q, v)
         return solve(r.mass_matrix, self._right(q), *self._feet.rows(), self.contacts)
 
-    def _flow(self, h: float) -> tuple[Array, Array, Array]:
-        """State after ``h`` seconds with the present contacts, and their impulse (2, 2)."""
+    def _flow(self, h: float, begin: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+        """State after ``h`` seconds with the present contacts, and their impulse (2, 2).
+
+        ``begin`` holds the rates at the beginning.
+        """
         q, v = self._q, self._v
-        a1, f1 = self._rates(q, v)
+        a1, f1 = begin
         a2, f2 = self._rates(q + 0.5 * h * v, v2 := v + 0.5 * h * a1)
         a3, f3 = self._rates(q + 0.5 * h * v2, v3 := v + 0.5 * h * a2)
         a4, f4 = self._rates(q + h * v3, v4 := v + h * a3)
@@ -219,20 +223,22 @@ class IdealPlant:
         )
 
     def _to_event(self, h: float) -> float:
-        """Go on until a foot touches down or is released, at most ``h``; the time gone by."""
+        """Go on until a foot touches down or is released, at most ``h``; the time gone by.
+
+        The robot's update is at the present state.
+        """
         r = self.robot
-        r.update(self._q, self._v)
         right = self._right(self._q)
-        self.contacts, _, _, clean = pressing(
+        self.contacts, a, f, clean = pressing(
             r.mass_matrix, right, *self._feet.rows(), self.contacts
         )
         self.pulls += not clean
-        end = self._flow(h)
+        end = self._flow(h, (a, f))
         if clean and self._margin(end) < 0.0:
             low, high = 0.0, h
             for _ in range(_HALVINGS):
                 middle = 0.5 * (low + high)
-                flown = self._flow(middle)
+                flown = self._flow(middle, (a, f))
                 if self._margin(flown) < 0.0:
                     high, end = middle, flown
                 else:

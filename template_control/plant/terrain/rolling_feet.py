@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.plant.terrain.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
 
@@ -56,13 +57,10 @@ class RollingFeet:
         each foot, and their dJ/dt v (2, 2) [m/s^2].
         """
         r = self._robot
-        jacobian = np.empty_like(r.foot_jacobian)
-        for foot, ((_, _), (x, y)) in enumerate(self._axes.tolist()):
-            # From the sphere's lowest point, which the model tells, to the one that touches.
-            arm = r.foot_radius * np.array([1.0 - y, x])
-            point = r.foot_jacobian[foot] + np.outer(arm, r.foot_turning[foot])
-            jacobian[foot] = self._axes[foot] @ point
-        return jacobian, np.einsum("fij,fj->fi", self._axes, r.foot_bias)
+        found: tuple[Array, Array] = _rows(
+            self._axes, r.foot_radius, r.foot_jacobian, r.foot_turning, r.foot_bias
+        )
+        return found
 
     def errors(self, foot: int, q: Array) -> Array:
         """(2,) how far a foot is from where it holds, along and out of its plane [m].
@@ -93,3 +91,28 @@ class RollingFeet:
         r = self._robot
         rolled = r.foot_radius * float(r.foot_turning[foot] @ q)
         return np.asarray(self._axes[foot] @ self._centre(foot) - (rolled, 0.0))
+
+
+@compiled
+def _rows(
+    axes: Array, radius: float, lowest: Array, turning: Array, bias: Array
+) -> tuple[Array, Array]:
+    """Rows as :meth:`RollingFeet.rows` returns them.
+
+    ``axes`` (2, 2, 2) are along and out of each foot's plane; ``lowest`` (2, 2, nv) is the
+    Jacobian of each sphere's lowest point, ``turning`` (2, nv) of its angle, and ``bias`` (2, 2)
+    the point's dJ/dt v.
+    """
+    jacobian, rates = np.empty_like(lowest), np.empty((2, 2))
+    for foot in range(2):
+        # From the sphere's lowest point, which the model tells, to the one that touches.
+        x = radius * (1.0 - axes[foot, 1, 1])
+        y = radius * axes[foot, 1, 0]
+        for axis in range(2):
+            along, up = axes[foot, axis]
+            rates[foot, axis] = along * bias[foot, 0] + up * bias[foot, 1]
+            for k in range(lowest.shape[2]):
+                point_x = lowest[foot, 0, k] + x * turning[foot, k]
+                point_y = lowest[foot, 1, k] + y * turning[foot, k]
+                jacobian[foot, axis, k] = along * point_x + up * point_y
+    return jacobian, rates
