@@ -19,14 +19,8 @@ from template_control.checks.checked import checked
 from template_control.embedding.planners.planner import ANY_ANGLE, Ahead, Decision
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.embedding.planners.walking.rest_of_step import choose_rest
-from template_control.embedding.planners.walking.step_search import (
-    FALL_PRICE,
-    Grid,
-    Law,
-    Strain,
-    Trust,
-    choose,
-)
+from template_control.embedding.planners.walking.step_law import Law, Strain
+from template_control.embedding.planners.walking.step_search import FALL_PRICE, Grid, Trust, choose
 from template_control.embedding.planners.walking.walk_kernels import WALK
 from template_control.errors import GaitError
 from template_control.parts import ready

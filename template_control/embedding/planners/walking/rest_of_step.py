@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.embedding.planners.planner import Ahead
 from template_control.embedding.planners.regularised import FromHere, Prior, solve_stride
-from template_control.embedding.planners.walking.step_search import Law
+from template_control.embedding.planners.walking.step_law import Law
 from template_control.slip.automaton.vocabulary import Outcome
 
 Array = NDArray[np.float64]

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.embedding.planners.gauss_newton import improve
-from template_control.embedding.planners.walking.step_search import Grid, Law, Strain, Trust, choose
+from template_control.embedding.planners.walking.step_law import Law, Strain
+from template_control.embedding.planners.walking.step_search import Grid, Trust, choose
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.swing_foot import quintic_step
 from template_control.embedding.references.template_path import LOCATE
