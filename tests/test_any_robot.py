@@ -238,6 +238,7 @@ def test_feet_without_spheres_are_named():
         PlanarBiped.from_urdf(robot_path("bolt"), BOLT_FEET, BOLT_JOINTS)
 
 
+@pytest.mark.slow(seconds=3)
 def test_a_joint_that_turns_the_other_way_walks_the_same(tmp_path, short_walk):
     # Turn one knee's axis about and with it its range: the same robot, another convention.
     tree = ET.parse(robot_path("five-link"))

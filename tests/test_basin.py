@@ -29,6 +29,7 @@ def test_vlo_states_and_energies_belong_together():
     assert np.isnan(vlo_state(P, 0.98, 0.0, 700.0)[0])
 
 
+@pytest.mark.slow(seconds=3)
 def test_steps_to_fall_counts_steps(paper_gait):
     goal = np.array([0.9818, 0.0])
     z = vlo_state(P, [0.9818, 0.9818, 0.955, 0.9818], np.radians([0.0, 1.0, 0.0, 0.0]), 826.0)

@@ -68,6 +68,7 @@ def template(gone):
     return ScenarioRecord.load(gone / "template.npz")
 
 
+@pytest.mark.slow(seconds=3)
 def test_the_run_repeats_and_json_has_what_it_promises(gone, record, tmp_path, capfd):
     words = ["go", "--config", str(gone / "run.toml"), "--json", "--no-figures", "--output"]
     assert main([*words, str(tmp_path)]) == 0

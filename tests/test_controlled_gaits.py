@@ -54,6 +54,7 @@ def modified_branch():
     return policy, family.trace(np.append(start, 826.0), "target", (815.0, 830.0), step=0.004)
 
 
+@pytest.mark.slow(seconds=3)
 def test_controlled_walking_settles_on_its_target_up_to_the_fold(modified_branch):
     policy, found = modified_branch
     fold = next(p for p in branch() if p.special is Special.FOLD)

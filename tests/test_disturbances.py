@@ -50,7 +50,8 @@ def test_rays_meet_the_ground_where_it_is_said_to_be(robot, height, edge):
             assert options.ground_height(x) == (height if x > edge else 0.0)
 
 
-@pytest.mark.parametrize("height", [0.005, pytest.param(-0.005, marks=pytest.mark.slow)])
+@pytest.mark.slow(seconds=3)
+@pytest.mark.parametrize("height", [0.005, -0.005])
 def test_a_step_nobody_told_of_moves_the_feet(on_step, robot, height):
     step, record = on_step(height)
     assert not record.fell

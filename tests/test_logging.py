@@ -58,6 +58,7 @@ def told_of(impulse, robot, gait, caplog, catches=True):
     return record, caplog.records
 
 
+@pytest.mark.slow(seconds=3)
 def test_every_section_is_told(robot, default_gait, caplog):
     record, told = told_of(-60.0, robot, default_gait, caplog)
     texts = [m.getMessage() for m in told if m.levelno == logging.DEBUG]

@@ -68,7 +68,8 @@ def test_a_second_run_of_one_route_is_as_the_first(robot):
     np.testing.assert_array_equal(again.q, first.q)
 
 
-@pytest.mark.parametrize("shared", ["robot", pytest.param("planner", marks=pytest.mark.slow)])
+@pytest.mark.slow(seconds=2)
+@pytest.mark.parametrize("shared", ["robot", "planner"])
 def test_a_robot_or_planner_in_use_is_refused_to_another_thread(shared, default_gait):
     own = {"robot": tc.load_robot("five-link"), "planner": tc.LqrPlanner(default_gait)}
     other = {"robot": tc.load_robot("five-link"), "planner": tc.LqrPlanner(default_gait)}

@@ -127,9 +127,8 @@ def test_the_server_serves_and_ends(record, monkeypatch):
         urllib.request.urlopen(server.url, timeout=10)
 
 
-@pytest.mark.parametrize(
-    "how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow(seconds=3)
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_a_replay_in_peace(run_file, how):
     command = [sys.executable, "-m", "template_control.cli.main", "replay", str(run_file)]
     process = subprocess.Popen(

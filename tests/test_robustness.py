@@ -157,6 +157,7 @@ def test_trials_of_a_run_succeed_and_know_its_speed():
     assert abs(good["height_error"]) < 0.02
 
 
+@pytest.mark.slow(seconds=3)
 def test_trials_fall_alike():
     bad = trial("five-link", "torque", 0.5, 0)
     assert bad["fell"]
