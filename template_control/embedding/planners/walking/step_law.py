@@ -86,7 +86,12 @@ class Law(NamedTuple):
 
 @callee
 def copy(source: Array, target: Array) -> None:
-    """A slice would take Numba seconds to compile: it prepares what to say of wrong shapes."""
+    """Copy numbers; a slice would take Numba seconds to compile, for what it says of wrong shapes.
+
+    Args:
+        source: (n,) of them.
+        target: (m,) overwritten, m <= n.
+    """
     for i in range(target.shape[0]):
         target[i] = source[i]
 
@@ -188,7 +193,15 @@ def strain(law: Law, z: Array, u: Array, result: Array) -> float:
 
 @callee
 def cost_to_go(target: Array, cost: Array, z: Array) -> float:
-    """Of the whole :class:`Law` a callee would take longer to compile: it has 32 parts."""
+    """(z - z_s)^T P (z - z_s).
+
+    It takes no :class:`Law`, which has 32 parts: a callee would take longer to compile.
+
+    Args:
+        target: (3,) z_s.
+        cost: (3, 3) P.
+        z: (3,) VLO state.
+    """
     total = 0.0
     for i in range(3):
         for j in range(3):
