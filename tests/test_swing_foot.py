@@ -56,9 +56,9 @@ def test_swing_without_a_foothold_comes_down():
 def test_swing_stays_within_reach_of_the_hip():
     swing = SwingFoot(SwingOptions(leg_share=0.97))
     swing.start(np.array([0.55, 0.1]), np.zeros(2))
-    x = swing.furthest(np.array([0.2, 0.85]), 0.9)
+    x = swing.furthest((0.2, 0.85), 0.9)
     assert np.hypot(x - 0.2, 0.75) == pytest.approx(0.97 * 0.9)
-    assert swing.furthest(np.array([0.2, 1.2]), 0.9) == 0.2, "nowhere but below the hip"
+    assert swing.furthest((0.2, 1.2), 0.9) == 0.2, "nowhere but below the hip"
 
 
 def test_swing_falls_to_ground_that_comes_late():

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 
 Array = NDArray[np.float64]
@@ -48,7 +49,6 @@ class JointBounds:
         self._robot = robot
         self._tuning = tuning
         self._low, self._high = robot.joint_range.T
-        self._range: list[list[float]] = robot.joint_range.tolist()
 
     def needed(self) -> bool:
         """Whether a joint is near its limit of speed, or the one that it has before its stop."""
@@ -57,14 +57,8 @@ class JointBounds:
             return True
         if robot.fastest <= o.stop_share:
             return False
-        # Numbers, not arrays: this is asked in every tick of a fast run.
-        places, speeds = robot.joint_angle.tolist(), robot.joint_velocity.tolist()
-        share = o.speed_share
-        for (low, high), place, speed in zip(self._range, places, speeds, strict=True):
-            way = speed * o.stop_horizon
-            if not share * (low - place) < way < share * (high - place):
-                return True
-        return False
+        limits = robot.joint_angle, robot.joint_velocity, robot.joint_range
+        return bool(before_stops(*limits, o.speed_share, o.stop_horizon))
 
     def write(self, least: Array, most: Array, slack: float) -> None:
         """Write the bounds.
@@ -80,3 +74,22 @@ class JointBounds:
         up = np.minimum((self._high - place) / o.stop_horizon, limit)
         most[:] = np.maximum((up - speed) / o.speed_horizon, slack)
         least[:] = -np.maximum((down + speed) / o.speed_horizon, slack)
+
+
+@compiled
+def before_stops(places: Array, speeds: Array, ranges: Array, share: float, horizon: float) -> bool:
+    """Whether a joint has a share of the speed that it may have before its stop.
+
+    Compiled: this is asked in every tick of a fast run.
+
+    Args:
+        places, speeds: (nu,) of the joints [rad, rad/s].
+        ranges: (nu, 2) their stops [rad].
+        share: of that speed.
+        horizon: T_s [s].
+    """
+    for i in range(places.shape[0]):
+        way = speeds[i] * horizon
+        if not share * (ranges[i, 0] - places[i]) < way < share * (ranges[i, 1] - places[i]):
+            return True
+    return False

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
 from template_control.robot.biped import Biped
@@ -39,10 +41,10 @@ class MomentumTask(Checked):
 
     def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
-        # Lists: arithmetic on an array's single numbers is slow.
-        height, angle = wanted.com_now.tolist()[1], wanted.pitch_now.tolist()[0]
+        # Python's numbers: arithmetic on an array's is slow.
+        height, angle = wanted.com_now.item(1), wanted.pitch_now.item(0)
         inertia = robot.mass * (height * height)
-        rows.jacobian[0] = robot.angular_momentum_jacobian / inertia
+        np.divide(robot.angular_momentum_jacobian, inertia, out=rows.jacobian[0])
         rows.bias[0] = robot.angular_momentum_bias / inertia
         turning = self.turning * (wanted.pitch - angle)
         rows.desired[0] = self.bandwidth * (turning - robot.angular_momentum / inertia)

@@ -57,7 +57,7 @@ class FeetInAir:
             dt: duration of the tick [s].
         """
         robot, feet = self._robot, self._feet
-        late = self._overdue(station, planning)
+        late, hip = self._overdue(station, planning), hips.tolist()
         for leg in station.swings:
             foot = feet.of[leg]
             swing = feet.swing[foot]
@@ -80,7 +80,7 @@ class FeetInAir:
                     angle = float(planning.reports[-1].decision.controls[Slot.TOUCHDOWN_ANGLE])
                     foothold = rolled(foothold, angle, robot.foot_radius)
                 swing.advance(foothold, due, dt, sensing.ground)
-            self._wanted.furthest[foot] = swing.furthest(hips, robot.leg_length)
+            self._wanted.furthest[foot] = swing.furthest(hip, robot.leg_length)
 
     def overdue_speeds(self, station: Station, planning: StridePlanning) -> Sequence[float]:
         """Landing speed of the foot that is overdue, inf of the others [m/s].

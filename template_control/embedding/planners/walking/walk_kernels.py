@@ -12,7 +12,10 @@ from template_control.embedding.planners.gauss_newton import improve
 from template_control.embedding.planners.walking.step_law import Law, Strain
 from template_control.embedding.planners.walking.step_search import Grid, Trust, choose
 from template_control.embedding.references.leg_forces import leg_forces
-from template_control.embedding.references.swing_foot import quintic_step
+from template_control.embedding.references.swing_foot import (
+    quintic_step,
+    two_quintic_steps,
+)
 from template_control.embedding.references.template_path import LOCATE
 from template_control.robot.library import load_robot
 from template_control.slip.automaton.automaton import STRIDE_START
@@ -115,6 +118,7 @@ def references() -> None:
         locate(coefficients, meta, np.ones(3), 0.1, 1.0, 0.0, np.zeros(6))
     leg_forces(meta[0], 0.1, np.ones(6), np.array([1.0, 1.0, 1.0, 0.0]), np.zeros((2, 2)))
     quintic_step(np.zeros(3), 0.1, 0.0, 1.0, 1e-3)
+    two_quintic_steps(np.zeros(3), np.zeros(3), (0.1, 0.0, 1.0), (0.1, 0.0, 1.0), 1e-3)
 
 
 def catch() -> None:
