@@ -218,7 +218,7 @@ def test_slippery_ground(gait):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("impulse", [-20.0, -10.0, 10.0, 25.0])
+@pytest.mark.parametrize("impulse", [-20.0, 25.0])
 @pytest.mark.parametrize("phase", np.arange(10) / 10)
 def test_pushes(default_gait, impulse, phase):
     record = walk(default_gait, steps=26, pushes=(Push(impulse, 5, phase),))
