@@ -125,6 +125,7 @@ def test_robots_never_seen_walk_on(tmp_path, build):
     walk_unseen(tmp_path, build, 20)
 
 
+@pytest.mark.slow(seconds=2)
 def test_similar_robots_walk_similarly(tmp_path):
     # Mass times 1/8 and lengths times 1/2: the same robot in other units.
     records = []

@@ -60,6 +60,7 @@ def test_a_run_writes_what_repeats_it_bit_by_bit(line, tmp_path):
     assert texts[0] == texts[1]
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_scenario_is_written_down_whole(tmp_path):
     path = tmp_path / "profile.toml"
     path.write_text('[[segment]]\ngait = "walk"\nspeed = 1.05\nsteps = 2\n')

@@ -65,6 +65,7 @@ def test_a_step_nobody_told_of_moves_the_feet(on_step, robot, height):
     assert np.all(force > 0.3 * robot.mass * robot.gravity)
 
 
+@pytest.mark.slow(seconds=2)
 def test_momentum_changes_by_the_forces_on_both_levels(on_step, robot):
     """Weight and reported contact forces; a body of ground not counted would show."""
     _, record = on_step(0.005)

@@ -69,6 +69,7 @@ def test_every_section_is_told(robot, default_gait, caplog):
     assert all(m.levelno == logging.INFO for m in left)
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_stride_that_the_template_cannot_make_is_told(robot, default_gait, caplog):
     _, told = told_of(-90.0, robot, default_gait, caplog, catches=False)
     (refused,) = [m for m in told if "no stride of the template" in m.getMessage()]

@@ -115,7 +115,8 @@ def test_the_ground_carries_the_robot(walk, robot):
     assert walk.contact_force[during, :, 1].min() >= 0.0
 
 
-@pytest.mark.parametrize("height", [0.02, pytest.param(-0.02, marks=pytest.mark.slow)])
+@pytest.mark.slow(seconds=2)
+@pytest.mark.parametrize("height", [0.02, -0.02])
 def test_a_step_of_the_ground_is_where_it_is_told(robot, default_gait, height):
     step = tc.GroundStep.at_step(default_gait, height, 2)
     world = tc.MujocoOptions(ground_step=step)

@@ -60,6 +60,7 @@ def test_a_second_run_of_one_robot_and_planner_is_as_the_first(robot, default_ga
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_second_run_of_one_route_is_as_the_first(robot):
     walk = Scenario((Segment("walk", 1.1, steps=2),), start=(1.1, 0.978, 0.0))
     route = robot_route(robot, walk, push_off=False)

@@ -349,6 +349,7 @@ def come_back(gait, planner, impulse):
     return bool(np.all(abs(z[:2] / gait.vlo[:2] - 1.0) < SETTLED))
 
 
+@pytest.mark.slow(seconds=2)
 @pytest.mark.parametrize(("name", "sign"), [("push-forward", 1.0), ("push-backward", -1.0)])
 def test_the_template_has_a_limit_to_pushes(robot, gait, name, sign):
     planner = LqrPlanner(gait)

@@ -116,6 +116,7 @@ def test_summary_has_every_figure(record):
     assert figures["fall_reason"] is None
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_fall_is_recorded_whole(gait, tmp_path):
     record = walk(gait, steps=30, pushes=(Push(-200.0, step=3),))
     assert record.fell
