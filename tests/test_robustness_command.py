@@ -123,8 +123,9 @@ def test_the_snippet_of_the_documentation_runs(capfd):
 def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
     others = {"--gait", "--free", "--plant"}
     (line,) = (x for x in commands() if "--quick" in x and not others & {*x.split()})
-    # One level of two: the test of the files runs both.
+    # One level of two, and one trial of two: the test of the files runs all.
     monkeypatch.setattr(ladder, "_QUICK_LEVELS", 1)
+    monkeypatch.setattr(ladder, "_QUICK_TRIALS", 1)
     monkeypatch.chdir(tmp_path)
     assert main(shlex.split(line)[1:]) == 0
     assert (tmp_path / "runs" / "robustness" / "five-link" / "robustness.png").is_file()

@@ -161,10 +161,10 @@ def settled(record, gait, steps):
     return record.section_state[steps - 49 : steps + 1].mean(axis=0) - gait.vlo
 
 
-@pytest.mark.slow(seconds=12)
+@pytest.mark.slow(seconds=10)
 def test_settles_on_the_papers_equilibrium(paper_gait):
-    record = walk(paper_gait, steps=200)
-    error = np.abs(settled(record, paper_gait, 200))
+    record = walk(paper_gait, steps=100)
+    error = np.abs(settled(record, paper_gait, 100))
     assert not record.fell
     assert error[0] <= 0.03 * paper_gait.vlo[0]
     assert error[1] <= 0.01
@@ -172,12 +172,12 @@ def test_settles_on_the_papers_equilibrium(paper_gait):
 
 
 @pytest.mark.slow(seconds=40)
-def test_three_hundred_steps_settle_on_the_default_gait(default_gait):
-    record = walk(default_gait, steps=300, record_every=10)
+def test_two_hundred_steps_settle_on_the_default_gait(default_gait):
+    record = walk(default_gait, steps=200, record_every=10)
     figures = summarise(record, "")
-    assert record.steps == 300
+    assert record.steps == 200
     assert not record.fell
-    for steps in (200, 300):
+    for steps in (100, 200):
         error = np.abs(settled(record, default_gait, steps))
         assert np.all(error <= (0.01 * default_gait.vlo[0], 0.005, 0.03))
     assert 1.1 <= figures["mean_speed"] <= 1.3
@@ -189,7 +189,7 @@ def test_three_hundred_steps_settle_on_the_default_gait(default_gait):
 @pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.9, 1.0, 1.3])
 def test_other_speeds(speed):
-    record = walk(gait_for_speed(P, speed), steps=50)
+    record = walk(gait_for_speed(P, speed), steps=25)
     assert not record.fell
     walked = (record.com[-1, 0] - record.com[0, 0]) / record.time[-1]
     assert walked == pytest.approx(speed, rel=0.05)
@@ -198,7 +198,7 @@ def test_other_speeds(speed):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_perturbed_starts(gait, seed):
-    assert not walk(gait, steps=20, start=perturbed_start(gait, seed)).fell
+    assert not walk(gait, steps=12, start=perturbed_start(gait, seed)).fell
 
 
 @pytest.mark.slow
