@@ -12,6 +12,7 @@ from template_control.embedding.references.swing_foot import (
     SwingFoot,
     SwingOptions,
     quintic_step,
+    two_quintic_steps,
 )
 from template_control.slip.automaton.vocabulary import Leg
 
@@ -23,6 +24,15 @@ def test_quintic_arrives():
         quintic_step(state, 0.7, 0.2, remaining - i * dt, dt)
     assert state[0] == pytest.approx(0.7 - 0.2 * dt, abs=1e-5)
     assert state[1] == pytest.approx(0.2, abs=1e-3)
+
+
+def test_two_steps_at_once_are_two_steps():
+    x, y = np.array([0.1, -0.4, 3.0]), np.array([0.05, 0.2, -1.0])
+    once = x.copy(), y.copy()
+    quintic_step(x, 0.7, 0.0, 0.3, 1e-3)
+    quintic_step(y, 0.0, -0.2, 0.25, 1e-3)
+    two_quintic_steps(*once, (0.7, 0.0, 0.3), (0.0, -0.2, 0.25), 1e-3)
+    np.testing.assert_array_equal(once, (x, y))
 
 
 def test_swing_clears_the_ground_and_lands_slowly():
