@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
+from template_control.robot.joint_reserve import joint_limits
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,8 @@ class Biped(ABC):
         contact_velocity, contact_jacobian, contact_bias: of each foot in all ``directions``.
         joint_angle, joint_velocity: (nu,) of the actuated joints [rad, rad/s].
         fastest: the largest share of its limit that a joint's speed has.
+        soonest_stop: the shortest time in which a joint would come to its stop at its speed [s]; 0
+            of one that is there, inf where none moves.
     """
 
     base_dof: int
@@ -106,6 +109,7 @@ class Biped(ABC):
     joint_angle: Array
     joint_velocity: Array
     fastest: float
+    soonest_stop: float
 
     def __init__(
         self,
@@ -124,11 +128,8 @@ class Biped(ABC):
         first = 1 + self.base_joints
         self.joint_names = tuple(model.names)[first:]
         self.torque_limit = np.array(model.effortLimit[self.base_dof :])
-        self.velocity_limit = np.array(model.velocityLimit[self.base_dof :])
-        nu = len(self.joint_names)
-        limits = (model.lowerPositionLimit, model.upperPositionLimit)
-        self.joint_range = np.column_stack(limits)[-nu:]
-        self.joint_angle = np.zeros(nu)
+        self.velocity_limit, self.joint_range = joint_limits(model, self.base_dof)
+        self.joint_angle = np.zeros(len(self.joint_names))
         self._foot_ids = tuple(model.getFrameId(foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)

@@ -8,7 +8,7 @@ joint order; all hinges are revolute, so nq = nv.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import cos, sin
+from math import cos, inf, sin
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -96,7 +96,7 @@ class PlanarBiped(Biped):
         self.contact_jacobian = self.foot_jacobian
         self.contact_bias = self.foot_bias
         self.joint_velocity = terms.joint_velocity
-        self.fastest = 0.0
+        self.fastest, self.soonest_stop = 0.0, inf
 
     @classmethod
     @checked
@@ -166,9 +166,9 @@ class PlanarBiped(Biped):
         Raises:
             ParameterError: if a value is NaN or infinite.
         """
-        finite, self.angular_momentum, self.angular_momentum_bias, self.fastest = gather(
-            self._sources, q, v, self._compute(q, v), self._terms
-        )
+        finite, momentum, reserve = gather(self._sources, q, v, self._compute(q, v), self._terms)
+        self.angular_momentum, self.angular_momentum_bias = momentum
+        self.fastest, self.soonest_stop = reserve
         self._check_finite(finite, q, v)
         np.matmul(self.foot_jacobian, v, out=self.foot_velocity)
 

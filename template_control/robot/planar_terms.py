@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.compiled import compiled
 from template_control.robot.biped import carrying
+from template_control.robot.joint_reserve import joint_limits, joint_reserve
 from template_control.robot.requirements import BASE_DOF
 
 Array = NDArray[np.float64]
@@ -73,14 +74,14 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float)
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.nle, data.g)
     jacobians = (data.Jcom, data.Ag, data.J)
     feet = tuple(data.oMf[frame].translation for frame in frames)
-    limit = np.array(model.velocityLimit[BASE_DOF:])
-    return (*whole, *jacobians), feet, (carrying(model, frames), np.array([radius]), limit)
+    constants = (carrying(model, frames), np.array([radius]), *joint_limits(model, BASE_DOF))
+    return (*whole, *jacobians), feet, constants
 
 
 @compiled
 def gather(
     views: Sources, q: Array, v: Array, drift: tuple[Array, Array], out: tuple[Array, ...]
-) -> tuple[bool, float, float, float]:
+) -> tuple[bool, tuple[float, float], tuple[float, float]]:
     """Write the planar terms at the state that Pinocchio has last computed.
 
     Args:
@@ -92,18 +93,18 @@ def gather(
 
     Returns:
         Whether the state is finite; the angular momentum about the CoM, forward pitch
-        positive [kg m^2/s], and its Jacobian's time derivative times v [N m]; the largest share
-        of its limit that a joint's speed has.
+        positive [kg m^2/s], and its Jacobian's time derivative times v [N m]; what
+        :func:`~.joint_reserve.joint_reserve` returns.
     """
-    whole, feet, (carries, radius, limit) = views
+    whole, feet, (carries, radius, limit, stops) = views
     centre, speed, pull, momentum, effects, weight, com_jacobian, centroidal, jacobian = whole
     com, com_velocity, com_bias, jcom, jl, foot_position, foot_jacobian, foot_bias, turning = out
-    finite, fastest = True, 0.0
+    finite = True
     for k in range(q.shape[0]):
         finite = finite and np.isfinite(q[k]) and np.isfinite(v[k])
     for k in range(limit.shape[0]):
         turning[k] = v[BASE_DOF + k]
-        fastest = max(fastest, abs(turning[k]) / limit[k])
+    reserve = joint_reserve(q, turning, limit, stops)
     com[0], com[1] = centre[0], centre[2]
     com_velocity[0], com_velocity[1] = speed[0], speed[2]
     com_bias[0], com_bias[1] = pull[0], pull[2]
@@ -127,4 +128,4 @@ def gather(
     force_z = effects[1] - weight[1]
     moment = effects[BASE_DOF - 1] - weight[BASE_DOF - 1]
     rate = moment - (com[1] - q[1]) * force_x + (com[0] - q[0]) * force_z
-    return finite, momentum[4], rate, fastest
+    return finite, (momentum[4], rate), reserve

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 
 Array = NDArray[np.float64]
@@ -49,16 +48,14 @@ class JointBounds:
         self._robot = robot
         self._tuning = tuning
         self._low, self._high = robot.joint_range.T
+        self._stop_time = tuning.stop_horizon / tuning.speed_share
 
     def needed(self) -> bool:
         """Whether a joint is near its limit of speed, or the one that it has before its stop."""
-        robot, o = self._robot, self._tuning
-        if robot.fastest > o.speed_share:
-            return True
-        if robot.fastest <= o.stop_share:
+        fastest, o = self._robot.fastest, self._tuning
+        if fastest <= o.stop_share:
             return False
-        limits = robot.joint_angle, robot.joint_velocity, robot.joint_range
-        return bool(before_stops(*limits, o.speed_share, o.stop_horizon))
+        return fastest > o.speed_share or self._robot.soonest_stop <= self._stop_time
 
     def write(self, least: Array, most: Array, slack: float) -> None:
         """Write the bounds.
@@ -74,22 +71,3 @@ class JointBounds:
         up = np.minimum((self._high - place) / o.stop_horizon, limit)
         most[:] = np.maximum((up - speed) / o.speed_horizon, slack)
         least[:] = -np.maximum((down + speed) / o.speed_horizon, slack)
-
-
-@compiled
-def before_stops(places: Array, speeds: Array, ranges: Array, share: float, horizon: float) -> bool:
-    """Whether a joint has a share of the speed that it may have before its stop.
-
-    Compiled: this is asked in every tick of a fast run.
-
-    Args:
-        places, speeds: (nu,) of the joints [rad, rad/s].
-        ranges: (nu, 2) their stops [rad].
-        share: of that speed.
-        horizon: T_s [s].
-    """
-    for i in range(places.shape[0]):
-        way = speeds[i] * horizon
-        if not share * (ranges[i, 0] - places[i]) < way < share * (ranges[i, 1] - places[i]):
-            return True
-    return False

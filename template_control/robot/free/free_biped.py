@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, sin
+from math import atan2, cos, inf, sin
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -119,7 +119,7 @@ class FreeBiped(Biped):
         self.foot_position, self.foot_velocity = s.foot[:, ::2], self.contact_velocity[:, ::2]
         self.foot_jacobian, self.foot_bias = s.foot_jacobian[:, ::2], s.foot_bias[:, ::2]
         self.joint_velocity = s.joint_velocity
-        self.fastest = 0.0
+        self.fastest, self.soonest_stop = 0.0, inf
 
     @classmethod
     @checked
@@ -166,7 +166,7 @@ class FreeBiped(Biped):
 
     def update(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.robot.biped.Biped.update`."""
-        finite, self.fastest = gather(
+        finite, self.fastest, self.soonest_stop = gather(
             self._sources, q, v, self._compute(q, v), self._frame, self._terms
         )
         self._check_finite(finite, q, v)

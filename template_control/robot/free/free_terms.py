@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from template_control.compiled import compiled
 from template_control.robot.biped import carrying
+from template_control.robot.joint_reserve import joint_limits, joint_reserve
 
 Array = NDArray[np.float64]
 
@@ -80,8 +81,8 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float)
     vectors = (data.com[0], data.vcom[0], data.hg.vector, data.nle, data.g)
     matrices = (data.Jcom, data.Ag, data.J, data.oMi[1].rotation)
     feet = tuple(data.oMf[frame].translation for frame in frames)
-    limit = np.array(model.velocityLimit[BASE_DOF:])
-    constants = (carrying(model, frames), np.array([radius, pin.computeTotalMass(model)]), limit)
+    sizes = np.array([radius, pin.computeTotalMass(model)])
+    constants = (carrying(model, frames), sizes, *joint_limits(model, BASE_DOF))
     return vectors, matrices, feet, constants
 
 
@@ -93,7 +94,7 @@ def gather(
     drift: tuple[Array, Array],
     frame: Array,
     out: tuple[Array, ...],
-) -> tuple[bool, float]:
+) -> tuple[bool, float, float]:
     """Write the terms at the state that Pinocchio has last computed.
 
     Args:
@@ -107,21 +108,22 @@ def gather(
         out: the arrays of :class:`FreeTerms`, overwritten.
 
     Returns:
-        Whether the state is finite; the largest share of its limit that a joint's speed has.
+        Whether the state is finite; what
+        :func:`~template_control.robot.joint_reserve.joint_reserve` returns.
     """
-    vectors, matrices, feet, (carries, constants, limit) = views
+    vectors, matrices, feet, (carries, constants, limit, stops) = views
     centre, speed, momentum, effects, weight = vectors
     jcom_world, centroidal, jacobian, rotation = matrices
     com, com_velocity, com_bias, jcom, spin, jspin, spin_bias = out[:7]
     foot_position, foot_jacobian, foot_bias, turning, jturning, joint_velocity = out[7:]
-    finite, fastest, nv = True, 0.0, v.shape[0]
+    finite, nv = True, v.shape[0]
     for k in range(q.shape[0]):
         finite = finite and np.isfinite(q[k])
     for k in range(nv):
         finite = finite and np.isfinite(v[k])
     for k in range(limit.shape[0]):
         joint_velocity[k] = v[BASE_DOF + k]
-        fastest = max(fastest, abs(joint_velocity[k]) / limit[k])
+    fastest, soonest = joint_reserve(q, joint_velocity, limit, stops)
     c, s, r, mass = frame[2], frame[3], constants[0], constants[1]
     x, y = centre[0] - frame[0], centre[1] - frame[1]
     com[0], com[1], com[2] = c * x + s * y, c * y - s * x, centre[2]
@@ -175,4 +177,4 @@ def gather(
         turning[i] = 0.0
         for k in range(3):
             turning[i] += jturning[i, 3 + k] * v[3 + k]
-    return finite, fastest
+    return finite, fastest, soonest
