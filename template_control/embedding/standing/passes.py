@@ -158,13 +158,14 @@ class Passes:
         return max(self.options.spare - left, 0.0) + self.options.narrow * apart
 
     def capture(self, state: Array) -> float:
-        """The capture point x + dx/dt sqrt(y / g) [m].
+        """The capture point x + dx/dt sqrt(y / g) [m]; x where the CoM is not above the ground.
 
         Args:
             state: (2, 3) x and y of the CoM, each position, velocity and acceleration.
         """
         (x, speed, _), y = state[0], state[1, 0]
-        return float(x + speed * np.sqrt(y / self.parameters.gravity))
+        # A robot that falls may have its CoM below where its foot was to stand.
+        return float(x + speed * np.sqrt(max(y, 0.0) / self.parameters.gravity))
 
     def _way(self, state: Array, stiffness: float, toe: float) -> Stride:
         """The template's way over a foot at x = ``toe``, without a landing."""
