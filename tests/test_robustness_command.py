@@ -10,13 +10,22 @@ import pytest
 from template_control.cli.main import build_parser, main
 from template_control.cli.trials import robustness as command
 from template_control.robot.library import robot_path
-from template_control.robustness import ladder
+from template_control.robustness import disturbances, ladder
 from template_control.robustness.disturbances import DISTURBANCES
 
 DOCS = Path(__file__).parents[1] / "docs"
 
 
-@pytest.mark.slow
+@pytest.fixture
+def brief(monkeypatch):
+    """Trials of a few steps: what a trial says of a robot is tested where trials are."""
+    for module in (disturbances, ladder):
+        monkeypatch.setattr(module, "BEGIN", 2)
+        monkeypatch.setattr(module, "AFTER", 7)
+
+
+@pytest.mark.slow(seconds=6)
+@pytest.mark.usefixtures("brief")
 def test_json_figure_and_resumption(tmp_path, capfd):
     arguments = ["robustness", "--quick", "--disturbance", "delay", "--workers", "2", "--json"]
     arguments += ["--output", str(tmp_path)]
@@ -35,7 +44,8 @@ def test_json_figure_and_resumption(tmp_path, capfd):
     assert {path: path.read_bytes() for path in tmp_path.glob("*.jsonl")} == before
 
 
-@pytest.mark.slow(seconds=18)
+@pytest.mark.slow(seconds=8)
+@pytest.mark.usefixtures("brief")
 def test_a_run_is_disturbed_as_a_walk_is(tmp_path, capfd):
     words = ["robustness", "--gait", "run", "--quick", "--disturbance", "step-up", "--workers", "1"]
     assert main([*words, "--json", "--output", str(tmp_path)]) == 0
@@ -119,7 +129,8 @@ def test_the_snippet_of_the_documentation_runs(capfd):
     assert "fell: False" in capfd.readouterr().out
 
 
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow(seconds=15)
+@pytest.mark.usefixtures("brief")
 def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
     others = {"--gait", "--free", "--plant"}
     (line,) = (x for x in commands() if "--quick" in x and not others & {*x.split()})
@@ -133,7 +144,8 @@ def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capf
     assert all(d.title in out for d in DISTURBANCES)
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=5)
+@pytest.mark.usefixtures("brief")
 def test_the_command_of_the_documentation_for_another_engine_runs(tmp_path, monkeypatch, capfd):
     (line,) = (x for x in commands() if "--plant" in x)
     monkeypatch.chdir(tmp_path)

@@ -161,7 +161,7 @@ def test_slip_command(tmp_path, capfd):
 
 
 # About so many seconds on two cores.
-LONG = {"fig12": 90, "fig8": 40, "fig13": 40, "fig9": 30, "fig10": 3, "fig5": 3}
+LONG = {"fig12": 90, "fig8": 40, "fig13": 20, "fig9": 30, "fig10": 3, "fig5": 3}
 
 
 @pytest.mark.slow(seconds=30)

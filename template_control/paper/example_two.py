@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 
 START = (0.9695, np.radians(1.9), 821.55)  # y, phi (positive downward), E of z_0
 STEPS, LAST = 60, 20
+_LIFTOFF_STEPS = 30  # with an early liftoff the robot has fallen by then
 GRIP = 5.0  # a friction coefficient that never binds
 EARLIER, LATER = np.radians(72.0), np.radians(67.0)  # predefined liftoffs about beta_l = 70 deg
 
@@ -194,7 +195,10 @@ def fig12() -> Reproduction:
     gait = _gait()
     target = sections(gait, gait.vlo[None])[0]
     return Reproduction(
-        title="Fig. 12: Example II, last 20 of 60 steps from z_0 = [0.9695 m, 1.9 deg, 821.55 J]",
+        title=(
+            f"Fig. 12: Example II, last {LAST} of {STEPS} steps from"
+            " z_0 = [0.9695 m, 1.9 deg, 821.55 J]"
+        ),
         columns=("planner", "plant", "y_v [m]", "phi_v [deg]", "E [J]", "falls in"),
         rows=[
             ("paper", "its robot", "0.9818", "0", "826", ""),
@@ -238,7 +242,7 @@ def _liftoffs(case: tuple[str, str]) -> tuple[Liftoff, Record, Walk, Record]:
         embedding=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
     )
     record = simulate(load_robot("five-link"), LqrPlanner(gait), options)
-    return liftoff(record), record, *robot_walk("LQR", plant, beta=beta)
+    return liftoff(record), record, *robot_walk("LQR", plant, _LIFTOFF_STEPS, beta)
 
 
 def fig13() -> Reproduction:
@@ -256,7 +260,7 @@ def fig13() -> Reproduction:
                 f"{event.load:.0f}",
                 "  ".join(f"{x:.0f}" for x in event.jump),
                 "  ".join(f"{x:.0f}" for x in event.peak),
-                "60 steps" if not walk.fall else f"falls in step {len(walk.states)}",
+                f"{_LIFTOFF_STEPS} steps" if not walk.fall else f"falls in step {len(walk.states)}",
             )
         )
     return Reproduction(
