@@ -71,10 +71,10 @@ def test_the_command_tells_the_same_range(capsys, tmp_path):
     assert lines == {"give one from 0.30 to 1.45 m/s\n"}
 
 
-@pytest.mark.slow(seconds=60)
+@pytest.mark.slow(seconds=6)
 @pytest.mark.parametrize(("name", "speed"), [("five-link", 1.05), ("rabbit", 0.85), ("bolt", 0.59)])
 def test_the_robot_walks_at_speeds_that_had_no_gait(name, speed):
     robot = tc.load_robot(name)
     planner = tc.LqrPlanner(tc.gait_for_speed(tc.template_for(robot), speed))
-    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=50, record_every=5))
-    assert (record.steps, record.fell) == (50, False)
+    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=25, record_every=5))
+    assert (record.steps, record.fell) == (25, False)

@@ -57,7 +57,7 @@ def test_junk_for_public_functions(tmp_path_factory, data):
 
 @pytest.mark.slow(seconds=100)
 @given(data=st.data())
-@settings(SHARE, max_examples=1500)
+@settings(SHARE, max_examples=1000)
 def test_much_junk_for_public_functions(tmp_path_factory, data):
     one_call(data, tmp_path_factory.getbasetemp())
 

@@ -204,14 +204,14 @@ def test_perturbed_starts(gait, seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.9, 1.1])
 def test_unknown_mass(gait, scale):
-    assert not walk(gait, steps=50, plant=PlantOptions(mass_scale=scale)).fell
+    assert not walk(gait, steps=30, plant=PlantOptions(mass_scale=scale)).fell
 
 
 @pytest.mark.slow
 def test_slippery_ground(gait):
     record = walk(
         gait,
-        steps=50,
+        steps=30,
         plant=PlantOptions(friction=0.5),
         embedding=EmbeddingOptions(friction=0.5),
     )
