@@ -11,7 +11,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
-from template_control.robot.joint_reserve import joint_limits
 
 Array = NDArray[np.float64]
 
@@ -128,8 +127,12 @@ class Biped(ABC):
         first = 1 + self.base_joints
         self.joint_names = tuple(model.names)[first:]
         self.torque_limit = np.array(model.effortLimit[self.base_dof :])
-        self.velocity_limit, self.joint_range = joint_limits(model, self.base_dof)
-        self.joint_angle = np.zeros(len(self.joint_names))
+        self.velocity_limit = np.array(model.velocityLimit[self.base_dof :])
+        nu = len(self.joint_names)
+        limits = (model.lowerPositionLimit, model.upperPositionLimit)
+        self.joint_range = np.column_stack(limits)[-nu:]
+        self.joint_angle = np.zeros(nu)
+        self.fastest, self.soonest_stop = 0.0, np.inf
         self._foot_ids = tuple(model.getFrameId(foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)

@@ -3,24 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.compiled import callee
 
 Array = NDArray[np.float64]
-
-
-def joint_limits(model: pin.Model, base_dof: int) -> tuple[Array, Array]:
-    """Of the actuated joints, the last ones: (nu,) speeds [rad/s] and (nu, 2) stops [rad].
-
-    Args:
-        model: the robot's.
-        base_dof: unactuated degrees of freedom.
-    """
-    speeds = np.array(model.velocityLimit[base_dof:])
-    stops = (model.lowerPositionLimit, model.upperPositionLimit)
-    return speeds, np.column_stack(stops)[-len(speeds) :]
 
 
 @callee

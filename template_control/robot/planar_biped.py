@@ -8,7 +8,7 @@ joint order; all hinges are revolute, so nq = nv.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import cos, inf, sin
+from math import cos, sin
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -80,7 +80,8 @@ class PlanarBiped(Biped):
         self.foot_turning[:, _PITCH] = 1.0
         for row, leg in zip(self.foot_turning, self.legs, strict=True):
             row[[BASE_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
-        self._sources = sources(model, self._data, self._foot_ids, self.foot_radius)
+        limits = self.velocity_limit, self.joint_range
+        self._sources = sources(model, self._data, self._foot_ids, self.foot_radius, limits)
         terms = PlanarTerms.zeros(self.nv)
         self._terms = tuple(terms)
         self.com, self.com_velocity, self.com_bias = terms[:3]
@@ -96,7 +97,6 @@ class PlanarBiped(Biped):
         self.contact_jacobian = self.foot_jacobian
         self.contact_bias = self.foot_bias
         self.joint_velocity = terms.joint_velocity
-        self.fastest, self.soonest_stop = 0.0, inf
 
     @classmethod
     @checked
@@ -166,9 +166,9 @@ class PlanarBiped(Biped):
         Raises:
             ParameterError: if a value is NaN or infinite.
         """
-        finite, momentum, reserve = gather(self._sources, q, v, self._compute(q, v), self._terms)
-        self.angular_momentum, self.angular_momentum_bias = momentum
-        self.fastest, self.soonest_stop = reserve
+        found = gather(self._sources, q, v, self._compute(q, v), self._terms)
+        finite, self.angular_momentum, self.angular_momentum_bias = found[:3]
+        self.fastest, self.soonest_stop = found[3:]
         self._check_finite(finite, q, v)
         np.matmul(self.foot_jacobian, v, out=self.foot_velocity)
 

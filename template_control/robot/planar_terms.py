@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.compiled import compiled
 from template_control.robot.biped import carrying
-from template_control.robot.joint_reserve import joint_limits, joint_reserve
+from template_control.robot.joint_reserve import joint_reserve
 from template_control.robot.requirements import BASE_DOF
 
 Array = NDArray[np.float64]
@@ -62,7 +62,13 @@ Plain tuples: a compiled function is called with a named one in twice the time.
 """
 
 
-def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float) -> Sources:
+def sources(
+    model: pin.Model,
+    data: Any,
+    frames: tuple[int, ...],
+    radius: float,
+    limits: tuple[Array, Array],
+) -> Sources:
     """Views of what :func:`gather` reads.
 
     Args:
@@ -70,18 +76,19 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float)
         data: written by Pinocchio at every update.
         frames: of the two feet.
         radius: of the foot spheres [m].
+        limits: of the joints, (nu,) speeds [rad/s] and (nu, 2) stops [rad].
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.nle, data.g)
     jacobians = (data.Jcom, data.Ag, data.J)
     feet = tuple(data.oMf[frame].translation for frame in frames)
-    constants = (carrying(model, frames), np.array([radius]), *joint_limits(model, BASE_DOF))
+    constants = (carrying(model, frames), np.array([radius]), *limits)
     return (*whole, *jacobians), feet, constants
 
 
 @compiled
 def gather(
     views: Sources, q: Array, v: Array, drift: tuple[Array, Array], out: tuple[Array, ...]
-) -> tuple[bool, tuple[float, float], tuple[float, float]]:
+) -> tuple[bool, float, float, float, float]:
     """Write the planar terms at the state that Pinocchio has last computed.
 
     Args:
@@ -104,7 +111,7 @@ def gather(
         finite = finite and np.isfinite(q[k]) and np.isfinite(v[k])
     for k in range(limit.shape[0]):
         turning[k] = v[BASE_DOF + k]
-    reserve = joint_reserve(q, turning, limit, stops)
+    fastest, soonest = joint_reserve(q, turning, limit, stops)
     com[0], com[1] = centre[0], centre[2]
     com_velocity[0], com_velocity[1] = speed[0], speed[2]
     com_bias[0], com_bias[1] = pull[0], pull[2]
@@ -128,4 +135,4 @@ def gather(
     force_z = effects[1] - weight[1]
     moment = effects[BASE_DOF - 1] - weight[BASE_DOF - 1]
     rate = moment - (com[1] - q[1]) * force_x + (com[0] - q[0]) * force_z
-    return finite, (momentum[4], rate), reserve
+    return finite, momentum[4], rate, fastest, soonest

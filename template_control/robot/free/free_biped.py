@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, inf, sin
+from math import atan2, cos, sin
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -92,7 +92,8 @@ class FreeBiped(Biped):
         data = self._data
         self.rotation: Array = data.oMi[_ROOT].rotation
         self._hips = [data.oMi[leg[-2]].translation for leg in self._leg_joints]
-        self._sources = sources(model, data, self._foot_ids, self.foot_radius)
+        limits = self.velocity_limit, self.joint_range
+        self._sources = sources(model, data, self._foot_ids, self.foot_radius, limits)
         self.space = FreeTerms.zeros(self.nv)
         self._terms = tuple(self.space)
         self._frame = np.array([0.0, 0.0, 1.0, 0.0])
@@ -119,7 +120,6 @@ class FreeBiped(Biped):
         self.foot_position, self.foot_velocity = s.foot[:, ::2], self.contact_velocity[:, ::2]
         self.foot_jacobian, self.foot_bias = s.foot_jacobian[:, ::2], s.foot_bias[:, ::2]
         self.joint_velocity = s.joint_velocity
-        self.fastest, self.soonest_stop = 0.0, inf
 
     @classmethod
     @checked

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from template_control.compiled import compiled
 from template_control.robot.biped import carrying
-from template_control.robot.joint_reserve import joint_limits, joint_reserve
+from template_control.robot.joint_reserve import joint_reserve
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,13 @@ Sources = tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...], tuple[A
 """Views into Pinocchio's data: vectors, matrices, the feet's centres; and what is constant."""
 
 
-def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float) -> Sources:
+def sources(
+    model: pin.Model,
+    data: Any,
+    frames: tuple[int, ...],
+    radius: float,
+    limits: tuple[Array, Array],
+) -> Sources:
     """Views of what :func:`gather` reads.
 
     Args:
@@ -77,12 +83,13 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], radius: float)
         data: written by Pinocchio at every update.
         frames: of the two feet.
         radius: of the foot spheres [m].
+        limits: of the joints, (nu,) speeds [rad/s] and (nu, 2) stops [rad].
     """
     vectors = (data.com[0], data.vcom[0], data.hg.vector, data.nle, data.g)
     matrices = (data.Jcom, data.Ag, data.J, data.oMi[1].rotation)
     feet = tuple(data.oMf[frame].translation for frame in frames)
     sizes = np.array([radius, pin.computeTotalMass(model)])
-    constants = (carrying(model, frames), sizes, *joint_limits(model, BASE_DOF))
+    constants = (carrying(model, frames), sizes, *limits)
     return vectors, matrices, feet, constants
 
 
