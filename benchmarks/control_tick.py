@@ -115,7 +115,7 @@ class Parts(NamedTuple):
             "references, events": tick - model - whole - plan,
             "plans": plan,
             "QP assembly": whole - solve,
-            "QP solve": solve,
+            f"ProxQP, in {(solve > 0.0).mean():.1%} of the ticks": solve[solve > 0.0],
             _TICK: tick,
             _PHYSICS: physics,
         }
@@ -161,7 +161,7 @@ def _ticks(gait: str, speed: float, split: bool, parts: Parts) -> Generator[int,
                     part.clear()
                 part.append(0.0)
             start = time.thread_time()
-            solution = controller.tick(q, v, forces[:, -1] > touching, dt)
+            solution = controller.tick(q, v, forces[:, -1] > touching, dt, forces)
             parts.ticks[-1] = time.thread_time() - start
             start = time.thread_time()
             plant.step(solution.torque)

@@ -138,6 +138,33 @@ def test_optimum_is_that_of_the_full_problem(robot, feet):
         assert cost(ours) <= cost(qp.results.x) + 1e-5 * (1.0 + abs(cost(qp.results.x)))
 
 
+@pytest.mark.parametrize(
+    ("feet", "share", "most"), [(0, 0.1, 80.0), (1, 1.0, 12.0), (2, 1.0, 12.0)]
+)
+def test_proxqp_is_asked_where_a_limit_acts_and_nowhere_else(robot, feet, share, most):
+    qp = WholeBodyQp(robot, replace(OPTIONS, torque_scale=share))
+    rng, limited = np.random.default_rng(5), 0
+    for _ in range(100):
+        *_, s = solve(robot, rng, feet, qp, scale=rng.uniform(0.0, most))
+        m = qp._workspaces[feet].matrices
+        assert s.solved
+        if s.solve_seconds > 0.0:
+            limited += 1
+            reached = m.constraint @ m.minimum
+            assert np.any((reached < m.lower) | (reached > m.upper))
+            continue
+        # In z, the torques over their limits.
+        factor = np.tril(m.factor)
+        plain = load_proxqp().dense.QP(4, 0, len(m.lower))
+        plain.settings.eps_abs = 1e-10
+        plain.init(
+            factor @ factor.T, factor @ m.gradient, None, None, m.constraint, m.lower, m.upper
+        )
+        plain.solve()
+        np.testing.assert_allclose(s.torque, share * 350.0 * plain.results.x, atol=0.01)
+    assert 10 < limited < 90
+
+
 def test_infeasible_problem_is_reported_and_recovers(robot):
     rng = np.random.default_rng(4)
     qp = WholeBodyQp(robot, OPTIONS)

@@ -112,7 +112,8 @@ class Record:
         section_feasible: (S,) False where the template cannot complete the stride at all.
         section_load: (S,) load factor.
         section_trim: (S,) momentum trim [m/s^2].
-        tick_seconds, solve_seconds: (ticks,) wall-clock time of every control tick and QP.
+        tick_seconds, solve_seconds: (ticks,) wall-clock time of every control tick, and of ProxQP
+            in it: 0 where no limit acts, and it was not needed.
         plan_seconds: (S,) wall-clock time of every plan.
         metadata: robot, gait, options, joint names, limits, outcome and summary figures.
     """

@@ -122,8 +122,14 @@ def _nearest(record: Record) -> dict[str, float]:
 
 
 def _quantiles(seconds: Array) -> dict[str, float]:
-    median, p99 = np.percentile(seconds, [50, 99])
+    median, p99 = np.percentile(seconds, [50, 99]) if len(seconds) else (0.0, 0.0)
     return {"median": float(median), "p99": float(p99)}
+
+
+def _solving(seconds: Array) -> dict[str, float]:
+    """Of the ticks in which ProxQP worked, and their share."""
+    works = seconds > 0.0
+    return {**_quantiles(seconds[works]), "share": float(works.mean())}
 
 
 @checked
@@ -147,8 +153,9 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         rms, limit), joint_speed (per joint peak, limit), saturated_share, qp_failures,
         cost_of_transport (work of the joints, all counted positive, over m g and distance),
         flight_share (robot, template: of the gait), duty_factor (share of the time that a foot is
-        on the ground), control_tick_seconds and qp_solve_seconds (median, p99), plan_seconds
-        (median, p99), real_time_factor, steps_not_nominal (plans that left the planner's own law),
+        on the ground), control_tick_seconds (median, p99), qp_solve_seconds (the same over the
+        ticks in which a limit acts, so that ProxQP works, and their share), plan_seconds (median,
+        p99), real_time_factor, steps_not_nominal (plans that left the planner's own law),
         record; of a run in space also joint_angle (per joint least and most, and the range's lower
         and upper [rad]) and what :func:`~template_control.run.kinds.free_summary.in_space` tells.
     """
@@ -173,7 +180,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "flight_share": _flight_share(record),
         "duty_factor": _duty_factor(record),
         "control_tick_seconds": _quantiles(record.tick_seconds),
-        "qp_solve_seconds": _quantiles(record.solve_seconds),
+        "qp_solve_seconds": _solving(record.solve_seconds),
         "plan_seconds": _quantiles(record.plan_seconds),
         "real_time_factor": duration / m["wall_seconds"],
         "steps_not_nominal": int(np.sum(~record.section_nominal)),

@@ -1,5 +1,8 @@
 """Whole-body control on ProxQP: one warm-started workspace per contact state.
 
+ProxQP is asked where a limit acts. Elsewhere the minimum is known without it
+(:mod:`~template_control.whole_body.problem`).
+
 A joint near its limit of speed, or fast before its stop, has its acceleration bounded, in a
 workspace with these further rows. Where the motors cannot slow down so much, it shall not get
 faster; where they cannot do that either, the tick is solved without these rows.
@@ -22,6 +25,8 @@ from template_control.slip.similarity import RATE, TIME, tuned
 from template_control.whole_body.joint_bounds import JointBounds, JointTuning
 from template_control.whole_body.portable_proxqp import load_proxqp
 from template_control.whole_body.problem import (
+    FREE,
+    SINGULAR,
     Matrices,
     assemble,
     follow,
@@ -105,7 +110,7 @@ class Solution:
         solved: False where the QP was infeasible, singular or not solved within its caps;
             the torques are then the last solved ones, and force and acceleration follow
             from them.
-        solve_seconds: time in ProxQP.
+        solve_seconds: time in ProxQP, 0 where no limit acts.
     """
 
     torque: Array
@@ -122,21 +127,16 @@ class _Workspace:
         robot: whose.
         feet: on the ground.
         bounded: how many accelerations of joints have bounds: none, or all.
+
+    Attributes:
+        answer: (nu,) the last solution, w of :mod:`.problem`.
     """
 
     def __init__(self, robot: Biped, feet: int, bounded: int = 0) -> None:
         nv, nu, directions = robot.nv, len(robot.torque_limit), robot.directions
         rows = nu + rows_per_foot(directions) * feet + bounded
         self._identity = np.eye(nu)
-        self.matrices = Matrices(
-            a_map=np.zeros((nv, nu + 1)),
-            f_map=np.zeros((directions * feet, nu + 1)),
-            factor=np.zeros((nu, nu)),
-            gradient=np.zeros(nu),
-            constraint=np.zeros((rows, nu)),
-            lower=np.zeros(rows),
-            upper=np.zeros(rows),
-        )
+        self.matrices = Matrices.zeros(nv, nu, directions * feet, rows)
         self.out = tuple(self.matrices)
         self.limits = np.zeros(nu + feet + 2 + 2 * bounded)
         self.limits[nu + feet + 1] = robot.mass * robot.gravity
@@ -147,6 +147,7 @@ class _Workspace:
         self.jacobian = self.contact[:, :, :nv]
         self.bias, self.force = self.contact[:, :, nv], self.contact[:, :, nv + 1]
         self.rows = rows
+        self.answer: Array = self.matrices.minimum
         self.qp = self._new()
         self.ready = False
 
@@ -249,7 +250,7 @@ class WholeBodyQp:
             self._tell(regular, stance)
         self._failing = not solved
         if solved:
-            torques(w.matrices.factor, w.qp.results.x, limit, self._torque)
+            torques(w.matrices.factor, w.answer, limit, self._torque)
         else:
             np.clip(self._torque, -limit, limit, out=self._torque)
         force = np.empty(robot.directions * feet)
@@ -269,7 +270,7 @@ class WholeBodyQp:
         w.force[:] = stance.force.reshape(w.force.shape)
         w.torque_limit[:], w.cap[:] = limit, stance.cap
         w.friction[0] = self.friction
-        regular = assemble(
+        found = assemble(
             robot.mass_matrix,
             robot.nonlinear_effects,
             w.contact,
@@ -278,9 +279,15 @@ class WholeBodyQp:
             w.limits,
             w.out,
         )
+        if found == FREE:
+            w.answer = w.matrices.minimum
+            return True, True, 0.0
         start = time.perf_counter()
+        regular = found != SINGULAR
         solved = regular and w.solve()
-        return regular, solved, time.perf_counter() - start
+        seconds = time.perf_counter() - start
+        w.answer = w.qp.results.x
+        return regular, solved, seconds
 
     def _tell(self, regular: bool, stance: Stance) -> None:
         """Log that the last solved torques are kept, once for failures in a row."""

@@ -83,11 +83,12 @@ def print_table(figures: dict[str, Any]) -> None:
     row("steps off the planner's own law", f"{figures['steps_not_nominal']}")
     for name, key in (
         ("control tick", "control_tick_seconds"),
-        ("QP solve", "qp_solve_seconds"),
+        ("ProxQP, where a limit acts", "qp_solve_seconds"),
         ("plan", "plan_seconds"),
     ):
         t = figures[key]
         row(f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us")
+    row("ticks in which a limit acts", f"{100 * figures['qp_solve_seconds']['share']:.1f} %")
     row("real-time factor", f"{figures['real_time_factor']:.1f}")
     row("record", figures["record"] or "not saved")
     plain_console().print(table)

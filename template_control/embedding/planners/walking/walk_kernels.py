@@ -59,16 +59,7 @@ def exact_map() -> None:
 
 def whole_body() -> None:
     """The whole-body QP, of two degrees of freedom, one motor and one foot."""
-    rows = 1 + rows_per_foot(2)
-    matrices = Matrices(
-        a_map=np.zeros((2, 2)),
-        f_map=np.zeros((2, 2)),
-        factor=np.zeros((1, 1)),
-        gradient=np.zeros(1),
-        constraint=np.zeros((rows, 1)),
-        lower=np.zeros(rows),
-        upper=np.zeros(rows),
-    )
+    matrices = Matrices.zeros(2, 1, 2, 1 + rows_per_foot(2))
     mass_matrix = np.asfortranarray(np.eye(2))
     bias, limits, costs = np.zeros(2), np.ones(1 + 1 + 2), np.ones(2)
     contact, tasks, out = np.zeros((1, 2, 4)), np.zeros((1, 5)), tuple(matrices)
