@@ -92,10 +92,10 @@ def test_a_walk_that_reckons_with_its_delay_keeps_nearer_to_its_gait(default_gai
         run = tc.SimulationOptions(steps=12, delay=0.008, embedding=options)
         record = tc.simulate(tc.load_robot("five-link"), planner, run)
         assert not record.fell
-        return np.abs(record.section_state[-1] - default_gait.vlo)
+        return np.abs(record.section_state[-5:] - default_gait.vlo).mean(axis=0)
 
     deaf = off(tc.EmbeddingOptions(delay=DelayOptions(longest=0.0)))
     hears = off(tc.EmbeddingOptions())
-    assert np.all(hears[:2] < 0.5 * deaf[:2])
+    assert np.all(hears[:2] < 0.3 * deaf[:2])
     assert hears[0] < 0.01
-    assert hears[1] < 0.001
+    assert hears[1] < 0.002

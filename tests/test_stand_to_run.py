@@ -29,8 +29,10 @@ def test_a_robot_stands_runs_and_stands_again(example, name, engine, top):
     kinds = [m["strides"][i] for i in record.stride[:-1]]
     order = [kind for i, kind in enumerate(kinds) if i == 0 or kind != kinds[i - 1]]
     assert order[:8] == ["s", "sw", "ww", "w", "wr", "r", "rw", "w"]
-    assert order[-4:] == ["ww", "ws", "sf", "s"]
-    assert set(order[8:-4]) <= {"ww", "w"}, "it slows down in as many steps as it takes"
+    assert order[-2:] == ["sf", "s"]
+    # It slows down in as many steps as it takes; from the slowest it closes its feet at once.
+    assert order[-3] in ("ws", "ww")
+    assert set(order[8:-3]) <= {"ww", "w"}
     speed = record.section_state[:, 0]
     assert speed.max() == pytest.approx(top, abs=0.05)
     error = speed[1:] - record.section_target[:-1, 0]

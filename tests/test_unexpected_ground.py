@@ -68,7 +68,7 @@ def test_an_overdue_foot_that_bounces_off_an_edge_has_not_landed(landing, slips)
         np.testing.assert_array_equal(stumble.slipping, [slips, False])
     for _ in range(2):
         stumble.feel(carried, STILL, [landing] * 2, 1e-3)
-    assert not stumble.slipping.any(), "it stands"
+    assert not any(stumble.slipping), "it stands"
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,8 @@ class EmbeddingController(AutomatonFollower):
             force = self.frame.inward(force)
             landing = self._in_air.overdue_speeds(self.station, self.planning)
             self._stumble.feel(force, self.robot.foot_velocity[:, 1], landing, dt)
-            contact = contact & ~self._stumble.slipping
+            if any(self._stumble.slipping):
+                contact = contact & np.logical_not(self._stumble.slipping)
             self._feel_friction(contact, force, dt)
         self.feet.swing_time += dt
         self._sense(contact)
@@ -115,7 +116,7 @@ class EmbeddingController(AutomatonFollower):
         solution = self.qp.solve(self.station.tasks, self._stance(), self.learners.load.factor)
         if self.frame.angle != 0.0:
             outward = self.frame.outward(solution.acceleration)
-            solution = replace(solution, acceleration=outward)
+            solution = solution._replace(acceleration=outward)
         return solution
 
     def _feel_friction(self, contact: NDArray[np.bool_], force: Array, dt: float) -> None:

@@ -252,7 +252,7 @@ class BulletPlant:
         p, c = pybullet, self.client
         self._contacts = None
         p.setJointMotorControlArray(
-            self.body, self._actuated, p.TORQUE_CONTROL, forces=torque, physicsClientId=c
+            self.body, self._actuated, p.TORQUE_CONTROL, forces=torque.tolist(), physicsClientId=c
         )
         if push or aside:
             p.applyExternalForce(

@@ -170,7 +170,7 @@ class Recorder:
             r.angular_momentum,
             template_x,
             template_y,
-            *c.frame.outward(c.place.reference[2:4]),
+            *c.frame.outward(c.place.reference[2:4]).tolist(),
             self._node_index[c.node.name],
             feet[Leg.REAR],
             solution.solved,

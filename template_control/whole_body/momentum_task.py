@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
 from template_control.robot.biped import Biped
@@ -16,16 +14,17 @@ from template_control.whole_body.wanted import Wanted
 
 @dataclass(frozen=True)
 class MomentumTask(Checked):
-    """One row: the rate of the angular momentum L = A_L v about the CoM, over m h^2.
+    """One row: the rate of the angular momentum L = A_L v about the CoM.
 
-        (A_L a + dA_L/dt v) / (m h^2) = k (w (theta_ref - theta) - L / (m h^2))
+        A_L a + dA_L/dt v = k (m h^2 w (theta_ref - theta) - L)
 
-    h is the CoM's height. A trunk that leans too far back gets a forward momentum, and with it
-    turns forward. Ground forces of several kilonewtons then do not have to pass the hips' PD
-    feedback, as they must where :class:`~.posture_task.PostureTask` holds the trunk in stance.
+    h is the CoM's height. The row's weight is that of both sides over m h^2. A trunk that leans too
+    far back gets a forward momentum, and with it turns forward. Ground forces of several
+    kilonewtons then do not have to pass the hips' PD feedback, as they must where
+    :class:`~.posture_task.PostureTask` holds the trunk in stance.
 
     Attributes:
-        weight: of the row, an angular acceleration [s^4/rad^2].
+        weight: of the row over m h^2, an angular acceleration [s^4/rad^2].
         bandwidth: k [1/s].
         turning: w, angular momentum over m h^2 for each radian of error [1/s].
     """
@@ -44,7 +43,8 @@ class MomentumTask(Checked):
         # Python's numbers: arithmetic on an array's is slow.
         height, angle = wanted.com_now.item(1), wanted.pitch_now.item(0)
         inertia = robot.mass * (height * height)
-        np.divide(robot.angular_momentum_jacobian, inertia, out=rows.jacobian[0])
-        rows.bias[0] = robot.angular_momentum_bias / inertia
-        turning = self.turning * (wanted.pitch - angle)
-        rows.desired[0] = self.bandwidth * (turning - robot.angular_momentum / inertia)
+        rows.jacobian[0] = robot.angular_momentum_jacobian
+        rows.bias[0] = robot.angular_momentum_bias
+        turning = inertia * self.turning * (wanted.pitch - angle)
+        rows.desired[0] = self.bandwidth * (turning - robot.angular_momentum)
+        rows.weight[0] = self.weight / (inertia * inertia)

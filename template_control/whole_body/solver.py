@@ -99,8 +99,7 @@ class Stance(NamedTuple):
     cap: Array
 
 
-@dataclass(frozen=True)
-class Solution:
+class Solution(NamedTuple):
     """Answer of one tick.
 
     Attributes:

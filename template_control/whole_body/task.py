@@ -29,11 +29,13 @@ class Rows(NamedTuple):
         jacobian: (r, nv) T.
         bias: (r,) dT/dt v.
         desired: (r,) wanted accelerations.
+        weight: (r,) the task's ``weights``; one whose rows have a changing unit scales them by it.
     """
 
     jacobian: Array
     bias: Array
     desired: Array
+    weight: Array
 
 
 class Task(Protocol):
@@ -73,7 +75,8 @@ class TaskStack:
         for task in tasks:
             part = self.table[first : first + len(task.weights)]
             first += len(part)
-            rows = Rows(part[:, :nv], part[:, nv + BIAS], part[:, nv + DESIRED])
+            numbers = (part[:, nv + column] for column in (BIAS, DESIRED, WEIGHT))
+            rows = Rows(part[:, :nv], *numbers)
             self._parts.append((task, rows))
 
     def write(self, robot: Biped, wanted: Wanted) -> None:

@@ -56,7 +56,7 @@ class Stumble:
         self._left = [0.0, 0.0]
         self._touching = [0.0, 0.0]
         self._came = [0.0, 0.0]  # upward speeds before the feet touched
-        self.slipping = np.zeros(2, dtype=bool)
+        self.slipping = [False, False]
 
     def blocked(self, foot: int) -> bool:
         """Whether a wall is in front of a foot."""
@@ -83,4 +83,4 @@ class Stumble:
             if touching == 0.0:
                 self._came[foot] = rises
             falls = rises < -o.sinking or self._came[foot] < -o.overdue * landing[foot]
-            self.slipping[foot] = wall or (falls and touching < o.graze)
+            self.slipping[foot] = wall or (falls and 0.0 < touching < o.graze)
