@@ -6,12 +6,13 @@ assignments, and reads which of them belong where from ``Tables``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import entry, inner
+from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
 from template_control.slip.dynamics.locate import Watch, arm, first_event
 from template_control.slip.dynamics.model import Kernel, model_of
@@ -200,16 +201,30 @@ def run_stride(
     return _TIMEOUT, node, segments, event_count, time
 
 
+def plain(kernel: Kernel) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """A kernel as :func:`record_stride` takes it: its tables, and its other fields."""
+    return tuple(kernel.tables), tuple(kernel[1:])
+
+
 @entry
 def record_stride(
-    kernel: Kernel, state: Array, toes: Array, controls: Array, scratch: Scratch
+    kernel: tuple[tuple[Any, ...], tuple[Any, ...]],
+    state: Array,
+    toes: Array,
+    controls: Array,
+    scratch: tuple[Any, ...],
 ) -> tuple[int, int, int, int, float]:
     """:func:`run_stride` for Python, with every segment and event.
 
     Args:
+        kernel: from :func:`plain`; a compiled function is called with named tuples in twice the
+            time.
+        scratch: the arrays of :class:`Scratch`, in a plain tuple too.
         The rest as in :func:`run_stride`, all real.
 
     Returns:
         As :func:`run_stride`.
     """
-    return run_stride(kernel, state, toes, controls, _EVERY, scratch)
+    tables, numbers = kernel
+    named = Kernel(Tables(*tables), *numbers)
+    return run_stride(named, state, toes, controls, _EVERY, Scratch(*scratch))

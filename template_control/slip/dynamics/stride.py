@@ -15,13 +15,12 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset, Slot
-from template_control.slip.dynamics.kernel import new_scratch, record_stride
+from template_control.slip.dynamics.kernel import new_scratch, plain, record_stride
 from template_control.slip.dynamics.model import Kernel, kernel_model
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
-_EVENTS = tuple(Event)  # by number
 _OUTCOMES = tuple(Outcome)
 
 
@@ -187,11 +186,12 @@ class StrideSimulator:
         self.automaton = automaton
         self._model = kernel_model(parameters, max_time)
         self._scratch = new_scratch()
+        self._plain = tuple(self._scratch)
         self._names = tuple(node.name for node in automaton.nodes)
         # By numbers: to hash a member of an enumeration takes long.
-        self._resets = [{int(e.event): e.reset for e in node.edges} for node in automaton.nodes]
+        self._edges = [{int(e.event): (e.event, e.reset) for e in n.edges} for n in automaton.nodes]
         self._kernels = {
-            name: Kernel(automaton.tables, *self._model, node=index)
+            name: plain(Kernel(automaton.tables, *self._model, node=index))
             for name, index in automaton.index.items()
         }
 
@@ -226,7 +226,7 @@ class StrideSimulator:
             x,
             c,
             finite("controls", u, NUM_SLOTS),
-            w,
+            self._plain,
         )
         return Stride(
             outcome=_OUTCOMES[outcome],
@@ -245,10 +245,10 @@ class StrideSimulator:
         """Events from the kernel's rows (n, 8): time, event, nodes left and entered, state."""
         fired, names = [], self._names
         for row, state in zip(rows.tolist(), rows[:, 4:8].copy(), strict=True):
-            event, source, target = int(row[1]), int(row[2]), int(row[3])
+            source, target = int(row[2]), int(row[3])
+            event, reset = self._edges[source][int(row[1])]
             entered = names[target] if target >= 0 else ""
-            reset = self._resets[source][event]
-            fired.append(FiredEvent(row[0], _EVENTS[event], names[source], entered, state, reset))
+            fired.append(FiredEvent(row[0], event, names[source], entered, state, reset))
         return tuple(fired)
 
 
