@@ -9,6 +9,7 @@ import template_control as tc
 from template_control.embedding.planners.planner import CurvePlanner
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.timed import derivatives, quintics
+from template_control.embedding.standing.curves import BetweenFeet
 from template_control.embedding.standing.default import standing_planners
 from template_control.embedding.standing.options import StandingOptions
 from template_control.embedding.standing.pose import standing_pose
@@ -63,6 +64,15 @@ def test_a_quintic_begins_and_ends_as_told():
     found = quintics(start, ends, durations)
     np.testing.assert_allclose(derivatives(found, np.zeros((5, 1))), np.tile(start, (5, 1, 1)))
     np.testing.assert_allclose(derivatives(found, durations[:, None]), ends, atol=1e-12)
+
+
+def test_a_com_on_the_ground_loads_no_foot():
+    start = np.array([[0.1, 0.5, 0.0], [0.9, -2.0, 0.0]])
+    between = BetweenFeet((0.0, 0.4), P, OPTIONS)
+    assert len(between.loaded(start)) == 1 + len(OPTIONS.loads)
+    start[1, 0] = 0.0
+    with np.errstate(all="raise"):
+        np.testing.assert_array_equal(between.loaded(start), start[None])
 
 
 def test_forces_without_springs_carry_the_com_along_the_legs():

@@ -74,9 +74,12 @@ class BetweenFeet:
         """Starts (n, 2, 3) with accelerations that load the front foot at once.
 
         Args:
-            start: (2, 3) x and y, each position, velocity and acceleration; the first of them.
+            start: (2, 3) x and y, each position, velocity and acceleration; the first of them. The
+                only one, where a robot that falls has its CoM on the ground: no leg bears it.
         """
         x, y = start[:, 0]
+        if y <= 0.0:
+            return start[None]
         lift = max(1.0 - self.options.fall, 1.0 + start[1, 2] / self.parameters.gravity)
         lift *= self.parameters.gravity
         starts = np.repeat(start[None], 1 + len(self.options.loads), axis=0)
