@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from template_control.embedding.planners import regularised
+from template_control.embedding.planners.nearby import NearbyStrides
 from template_control.embedding.planners.planner import ANY_ANGLE
 from template_control.embedding.planners.regularised import FromSection, solve_stride
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.planning.nearby import NearbyStrides
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, NotNegative, Positive, Share
+from template_control.embedding.planners.nearby import NearbyStrides
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.regularised import FromSection, Prior
 from template_control.embedding.planners.within_reach import solve_within_reach
-from template_control.embedding.planning.nearby import NearbyStrides
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap
