@@ -15,7 +15,7 @@ from template_control.whole_body.portable_proxqp import load_proxqp
 from template_control.whole_body.posture_task import PostureTask
 from template_control.whole_body.problem import rows_per_foot
 from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
-from template_control.whole_body.task import DESIRED, TaskStack
+from template_control.whole_body.task import DESIRED, WEIGHT, TaskStack
 from template_control.whole_body.wanted import Wanted
 
 FRICTION = 0.6
@@ -295,6 +295,8 @@ def test_task_rows_are_the_rates_of_what_they_move(robot, random_states, task):
         rate = (seen[1] - seen[0]) / (2.0 * h)
         rows = stack.table[:, :7] @ a + stack.table[:, 7]
         np.testing.assert_allclose(rows, rate, rtol=2e-6, atol=2e-5)
+        unit = robot.mass * robot.com[1] ** 2 if isinstance(task, MomentumTask) else 1.0
+        np.testing.assert_allclose(stack.table[:, 7 + WEIGHT] * unit**2, task.weights)
 
 
 def test_a_flying_robot_keeps_its_momentum(robot):

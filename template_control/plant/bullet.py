@@ -251,8 +251,9 @@ class BulletPlant:
         """One physics step with a push along the world's x and y [N]."""
         p, c = pybullet, self.client
         self._contacts = None
+        forces = np.asarray(torque).tolist()  # Python's numbers: PyBullet is slow with others
         p.setJointMotorControlArray(
-            self.body, self._actuated, p.TORQUE_CONTROL, forces=torque.tolist(), physicsClientId=c
+            self.body, self._actuated, p.TORQUE_CONTROL, forces=forces, physicsClientId=c
         )
         if push or aside:
             p.applyExternalForce(
