@@ -3,21 +3,20 @@
 import ast
 import os
 import re
-import shlex
 import shutil
 import signal
 import subprocess
 import sys
 import zipfile
-from pathlib import Path
 
 import pytest
+from printed import EXAMPLE_ONE, ROOT, ZERO_FIVE_ZERO
+from printed import words as words_of
 
 import template_control as tc
 from template_control.cli.main import main
 from template_control.paper import REPRODUCTIONS
 
-ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
 REPLAY = (ROOT / "docs" / "replay.md").read_text()
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -105,6 +104,7 @@ SHORT = [
 ]
 ALL = dict.fromkeys([*(c for c in commands() if "venv" not in c), *(c for p in SHORT for c in p)])
 REPRODUCED = [line for line in ALL if line.startswith("template-control reproduce ")]
+ELSEWHERE = [*REPRODUCED, EXAMPLE_ONE, ZERO_FIVE_ZERO]
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -119,10 +119,14 @@ def test_every_reproduction_is_in_the_readme():
     assert sorted(line.split(maxsplit=2)[2] for line in REPRODUCED) == sorted(REPRODUCTIONS)
 
 
+def test_what_is_run_elsewhere_as_the_readme_prints_it_is_in_the_readme():
+    assert set(ELSEWHERE) <= set(ALL)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("line", [line for line in ALL if line not in REPRODUCED])
+@pytest.mark.parametrize("line", [line for line in ALL if line not in ELSEWHERE])
 def test_other_commands_run_as_printed(line, tmp_path, walked, monkeypatch, capfd):
-    words = [str(ROOT / w) if w.startswith("examples/") else w for w in shlex.split(line)]
+    words = words_of(line)
     if "runs/walk/run.npz" in words:
         shutil.copytree(walked, tmp_path / "runs" / "walk")
     if words[0] == "template-control":

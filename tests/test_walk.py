@@ -99,7 +99,7 @@ def test_walk_is_deterministic(record, short_walk):
 @pytest.mark.slow
 def test_a_disturbed_walk_is_the_same_wherever_its_memory_lies(gait):
     """The last digits of ProxQP's harder solves depend on where its workspace lies."""
-    pushed = {"steps": 14, "pushes": (Push(25.0, step=10),)}
+    pushed = {"steps": 6, "pushes": (Push(25.0, step=2),)}
     first = walk(gait, **pushed)
     moved = []
     for n in range(1, 6):
@@ -222,7 +222,7 @@ def test_slippery_ground(gait):
 @pytest.mark.parametrize("impulse", [-20.0, 25.0])
 @pytest.mark.parametrize("phase", np.arange(10) / 10)
 def test_pushes(default_gait, impulse, phase):
-    record = walk(default_gait, steps=26, pushes=(Push(impulse, 5, phase),))
+    record = walk(default_gait, steps=23, pushes=(Push(impulse, 2, phase),))
     assert not record.fell
     assert max(map(abs, off_gait(record, default_gait))) < 0.02, "back within 20 steps"
 
@@ -231,7 +231,7 @@ def test_pushes(default_gait, impulse, phase):
 def footholds(default_gait):
     """About the place where the ground is to step up or down."""
     return Situation(load_robot("five-link"), default_gait, LqrPlanner(default_gait)).footholds(
-        tuple(default_gait.vlo), 11
+        tuple(default_gait.vlo), 5
     )[-2:]
 
 
@@ -241,6 +241,6 @@ def footholds(default_gait):
 def test_a_step_of_the_ground_that_it_does_not_see(default_gait, footholds, height, share):
     before, beyond = footholds
     edge = GroundStep(height, before + share * (beyond - before))
-    record = walk(default_gait, steps=31, plant=PlantOptions(ground_step=edge))
+    record = walk(default_gait, steps=25, plant=PlantOptions(ground_step=edge))
     assert not record.fell
     assert max(map(abs, off_gait(record, default_gait))) < 0.02

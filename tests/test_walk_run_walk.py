@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from printed import EXAMPLE_ONE
+from printed import go as go_as_printed
 
 import template_control as tc
 from template_control.slip.automaton.vocabulary import MapKind
@@ -130,8 +132,8 @@ def test_runner_goes_through_example_one_from_a_start_that_is_a_hair_off(off):
 
 
 @pytest.mark.slow(seconds=25)
-def test_runner_goes_through_example_one_as_its_template_does():
-    record = go("example_one.toml", "runner")
+def test_runner_goes_through_example_one_as_its_template_does(tmp_path, monkeypatch):
+    record = go_as_printed(EXAMPLE_ONE, tmp_path, monkeypatch)
     check(record)
     template = simulate_scenario(load_scenario(EXAMPLES / "example_one.toml"))
     assert template.completed

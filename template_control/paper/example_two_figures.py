@@ -96,7 +96,8 @@ def states_figure(
     """y, phi and E at VLO over the steps: a row of panels for each plant, a line for each planner.
 
     Args:
-        states: (steps + 1, 3) y [m], phi [rad], E [J] of each walk, by (planner, plant).
+        states: (steps + 1, 3) y [m], phi [rad], E [J] of each walk, by (planner, plant); not every
+            planner walks on every plant.
         planners, plants: names in the order they are drawn in.
         target: (3,) y, phi, E of the equilibrium.
     """
@@ -108,6 +109,8 @@ def states_figure(
         for j, axes in enumerate(row):
             axes.axhline(target[j] * unit[j], color="0.75", linewidth=2.5, zorder=0)
             for planner, color in zip(planners, _COLORS, strict=True):
+                if (planner, plant) not in states:
+                    continue
                 z = states[planner, plant] * unit
                 # A fall is drawn as far as it is on the picture.
                 off = np.flatnonzero(np.any((z < spans[:, 0]) | (z > spans[:, 1]), axis=1))

@@ -101,6 +101,7 @@ class IdealPlant:
         self.impacts: list[Array] = []
         self.pulls = 0
         self._q, self._v = np.zeros(robot.nv), np.zeros(robot.nv)
+        self._seen = np.empty(0), np.empty(0)
         self._drive = np.zeros(robot.nv)
         self._push = 0.0
         self._feet = RollingFeet(self.robot, options.ground)
@@ -121,10 +122,10 @@ class IdealPlant:
 
         A foot within 1 um of the ground that does not leave it is on it, and stops at once.
         """
-        self._q[:], self._v[:] = q, v
+        self._q, self._v = np.array(q, dtype=float), np.array(v, dtype=float)
         self.contacts = ()
         self._impulse[:] = 0.0
-        self.robot.update(self._q, self._v)
+        self._see(self._q, self._v)
         low = self._feet.gaps() < 1e-6
         self._land(low & (self.robot.foot_velocity[:, 1] <= 1e-9))
         self._impulse[:] = 0.0
@@ -191,6 +192,12 @@ class IdealPlant:
 
     # -- dynamics ---------------------------------------------------------------------
 
+    def _see(self, q: Array, v: Array) -> None:
+        """Let the robot's update be at (q, v); no state is ever changed in place."""
+        if q is not self._seen[0] or v is not self._seen[1]:
+            self.robot.update(q, v)
+            self._seen = q, v
+
     def _right(self, q: Array) -> Array:
         """Generalised forces less nonlinear effects at the robot's last update."""
         right = self._drive - self.robot.nonlinear_effects
@@ -203,7 +210,7 @@ class IdealPlant:
     def _rates(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Acceleration (nv,) and forces (2, 2) along and out of the ground, ``contacts`` held."""
         r = self.robot
-        r.update(q, v)
+        self._see(q, v)
         return solve(r.mass_matrix, self._right(q), *self._feet.rows(), self.contacts)
 
     def _flow(self, h: float, begin: tuple[Array, Array]) -> tuple[Array, Array, Array]:
@@ -286,7 +293,7 @@ class IdealPlant:
         """Take over (q, v), projected onto the contacts; the robot's update is at it."""
         r = self.robot
         self._impulse += impulse
-        r.update(q, v)
+        self._see(q, v)
         zero = np.zeros(r.nv)
         error = np.zeros((2, 2))
         for i in self.contacts:
@@ -294,11 +301,11 @@ class IdealPlant:
         moved = np.abs(error).max() > _DRIFT
         if moved:
             q = q + solve(r.mass_matrix, zero, self._feet.rows()[0], error, self.contacts)[0]
-            r.update(q, v)
+            self._see(q, v)
         rows, _ = self._feet.rows()
         slip = rows[list(self.contacts)] @ v
         if slip.size and np.abs(slip).max() > _DRIFT:
             momentum = r.mass_matrix @ v
             v, _ = solve(r.mass_matrix, momentum, rows, np.zeros((2, 2)), self.contacts)
-            r.update(q, v)
+            self._see(q, v)
         self._q, self._v = q, v

@@ -17,7 +17,6 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgesv
 
 from template_control.compiled import compiled
 
@@ -44,41 +43,45 @@ def solve(
     Raises:
         numpy.linalg.LinAlgError: if the contacts' rows depend on each other.
     """
-    matrix, known = _system(mass_matrix, right, jacobian, gamma, (0 in pressed, 1 in pressed))
-    # LAPACK without a detour: the plant solves ten such systems in a tick.
-    _, _, found, singular = dgesv(matrix, known, overwrite_a=True, overwrite_b=True)
-    if singular:
-        raise np.linalg.LinAlgError("the contacts' rows depend on each other")
-    force = np.zeros((2, 2))
-    force[list(pressed)] = found[len(right) :].reshape(-1, 2)
-    return found[: len(right)], force
+    held = 0 in pressed, 1 in pressed
+    try:
+        found: tuple[Array, Array] = _solution(mass_matrix, right, jacobian, gamma, held)
+    except np.linalg.LinAlgError:
+        raise np.linalg.LinAlgError("the contacts' rows depend on each other") from None
+    return found
 
 
 @compiled
-def _system(
+def _solution(
     mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, held: tuple[bool, bool]
 ) -> tuple[Array, Array]:
-    """The module's system: its matrix, column by column as LAPACK wants it, and right-hand side.
-
-    Arguments as for :func:`solve`; ``held`` tells of either contact whether it is.
-    """
+    """As :func:`solve`; ``held`` tells of either contact whether it is."""
     nv = right.shape[0]
     size = nv + 2 * (held[0] + held[1])
-    columns, known = np.zeros((size, size)), np.empty(size)
+    matrix, known = np.zeros((size, size)), np.empty(size)
     for k in range(nv):
         known[k] = right[k]
         for j in range(nv):
-            columns[k, j] = mass_matrix[j, k]
+            matrix[j, k] = mass_matrix[j, k]
     row = nv
     for i in range(2):
         if held[i]:
             for axis in range(2):
                 known[row] = -gamma[i, axis]
                 for k in range(nv):
-                    columns[k, row] = jacobian[i, axis, k]
-                    columns[row, k] = -jacobian[i, axis, k]
+                    matrix[row, k] = jacobian[i, axis, k]
+                    matrix[k, row] = -jacobian[i, axis, k]
                 row += 1
-    return columns.T, known
+    # What is not finite has no solution, and is no fault of the contacts.
+    finite = np.isfinite(known).all()
+    found = np.linalg.solve(matrix, known) if finite else np.full(size, np.nan)
+    force, row = np.zeros((2, 2)), nv
+    for i in range(2):
+        if held[i]:
+            for axis in range(2):
+                force[i, axis] = found[row]
+                row += 1
+    return found[:nv], force
 
 
 def pressing(
