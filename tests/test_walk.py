@@ -161,10 +161,10 @@ def settled(record, gait, steps):
     return record.section_state[steps - 49 : steps + 1].mean(axis=0) - gait.vlo
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=6)
 def test_settles_on_the_papers_equilibrium(paper_gait):
-    record = walk(paper_gait, steps=100)
-    error = np.abs(settled(record, paper_gait, 100))
+    record = walk(paper_gait, steps=60)
+    error = np.abs(settled(record, paper_gait, 60))
     assert not record.fell
     assert error[0] <= 0.03 * paper_gait.vlo[0]
     assert error[1] <= 0.01
@@ -222,9 +222,9 @@ def test_slippery_ground(gait):
 @pytest.mark.parametrize("impulse", [-20.0, 25.0])
 @pytest.mark.parametrize("phase", np.arange(10) / 10)
 def test_pushes(default_gait, impulse, phase):
-    record = walk(default_gait, steps=23, pushes=(Push(impulse, 2, phase),))
+    record = walk(default_gait, steps=13, pushes=(Push(impulse, 2, phase),))
     assert not record.fell
-    assert max(map(abs, off_gait(record, default_gait))) < 0.02, "back within 20 steps"
+    assert max(map(abs, off_gait(record, default_gait))) < 0.02, "back within 10 steps"
 
 
 @pytest.fixture(scope="module")
@@ -237,10 +237,10 @@ def footholds(default_gait):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("height", [-0.03, 0.03])
-@pytest.mark.parametrize("share", [0.3, 0.4, 0.5, 0.6, 0.7])
+@pytest.mark.parametrize("share", [0.3, 0.7])  # in between it is the same walk, to the bit
 def test_a_step_of_the_ground_that_it_does_not_see(default_gait, footholds, height, share):
     before, beyond = footholds
     edge = GroundStep(height, before + share * (beyond - before))
-    record = walk(default_gait, steps=25, plant=PlantOptions(ground_step=edge))
+    record = walk(default_gait, steps=15, plant=PlantOptions(ground_step=edge))
     assert not record.fell
-    assert max(map(abs, off_gait(record, default_gait))) < 0.02
+    assert max(map(abs, off_gait(record, default_gait))) < 0.02, "back within 10 steps"
