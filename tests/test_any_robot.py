@@ -82,9 +82,9 @@ def test_shipped_robots_walk(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
-def test_shipped_robots_walk_twenty_steps(name):
-    record, gait = walk(load_robot(name), 20)
-    check(record, gait, 20)
+def test_shipped_robots_walk_thirty_steps(name):
+    record, gait = walk(load_robot(name), 30)
+    check(record, gait, 30)
     if name == "bolt":
         torques = record.metadata["summary"]["joint_torque"].values()
         # [N m], of the real robot's motors; the URDF's limits are placeholders.

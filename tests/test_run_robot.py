@@ -171,7 +171,7 @@ def test_stiffnesses_follow_from_where_the_foot_has_landed(planning, gait, early
 @pytest.mark.slow(seconds=11)
 @pytest.mark.parametrize("speed", [1.3, 2.0, 2.5, 3.5, 4.0])
 def test_robot_runs_at_other_speeds(speed):
-    record = run(speed, 40)
+    record = run(speed, 60)
     assert record.metadata["fall_reason"] == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(speed, rel=0.01)
     assert record.solved.all()
@@ -179,7 +179,7 @@ def test_robot_runs_at_other_speeds(speed):
 
 @pytest.mark.slow(seconds=7)
 def test_robot_runs_at_five_metres_a_second_with_stronger_motors():
-    record = run(5.0, 40, embedding=EmbeddingOptions(torque_scale=1.3))
+    record = run(5.0, 60, embedding=EmbeddingOptions(torque_scale=1.3))
     assert record.metadata["fall_reason"] == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(5.0, rel=0.01)
 
