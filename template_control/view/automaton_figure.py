@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -131,7 +132,7 @@ def automaton_figure(automaton: Automaton) -> Figure:
     legend = _draw_legend(axes, automaton)
     figure.draw_without_rendering()  # puts the legend in its place
     texts = [*_draw_panels(axes, automaton, centre), *_draw_nodes(axes, automaton, centre)]
-    _draw_edges(axes, automaton, centre, [legend, *texts])
+    _draw_edges(axes, automaton, centre, [_room(artist) for artist in (legend, *texts)])
     return figure
 
 
@@ -168,7 +169,7 @@ def _draw_nodes(axes: Axes, automaton: Automaton, centre: dict[str, Array]) -> I
 
 
 def _draw_edges(
-    axes: Axes, automaton: Automaton, centre: dict[str, Array], taken: list[Legend | Text]
+    axes: Axes, automaton: Automaton, centre: dict[str, Array], taken: list[Bbox]
 ) -> None:
     """Arrows first, then each label where it hides least."""
     edges = list(successions(automaton))
@@ -203,7 +204,12 @@ def _draw_edges(
         color = _SECTION if edge.section else _INK
         text.set(color=color, ha="center", va="center", zorder=5)
         _place(axes, text, arrow, ink, taken)
-        taken.append(text)
+        taken.append(_room(text))
+
+
+def _room(artist: Artist) -> Bbox:
+    """The box that ``artist`` takes on the page, and a little around it."""
+    return artist.get_window_extent().padded(6.0)
 
 
 def _draw_arrow(axes: Axes, arrow: Array, color: str, width: float, line: str) -> None:
@@ -213,10 +219,9 @@ def _draw_arrow(axes: Axes, arrow: Array, color: str, width: float, line: str) -
     axes.add_patch(patch)
 
 
-def _place(axes: Axes, text: Text, arrow: Array, ink: Array, taken: list[Legend | Text]) -> None:
+def _place(axes: Axes, text: Text, arrow: Array, ink: Array, taken: list[Bbox]) -> None:
     """Put ``text`` beside ``arrow`` where it covers the least ink and nothing ``taken``."""
     data, page = axes.transData, axes.bbox
-    boxes = [other.get_window_extent().padded(6.0) for other in taken]
     corner = data.inverted().transform(text.get_window_extent().get_points())
     half = 0.5 * (corner[1] - corner[0])
     shares = np.array([0.5, 0.4, 0.6, 0.3, 0.7])
@@ -228,7 +233,7 @@ def _place(axes: Axes, text: Text, arrow: Array, ink: Array, taken: list[Legend 
         box = Bbox(data.transform([spot - half - 0.04, spot + half + 0.04]))
         covered = np.all((ink > box.min) & (ink < box.max), axis=1).sum()
         outside = not (page.contains(*box.min) and page.contains(*box.max))
-        clashes = box.count_overlaps(boxes) + outside
+        clashes = box.count_overlaps(taken) + outside
         costs.append(covered + 1e4 * clashes + abs(share - 0.5))
     text.set_position(tuple(spots[int(np.argmin(costs))]))
 
