@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,21 @@ from template_control.whole_body.solver import Solution
 Array = NDArray[np.float64]
 
 _BLOCK = 1024  # ticks
+# Columns of one or two numbers, and their widths.
+_NUMBERS = {
+    "time": 1,
+    "angular_momentum": 1,
+    "template_com": 2,
+    "template_velocity": 2,
+    "node": 1,
+    "rear": 1,
+    "solved": 1,
+    "push": 1,
+    "stands": 1,
+    "interval": 1,
+    "tick_seconds": 1,
+    "solve_seconds": 1,
+}
 # Columns that no field of the record holds as they are.
 _OTHERWISE = ("node", "rear", "solved", "stands", "interval", "tick_seconds", "solve_seconds")
 
@@ -104,46 +120,38 @@ class Recorder:
         self.every = every
         robot = controller.robot
         nu = len(robot.joint_names)
-        widths = {
-            # Single numbers first: they are written together, and so are the arrays.
-            "time": 1,
-            "angular_momentum": 1,
-            "template_com": 2,
-            "template_velocity": 2,
-            "node": 1,
-            "rear": 1,
-            "solved": 1,
-            "push": 1,
-            "stands": 1,
-            "interval": 1,
-            "tick_seconds": 1,
-            "solve_seconds": 1,
-            "q": robot.nq,
-            "v": robot.nv,
-            "torque": nu,
-            "com": 2,
-            "com_velocity": 2,
-            "foot": 4,
-            "joint": 2 * nu,
-            "contact_force": 4,
-            "template_force": 4,
-            "swing_reference": 4,
+        # In the order in which a tick writes them; single numbers are written together.
+        shapes: dict[str, tuple[int, ...]] = {
+            "q": (robot.nq,),
+            "v": (robot.nv,),
+            "torque": (nu,),
+            "com": (2,),
+            "com_velocity": (2,),
+            "foot": (2, 2),
+            "contact_force": (2, 2),
+            "template_force": (2, 2),
+            "joint": (nu, 2),
+            "swing_reference": (2, 2),
         }
+        widths = {**_NUMBERS, **{name: prod(shape) for name, shape in shapes.items()}}
         ends = np.cumsum(list(widths.values()))
         starts = ends - list(widths.values())
-        self._numbers = int(starts[list(widths).index("q")])
         self._columns = {
             name: slice(int(a), int(b)) for name, a, b in zip(widths, starts, ends, strict=True)
         }
         self._block = np.empty((_BLOCK, int(ends[-1])))
+        self._numbers = self._block[:, : self._columns["q"].start]
+        self._arrays = {
+            name: self._block[:, self._columns[name]].reshape(_BLOCK, *shape)
+            for name, shape in shapes.items()
+        }
+        *self._whole, self._joint, self._swing = self._arrays.values()
         self._block_start = 0  # tick of the block
         # By the block's first tick: closing it once more, after an interruption, changes nothing.
         self._kept: dict[int, Array] = {}
         self._clocks: dict[int, Array] = {}
         self._counted: dict[int, _Counted] = {}
         self._before = 0.0
-        self._joint = np.zeros((nu, 2))
-        self._swing = np.empty((2, 2))
         self._node_index = controller.planning.automaton.index
         self.ticks = 0
 
@@ -159,13 +167,8 @@ class Recorder:
         c, r = self.controller, self.controller.robot
         template_x, template_y = c.template_com
         feet, station = c.feet.of, c.station
-        r.joint_positions(self._joint)
-        swing = self._swing
-        swing[:] = np.nan
-        for leg in station.control.swings:
-            swing[feet[leg]] = c.frame.world(c.wanted.foot[feet[leg], :, 0])
-        row, numbers = self._block[self.ticks - self._block_start], self._numbers
-        row[:numbers] = (
+        row = self.ticks - self._block_start
+        self._numbers[row] = (
             time,
             r.angular_momentum,
             template_x,
@@ -180,9 +183,15 @@ class Recorder:
             seconds,
             solution.solve_seconds,
         )
-        state = (q, v, solution.torque, r.com, r.com_velocity, r.foot_position, self._joint)
-        forces = (contact_force, c.frame.outward(c.place.forces), swing)
-        np.concatenate((*state, *forces), axis=None, out=row[numbers:])
+        forces = contact_force, c.frame.outward(c.place.forces)
+        state = (q, v, solution.torque, r.com, r.com_velocity, r.foot_position, *forces)
+        for column, value in zip(self._whole, state, strict=True):
+            column[row] = value
+        r.joint_positions(self._joint[row])
+        swing = self._swing[row]
+        swing[:] = np.nan
+        for leg in station.control.swings:
+            swing[feet[leg]] = c.frame.world(c.wanted.foot[feet[leg], :, 0])
         self._before = time
         self.ticks += 1
         if self.ticks - self._block_start == _BLOCK:
@@ -238,8 +247,8 @@ class Recorder:
         data = {name: table[:, columns].copy() for name, columns in self._columns.items()}
         for name in ("time", "angular_momentum", "node", "rear", "solved", "push"):
             data[name] = data[name][:, 0]
-        for name in ("foot", "joint", "contact_force", "template_force", "swing_reference"):
-            data[name] = data[name].reshape(len(data[name]), -1, 2)
+        for name, rows in self._arrays.items():
+            data[name] = data[name].reshape(-1, *rows.shape[1:])
         reports = self.controller.reports
         sections, strides = self.section_names(), self.stride_names()
         return Record(
