@@ -8,7 +8,7 @@ run is to change its speed, or was pushed, every stride is solved on its own.
 from __future__ import annotations
 
 from collections import deque
-from operator import sub
+from operator import gt, lt, sub
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +74,7 @@ class NearbyStrides:
     def __init__(self, tolerance: Array, near: float) -> None:
         self.tolerance = tolerance
         self.near = near
+        self._steady: list[float] = (_STEADY * tolerance).tolist()
         self._known: deque[_Solution] = deque(maxlen=_KEPT)
 
     def forget(self) -> None:
@@ -88,9 +89,10 @@ class NearbyStrides:
             aim: (m,) where the stride should end.
             prior: the free controls.
         """
-        if not (abs(aim - stride.z) < _STEADY * self.tolerance).all():
+        change = map(abs, (aim - stride.z).tolist())
+        if not all(map(lt, change, self._steady)):
             return solve_stride(stride, aim, prior, self.tolerance)
-        turns = bool((prior.upper > prior.lower).all())
+        turns = all(map(gt, prior.upper.tolist(), prior.lower.tolist()))
         known = self._nearest(stride.z, turns)
         found = known and self._nearby(known.about(stride), stride.z, aim, prior)
         if found:

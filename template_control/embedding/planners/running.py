@@ -110,6 +110,7 @@ class RunningPlanner:
         # As arrays at once: a plan has little time.
         self._rise = np.array([o.pace, o.climb])
         self._drop = np.array([o.pace if o.brake is None else o.brake, o.climb])
+        self._believed = np.array([o.surprise_bound, o.offset_bound])
         self._strides = NearbyStrides(np.array(o.tolerance), o.near)
         # Compile now what a stride would otherwise wait for.
         self.decide(gait.apex)
@@ -150,25 +151,31 @@ class RunningPlanner:
     def _prior(self, z: Array, near: RunningGait, angles: tuple[float, float]) -> Prior:
         """Controls of the near gait, and how far from them the stride's may be."""
         o, p = self.options, self.gait.parameters
-        base = near.controls[_SLOTS]
-        alpha, before, after = base.tolist()
+        base = near.controls[_SLOTS].tolist()
+        alpha, before, after = base
         top = float(np.arcsin(min(z[1] / p.rest_length, 1.0))) - o.top_margin
         low, high = (
             min(max(min(alpha + turn, top), angles[0]), angles[1], top) for turn in o.angle_range
         )
         softest, stiffest = o.stiffness_range
-        lower = np.array([low, softest * before, softest * after])
-        upper = np.array([high, stiffest * before, stiffest * after])
         turn, sooner, later = o.change
-        change = np.array([turn, sooner * before, later * after])
-        start = np.minimum(np.maximum(base, lower), upper)
+        # In Python's numbers, and as arrays at once: numpy's calls took longer than the algebra.
+        least = low, softest * before, softest * after
+        most = high, stiffest * before, stiffest * after
+        table = (
+            [min(max(x, a), b) for x, a, b in zip(base, least, most, strict=True)],
+            (turn, sooner * before, later * after),
+            least,
+            most,
+        )
+        start, change, lower, upper = np.array(table)
         return Prior(near.controls, _SLOTS, start, change, lower, upper, o.rounds)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal strides teach."""
         if not (decision.feasible and decision.nominal):
             return
-        o = self.options
-        limit, bound = np.array(o.surprise_bound), np.array(o.offset_bound)
-        surprise = np.clip(z - decision.predicted[:2], -limit, limit)
-        self.offset[:2] = np.clip(self.offset[:2] + o.offset_gain * surprise, -bound, bound)
+        limit, bound = self._believed
+        surprise = np.minimum(np.maximum(z - decision.predicted[:2], -limit), limit)
+        offset = self.offset[:2] + self.options.offset_gain * surprise
+        self.offset[:2] = np.minimum(np.maximum(offset, -bound), bound)
