@@ -42,7 +42,9 @@ def test_a_foot_that_would_pull_is_let_go():
     jacobian = np.zeros((2, 2, 4))
     jacobian[0, 0, 0], jacobian[0, 1, 1], jacobian[1, 0, 2], jacobian[1, 1, 3] = 1, 1, 1, 1
     right = np.array([0.0, 5.0, 0.0, -5.0])
-    held, x, force, clean = pressing(np.eye(4), right, jacobian, np.zeros((2, 2)), (0, 1))
+    held, x, force, clean = pressing(
+        np.asfortranarray(np.eye(4)), right, jacobian, np.zeros((2, 2)), (0, 1)
+    )
     assert (held, clean) == ((1,), True)
     assert x.tolist() == [0.0, 5.0, 0.0, 0.0]
     assert force.tolist() == [[0.0, 0.0], [0.0, 5.0]]

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
+from template_control.whole_body.elimination import cholesky, solve_cholesky
 
 Array = NDArray[np.float64]
 
@@ -44,44 +45,66 @@ def solve(
         numpy.linalg.LinAlgError: if the contacts' rows depend on each other.
     """
     held = 0 in pressed, 1 in pressed
-    try:
-        found: tuple[Array, Array] = _solution(mass_matrix, right, jacobian, gamma, held)
-    except np.linalg.LinAlgError:
-        raise np.linalg.LinAlgError("the contacts' rows depend on each other") from None
-    return found
+    determined, x, force = _solution(mass_matrix, right, jacobian, gamma, held)
+    if not determined:
+        raise np.linalg.LinAlgError("the contacts' rows depend on each other")
+    return x, force
 
 
 @compiled
 def _solution(
     mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, held: tuple[bool, bool]
-) -> tuple[Array, Array]:
-    """As :func:`solve`; ``held`` tells of either contact whether it is."""
-    nv = right.shape[0]
-    size = nv + 2 * (held[0] + held[1])
-    matrix, known = np.zeros((size, size)), np.empty(size)
-    for k in range(nv):
-        known[k] = right[k]
-        for j in range(nv):
-            matrix[j, k] = mass_matrix[j, k]
-    row = nv
+) -> tuple[bool, Array, Array]:
+    """As :func:`solve`; ``held`` tells of either contact whether it is.
+
+    With A = J M^-1 J^T: A f = -gamma - J M^-1 right, and x = M^-1 (right + J^T f).
+
+    Returns:
+        Whether the contacts' rows determine f; x and f.
+    """
+    # Number by number: Numba compiles operations on whole arrays for seconds.
+    nv, count = right.shape[0], 0
+    rows, known = np.empty((4, nv)), np.empty((4, 1))
     for i in range(2):
         if held[i]:
             for axis in range(2):
-                known[row] = -gamma[i, axis]
+                known[count, 0] = -gamma[i, axis]
                 for k in range(nv):
-                    matrix[row, k] = jacobian[i, axis, k]
-                    matrix[k, row] = -jacobian[i, axis, k]
-                row += 1
+                    rows[count, k] = jacobian[i, axis, k]
+                count += 1
+    factor, columns = np.empty((nv, nv)), np.empty((nv, 1 + count))
+    for k in range(nv):
+        columns[k, 0] = right[k]
+        for row in range(count):
+            columns[k, 1 + row] = rows[row, k]
+        for j in range(k + 1):
+            factor[k, j] = mass_matrix[k, j]
+    cholesky(factor, nv)
+    solve_cholesky(factor, nv, columns)
+    gram, finite = np.empty((count, count)), True
+    for row in range(count):
+        for k in range(nv):
+            known[row, 0] -= rows[row, k] * columns[k, 0]
+        for other in range(row + 1):
+            total = 0.0
+            for k in range(nv):
+                total += rows[row, k] * columns[k, 1 + other]
+            gram[row, other] = total
+            finite = finite and np.isfinite(total)
     # What is not finite has no solution, and is no fault of the contacts.
-    finite = np.isfinite(known).all()
-    found = np.linalg.solve(matrix, known) if finite else np.full(size, np.nan)
-    force, row = np.zeros((2, 2)), nv
+    determined = cholesky(gram, count) or not finite
+    solve_cholesky(gram, count, known)
+    x, force, row = np.empty(nv), np.zeros((2, 2)), 0
+    for k in range(nv):
+        x[k] = columns[k, 0]
+        for other in range(count):
+            x[k] += columns[k, 1 + other] * known[other, 0]
     for i in range(2):
         if held[i]:
             for axis in range(2):
-                force[i, axis] = found[row]
+                force[i, axis] = known[row, 0]
                 row += 1
-    return found[:nv], force
+    return determined, x, force
 
 
 def pressing(

@@ -185,9 +185,8 @@ def assemble(
     if not cholesky(factor, nu):
         return SINGULAR
     _forward(factor, gradient)
-    for i in range(nu):
-        minimum[i] = -gradient[i]
-    row[:nu] = minimum
+    for i in range(nu):  # Numba compiles the copy of a whole array for seconds
+        minimum[i] = row[i] = -gradient[i]
     _backward(factor, row[:nu])
     if _keeps(constraint, lower, upper, row):
         return FREE
@@ -250,7 +249,8 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
         torque_limit: (nu,) tau_max [N m].
         out: (nu,) overwritten with the torques [N m].
     """
-    out[:] = w
+    for i in range(w.shape[0]):
+        out[i] = w[i]
     _backward(factor, out)
     for i in range(w.shape[0]):
         # The solver's tolerance may leave a torque a hair beyond its limit.

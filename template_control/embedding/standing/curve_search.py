@@ -79,7 +79,9 @@ def best_quintic(
                 cost = max(excess - rules.slack, 0.0) + time
                 if cost < best:
                     best, least, chosen, lasting = cost, excess, e, i
-                    curve[:] = c
+                    for axis in range(2):
+                        for n in range(_TERMS):  # Numba compiles whole copies for seconds
+                            curve[axis, n] = c[axis, n]
     return best, least, chosen, lasting
 
 
