@@ -266,6 +266,20 @@ def test_load_scales_torques_within_their_limits(robot):
     assert np.all(np.abs(loaded.torque) <= robot.torque_limit)
 
 
+def test_no_torque_is_a_hair_beyond_its_limit_whatever_the_load(robot):
+    robot.update(*standing(np.random.default_rng(4)))
+    stance = Stance((0,), np.array([0.0, 780.0]), np.full(1, np.inf))
+    loads = np.linspace(0.7, 1.4, 71)
+    assert np.any(loads * (robot.torque_limit[0] / loads) > robot.torque_limit[0]), "by rounding"
+    saturated = 0
+    for load in loads:
+        wild = written(robot, 1, np.random.default_rng(8), 200.0)
+        torque = np.abs(WholeBodyQp(robot, OPTIONS).solve(wild, stance, load).torque)
+        assert np.all(torque <= robot.torque_limit)
+        saturated += np.any(torque > (1.0 - 1e-15) * robot.torque_limit)
+    assert saturated > 10
+
+
 def quantity_of(task, robot):
     """What the task's rows move, at the robot's last update: their time integral's rate."""
     if isinstance(task, ComTask):

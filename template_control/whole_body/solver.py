@@ -219,6 +219,7 @@ class WholeBodyQp:
             [_Workspace(robot, feet, bounded) for feet in range(3)] for bounded in (0, nu)
         )
         self._torque = np.zeros(nu)
+        self._loaded = 1.0, self.torque_limit, self.torque_limit
         self._failing = False
 
     def solve(self, tasks: TaskStack, stance: Stance, load: float = 1.0) -> Solution:
@@ -231,7 +232,7 @@ class WholeBodyQp:
                 and stay within their limits.
         """
         robot, feet = self.robot, len(stance.feet)
-        limit = self.torque_limit / load
+        limit = self._limit(load)
         w, seconds, solved = self._workspaces[feet], 0.0, False
         if self._bounds.needed():
             w = self._braked[feet]
@@ -256,6 +257,17 @@ class WholeBodyQp:
         acceleration = np.empty(robot.nv)
         follow(w.matrices.a_map, w.matrices.f_map, self._torque, acceleration, force)
         return Solution(load * self._torque, force, acceleration, solved, seconds)
+
+    def _limit(self, load: float) -> Array:
+        """(nu,) the model's limits of torque [N m]: times ``load`` they are within the robot's."""
+        known, whole, limit = self._loaded
+        if load != known or whole is not self.torque_limit:
+            limit = self.torque_limit / load
+            # The product is rounded once more, and may be a hair beyond.
+            beyond = load * limit > self.torque_limit
+            limit = np.where(beyond, np.nextafter(limit, 0.0), limit)
+            self._loaded = load, self.torque_limit, limit
+        return limit
 
     def _attempt(
         self, w: _Workspace, tasks: TaskStack, stance: Stance, limit: Array
