@@ -17,6 +17,7 @@ from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.embedding.planners.walking.modified import ModifiedPlanner
 from template_control.embedding.planning.replan_options import ReplanOptions
+from template_control.embedding.planning.route_planners import RoutePlanners
 from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.stride_planning import StridePlanning
@@ -135,6 +136,25 @@ NOTHING = Learnt(load=1.0, trim=0.0, lean=0.0)
 def planned(gait, options=None):
     """The planning of a walk that keeps its gait."""
     return StridePlanning(SteadyRoute.of(gait), {"w": LqrPlanner(gait)}, options or ReplanOptions())
+
+
+@pytest.mark.parametrize(("before", "speed_kept"), [("w", True), ("rw", False)])
+def test_a_walk_after_a_run_forgets_what_its_steps_added_to_the_speed(gait, before, speed_kept):
+    planner = LqrPlanner(gait)
+    route = SteadyRoute.of(gait)
+    planners = RoutePlanners(route, {"w": planner, "rw": planner}, ReplanOptions(), AUTOMATON)
+    report, *_ = planners.decide(VLO, gait.vlo, 0.0, NOTHING, [])
+    planner.offset = np.array([0.02, -0.002, -0.05])
+    goal = replace(report.goal, stride=before)
+    off_law = replace(report, goal=goal, decision=replace(report.decision, nominal=False))
+    there, *_ = planners.decide(VLO, gait.vlo, 0.5, NOTHING, [off_law])
+    kept = [0.02 if speed_kept else 0.0, -0.002, -0.05]
+    np.testing.assert_array_equal(there.offset, kept)
+    if not speed_kept:
+        fresh = LqrPlanner(gait)
+        fresh.offset = np.array(kept)
+        fresh.forget()
+        np.testing.assert_array_equal(there.decision.controls, fresh.decide(gait.vlo).controls)
 
 
 def test_overdue_ground_keeps_the_template_in_single_stance(gait):

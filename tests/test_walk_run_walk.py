@@ -39,7 +39,7 @@ def check(record):
 def settled(record):
     """Walks as is wanted, after both transitions."""
     error = record.section_state[-5:] - record.section_target[-6:-1]
-    assert np.all(np.abs(error[:, 0]) < 0.06), "of 1.1 m/s"
+    assert np.all(np.abs(error[:, 0]) < 0.04), "of 1.1 m/s"
     assert np.all(np.abs(error[:, 1]) < 8e-3)
 
 

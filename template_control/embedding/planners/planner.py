@@ -147,6 +147,14 @@ class SlopePlanner(Planner, Protocol):
 
 
 @runtime_checkable
+class ForgettingPlanner(Planner, Protocol):
+    """A planner that learns anew, in part, where its kind of stride follows another one."""
+
+    def forget(self) -> None:
+        """Forget what was true of another way of moving only; gait and slope stay."""
+
+
+@runtime_checkable
 class CurvePlanner(Planner, Protocol):
     """A planner that leads the CoM along a curve in time where no spring carries it."""
 

@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Triple
-from template_control.embedding.planners.planner import Decision, Planner, Planners
+from template_control.embedding.planners.planner import (
+    Decision,
+    ForgettingPlanner,
+    Planner,
+    Planners,
+)
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt, SectionReport
 from template_control.errors import ParameterError
@@ -98,6 +103,10 @@ class RoutePlanners:
         wanted = self.route.next(section, z, now)
         # The last stride goes on until whoever drives the robot ends the run.
         goal = reports[-1].goal if wanted is None else wanted
+        if reports and reports[-1].goal.stride != goal.stride:
+            planner = self.of(goal)
+            if isinstance(planner, ForgettingPlanner):
+                planner.forget()
         decision, start = self.plan(section, z, goal)
         seconds = time.perf_counter() - begin
         end = section_of(self.automaton.sections(self.automaton.start(goal.stride).name)[1])

@@ -38,6 +38,7 @@ from template_control.slip.similarity import (
 )
 
 Array = NDArray[np.float64]
+_LASTING = (0.0, 1.0, 1.0)  # what of an offset outlives another way of moving
 _ROUNDS = 2  # of Newton's method for the fixed point; it begins at the last one
 
 
@@ -97,6 +98,17 @@ class LqrPlanner:
         self.offset = np.zeros(3)
         self._slope = 0.0
         self._settle_on(self._family.reset())
+
+    def forget(self) -> None:
+        """See :meth:`~.planner.ForgettingPlanner.forget`.
+
+        What the robot adds to dx/dt depends on how its trunk moves. A five-link robot that leans
+        for a run to come gains 0.02 m/s in each walking step; after the run it stands up, and
+        loses up to 0.04 m/s. What it adds to y and dy/dt is much the same.
+        """
+        self.offset = self.offset * _LASTING
+        self._shift = self._settling @ self.offset
+        self._law = self._aim()
 
     def on_slope(self, slope: float) -> SlipParameters:
         """See :meth:`~.planner.SlopePlanner.on_slope`; without a gait there the ground is level."""
