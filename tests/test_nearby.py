@@ -8,8 +8,9 @@ import pytest
 from template_control.embedding.planners import regularised
 from template_control.embedding.planners.nearby import NearbyStrides
 from template_control.embedding.planners.planner import ANY_ANGLE
-from template_control.embedding.planners.regularised import FromSection, solve_stride
+from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
 from template_control.embedding.planners.running import RunningPlanner
+from template_control.embedding.planners.running_limits import aim_and_bounds
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
@@ -40,7 +41,10 @@ def step():
 
 
 def prior_of(gait, z, angles=ANY_ANGLE):
-    return RunningPlanner(gait)._prior(z, gait, angles)
+    planner = RunningPlanner(gait)
+    legs, limits = gait.controls[:3], planner._limits
+    _, table, _ = aim_and_bounds(z, gait.apex, np.zeros(3), legs, angles, limits)
+    return Prior(gait.controls, [0, 1, 2], table, planner.options.rounds)
 
 
 def exactly(stride, aim, prior, monkeypatch):

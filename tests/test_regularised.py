@@ -33,7 +33,8 @@ def prior(lower=0.8, upper=1.25, slots=SLOTS, **other):
     if slots[0] == Slot.TOUCHDOWN_ANGLE:
         low[0], high[0] = base[0] - 0.1, min(base[0] + 0.1, np.arcsin(GAIT.apex[1]) - 0.005)
     values = {"rounds": 8, **other}
-    return Prior(GAIT.controls.copy(), list(slots), base, change, low, high, **values)
+    table = np.array([base, change, low, high])
+    return Prior(GAIT.controls.copy(), list(slots), table, **values)
 
 
 def cost(u, aim, its):
@@ -110,11 +111,12 @@ def test_a_grid_is_tried_where_the_base_fails_and_none_is_said_where_it_does_too
         return (GAIT.apex, Outcome.SECTION) if near else (np.zeros(2), Outcome.FALL)
 
     base = good * [1.0, 1.4, 1.4]
-    wide = Prior(GAIT.controls, SLOTS, base, CHANGE, good * 0.6, good * 1.4, 3)
+    wide = Prior(GAIT.controls, SLOTS, np.array([base, CHANGE, good * 0.6, good * 1.4]), 3)
     u, end = solve_stride(FromHere(ahead, SLOTS), GAIT.apex, wide, TOLERANCE)
     assert end is not None
     assert ahead(u)[1] is Outcome.SECTION
-    narrow = Prior(GAIT.controls, SLOTS, base, CHANGE, base * 0.98, base * 1.02, 3)
+    table = np.array([base, CHANGE, base * 0.98, base * 1.02])
+    narrow = Prior(GAIT.controls, SLOTS, table, 3)
     u, end = solve_stride(FromHere(ahead, SLOTS), GAIT.apex, narrow, TOLERANCE)
     assert end is None
     np.testing.assert_array_equal(u[SLOTS], base)

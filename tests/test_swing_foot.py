@@ -12,7 +12,7 @@ from template_control.embedding.references.swing_foot import (
     SwingFoot,
     SwingOptions,
     quintic_step,
-    two_quintic_steps,
+    swing_step,
 )
 from template_control.slip.automaton.vocabulary import Leg
 
@@ -26,13 +26,20 @@ def test_quintic_arrives():
     assert state[1] == pytest.approx(0.2, abs=1e-3)
 
 
-def test_two_steps_at_once_are_two_steps():
-    x, y = np.array([0.1, -0.4, 3.0]), np.array([0.05, 0.2, -1.0])
-    once = x.copy(), y.copy()
-    quintic_step(x, 0.7, 0.0, 0.3, 1e-3)
-    quintic_step(y, 0.0, -0.2, 0.25, 1e-3)
-    two_quintic_steps(*once, (0.7, 0.0, 0.3), (0.0, -0.2, 0.25), 1e-3)
-    np.testing.assert_array_equal(once, (x, y))
+def test_a_swing_steps_along_the_quintics_of_its_parts():
+    options = SwingOptions(descent=0.1)
+    here = np.array([0.1, -0.4, 3.0]), np.array([0.02, 0.2, -1.0])
+    parts = {
+        (0.0, 0.30): (options.clearance, 0.0, 0.5 * 0.30),  # it rises,
+        (0.2, 0.15): (options.clearance, 0.0, 2.0 * options.horizon),  # stays up,
+        (0.3, 0.08): (0.0, -options.landing_speed, 0.08),  # and comes down
+    }
+    for (elapsed, to_go), up in parts.items():
+        (x, y), (other_x, other_y) = ([axis.copy() for axis in here] for _ in range(2))
+        swing_step(x, y, (0.7, 0.0, to_go), options.shape, (elapsed, -np.inf), 1e-3)
+        quintic_step(other_x, 0.7, 0.0, to_go - options.early, 1e-3)
+        quintic_step(other_y, *up, 1e-3)
+        np.testing.assert_allclose((x, y), (other_x, other_y), rtol=1e-13)
 
 
 def test_swing_clears_the_ground_and_lands_slowly():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+from math import asin, atan2, hypot
 
 from template_control.embedding.sensing import Sensed
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -35,10 +35,10 @@ def angle_later(sensed: Sensed, parameters: SlipParameters, stiffness: float, ti
     """
     x, y, _, dy = sensed.state.tolist()
     length = parameters.rest_length
-    stretch = length / float(np.hypot(x - sensed.toes[0], y)) - 1.0
+    stretch = length / hypot(x - float(sensed.toes[0]), y) - 1.0
     lift = stiffness * stretch * y / parameters.mass - parameters.gravity
     later = y + time * (dy + 0.5 * time * lift)
-    return float(np.arcsin(min(max(later / length, 0.0), 1.0)))
+    return asin(min(max(later / length, 0.0), 1.0))
 
 
 def flown_angle(sensed: Sensed, parameters: SlipParameters) -> float:
@@ -60,4 +60,4 @@ def flown_angle(sensed: Sensed, parameters: SlipParameters) -> float:
         if slope >= 0.0:
             break
         time -= (px**2 + py**2 - parameters.rest_length**2) / slope
-    return float(np.arctan2(py, -px))
+    return atan2(py, -px)

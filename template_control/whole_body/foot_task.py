@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
+from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.similarity import PER_ACCELERATION_SQUARED, RATE, RATE_SQUARED, tuned
-from template_control.whole_body.task import Rows
+from template_control.whole_body.task import BIAS, DESIRED, Rows
 from template_control.whole_body.wanted import Wanted
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,15 +48,43 @@ class FootTask(Checked):
 
     def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
-        foot = wanted.feet[self.leg]
-        (kp, kd), (hold_p, hold_d) = self.gains, self.hold_gains
-        # Lists: arithmetic on an array's single numbers is slow.
-        position, velocity = robot.foot_position[foot].tolist(), robot.foot_velocity[foot].tolist()
-        x, y = wanted.foot[foot].tolist()
-        rows.jacobian[:] = robot.foot_jacobian[foot]
-        rows.bias[:] = robot.foot_bias[foot]
-        to_reference = x[2] + kp * (x[0] - position[0]) + kd * (x[1] - velocity[0])
-        ahead = wanted.furthest[foot] - position[0]
-        held = hold_p * ahead + hold_d * (wanted.hip_speed - velocity[0])
-        rows.desired[0] = min(to_reference, held)
-        rows.desired[1] = y[2] + kp * (y[0] - position[1]) + kd * (y[1] - velocity[1])
+        feels = robot.foot_position, robot.foot_velocity, robot.foot_jacobian, robot.foot_bias
+        wish = wanted.foot, wanted.furthest
+        gains = *self.gains, *self.hold_gains
+        follow_foot(wanted.feet[self.leg], feels, wish, wanted.hip_speed, gains, rows.table)
+
+
+@compiled
+def follow_foot(
+    foot: int,
+    feels: tuple[Array, Array, Array, Array],
+    wish: tuple[Array, Array],
+    hip_speed: float,
+    gains: tuple[float, float, float, float],
+    table: Array,
+) -> None:
+    """Write the two rows of a :class:`FootTask`.
+
+    Args:
+        foot: 0 or 1.
+        feels: (2, 2) positions and (2, 2) velocities of both feet, their (2, 2, nv) Jacobians, and
+            (2, 2) dJ/dt v.
+        wish: (2, 2, 3) the references, and (2,) the furthest x of each foot [m].
+        hip_speed: forward [m/s].
+        gains: kp and kd of the feedback, and of that which holds the foot back.
+        table: (2, nv + 3) overwritten, as that of a :class:`~.task.TaskStack`.
+    """
+    position, velocity, jacobian, bias = feels
+    reference, furthest = wish
+    kp, kd, hold_p, hold_d = gains
+    nv = table.shape[1] - 3
+    for axis in range(2):
+        for k in range(nv):
+            table[axis, k] = jacobian[foot, axis, k]
+        table[axis, nv + BIAS] = bias[foot, axis]
+        r = reference[foot, axis]
+        ahead, faster = r[0] - position[foot, axis], r[1] - velocity[foot, axis]
+        table[axis, nv + DESIRED] = r[2] + kp * ahead + kd * faster
+    ahead = furthest[foot] - position[foot, 0]
+    held = hold_p * ahead + hold_d * (hip_speed - velocity[foot, 0])
+    table[0, nv + DESIRED] = min(table[0, nv + DESIRED], held)

@@ -30,12 +30,14 @@ class Rows(NamedTuple):
         bias: (r,) dT/dt v.
         desired: (r,) wanted accelerations.
         weight: (r,) the task's ``weights``; one whose rows have a changing unit scales them by it.
+        table: (r, nv + 3) all of them, for compiled code; columns as in :class:`TaskStack`.
     """
 
     jacobian: Array
     bias: Array
     desired: Array
     weight: Array
+    table: Array
 
 
 class Task(Protocol):
@@ -75,8 +77,8 @@ class TaskStack:
         for task in tasks:
             part = self.table[first : first + len(task.weights)]
             first += len(part)
-            numbers = (part[:, nv + column] for column in (BIAS, DESIRED, WEIGHT))
-            rows = Rows(part[:, :nv], *numbers)
+            bias, desired, weight = (part[:, nv + i] for i in (BIAS, DESIRED, WEIGHT))
+            rows = Rows(part[:, :nv], bias, desired, weight, part)
             self._parts.append((task, rows))
 
     def write(self, robot: Biped, wanted: Wanted) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.hurry import Outlook, hurried
+from template_control.embedding.free.kernels import FREE
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.sideways import SIDES, Sideways
 from template_control.embedding.planners.planner import Decision, Planner, Planners
@@ -27,7 +28,6 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Event, Leg
 from template_control.slip.lateral.cycle import LateralWish
-from template_control.slip.lateral.kernels import LATERAL
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import Route
 from template_control.whole_body.solver import Solution, Stance
@@ -65,7 +65,7 @@ class FreeController(EmbeddingController):
     ) -> None:
         unscaled = options or FreeOptions()
         super().__init__(robot, planners, unscaled, route, automaton)
-        ready(LATERAL)
+        ready(FREE)
         wish = LateralWish(self.options.step_width)
         self.sideways = Sideways(self.parameters, unscaled.lateral, wish)
         self.turning: Callable[[float], float] = lambda time: 0.0

@@ -7,11 +7,10 @@ the trunk, and its mean settles beside the reference: the mean is regulated from
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-
-import numpy as np
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Share
@@ -49,7 +48,11 @@ class Lean(Checked):
 
     def at(self, speed: float) -> float:
         """The mean pitch [rad] at a speed [m/s]."""
-        return float(np.interp(speed, self.speeds, self.pitches))
+        after = bisect_right(self.speeds, speed)
+        if after in (0, len(self.speeds)):
+            return self.pitches[max(after - 1, 0)]
+        (near, far), (low, high) = (a[after - 1 : after + 1] for a in (self.speeds, self.pitches))
+        return low + (high - low) / (far - near) * (speed - near)
 
 
 def _leans() -> dict[str, Lean]:

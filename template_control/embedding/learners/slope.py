@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from itertools import combinations
+from math import atan
 from statistics import median
 from typing import Annotated
-
-import numpy as np
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Range
@@ -76,7 +75,7 @@ class SlopeEstimate:
         o = self.options
         (x, height), (before, below) = place, other
         if abs(x - before) > o.shortest * self._length:
-            last = float(np.arctan((height - below) / (x - before)))
+            last = atan((height - below) / (x - before))
             self.last = min(max(last, -o.steepest), o.steepest)
         self._places[-1] = other
         self._places.append(place)
@@ -85,7 +84,7 @@ class SlopeEstimate:
             for near, far in combinations(self._places, 2)
             if abs(far[0] - near[0]) > o.shortest * self._length
         ]
-        found = float(np.arctan(median(slopes))) if slopes else self.slope
+        found = atan(median(slopes)) if slopes else self.slope
         found = min(max(found, -o.steepest), o.steepest)
         if abs(found - self.slope) > o.change:
             self.slope = found

@@ -73,8 +73,8 @@ def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Ar
     return there
 
 
-@compiled
-def improve(
+@callee
+def step_between(
     end: Array, jacobian: Array, goal: Array, x: Array, prior: Array
 ) -> tuple[float, float, Array]:
     """One step towards the least |(end - aim) / tolerance|^2 + |(x - base) / change|^2.
@@ -106,3 +106,11 @@ def improve(
     for j in range(size):
         longest = max(longest, abs(there[j] - x[j]) / prior[1, j])
     return cost, longest, there
+
+
+@compiled
+def improve(
+    end: Array, jacobian: Array, goal: Array, x: Array, prior: Array
+) -> tuple[float, float, Array]:
+    """:func:`step_between` for Python."""
+    return step_between(end, jacobian, goal, x, prior)

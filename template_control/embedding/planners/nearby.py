@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.gauss_newton import improve
+from template_control.compiled import compiled
+from template_control.embedding.planners.gauss_newton import step_between
 from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
 from template_control.slip.maps.section import PADDED
 
@@ -43,6 +44,41 @@ class Linear(NamedTuple):
     by_controls: Array
 
 
+@compiled
+def improve_nearby(
+    linear: tuple[Array, Array, Array, Array, Array],
+    z: Array,
+    aim: Array,
+    tolerance: Array,
+    prior: Array,
+) -> tuple[float, Array, Array]:
+    """As :func:`~.gauss_newton.improve`, from a solution that is known, for another state.
+
+    Args:
+        linear: a :class:`Linear`; compiled code takes a plain tuple more quickly.
+        z: (n,) where the stride begins.
+        aim: (m,) where it should end.
+        tolerance: (m,) errors that count as 1.
+        prior: (4, f) base, change, lower and upper bounds of the free controls.
+
+    Returns:
+        The longest change of a control in units of its change; (f,) the controls; (m,) where they
+        lead, to first order.
+    """
+    known, x, end, by_state, by_controls = linear
+    m = end.shape[0]
+    there, goal = np.empty(m), np.empty((2, m))
+    for i in range(m):
+        there[i], goal[0, i], goal[1, i] = end[i], aim[i], tolerance[i]
+        for j in range(z.shape[0]):
+            there[i] += by_state[i, j] * (z[j] - known[j])
+    _, turn, better = step_between(there, by_controls, goal, x, prior)
+    for i in range(m):
+        for j in range(x.shape[0]):
+            there[i] += by_controls[i, j] * (better[j] - x[j])
+    return turn, better, there
+
+
 class _Solution:
     """A stride that was solved; its derivatives are not taken before a second one comes near."""
 
@@ -57,7 +93,7 @@ class _Solution:
             step, n, slots = stride.step, len(self.z), stride.slots
             m, columns = step.dimensions[1], np.array([*range(n), *(PADDED + s for s in slots)])
             end, jacobian, _ = step.derivatives(self.z, self.u, columns)
-            by_state, by_controls = jacobian[:m, :n], jacobian[:m, n:].copy()
+            by_state, by_controls = jacobian[:m, :n].copy(), jacobian[:m, n:].copy()
             self.linear = Linear(self.z, self.u[slots], end[:m], by_state, by_controls)
         return self.linear
 
@@ -116,11 +152,10 @@ class NearbyStrides:
         self, linear: Linear, z: Array, aim: Array, prior: Prior
     ) -> tuple[Array, Array] | None:
         """On the derivatives of a solution that is known; None where they do not hold."""
-        goal = np.array([aim, self.tolerance])
-        end = linear.end + linear.by_state @ (z - linear.z)
-        _, turn, x = improve(end, linear.by_controls, goal, linear.x, prior.table)
+        turn, x, end = improve_nearby(tuple(linear), z, aim, self.tolerance, prior.table)
         if turn > _TURN:
             return None
         u = prior.controls.copy()
-        u[prior.slots] = x
-        return u, end + linear.by_controls @ (x - linear.x)
+        for slot, value in zip(prior.slots, x.tolist(), strict=True):
+            u[slot] = value
+        return u, end

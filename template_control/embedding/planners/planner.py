@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Protocol, runtime_checkable
+from typing import Annotated, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +120,14 @@ class LandingPlanner(Planner, Protocol):
             target: (m,) state wanted at the section where the stride ends.
             free: slots of the stiffnesses that the rest depends on.
         """
+
+
+def lands(planner: Planner) -> TypeGuard[LandingPlanner]:
+    """Whether a planner is a :class:`LandingPlanner`.
+
+    ``isinstance`` goes through all members of a protocol, which is long in a tick.
+    """
+    return hasattr(planner, "land")
 
 
 @runtime_checkable

@@ -30,24 +30,34 @@ class Prior:
     Attributes:
         controls: (NUM_SLOTS,) u by Slot; those that are not free stay.
         slots: the f free ones.
-        base: (f,) their values.
-        change: (f,) changes that count as 1.
-        lower, upper: (f,) bounds.
+        table: (4, f) of these: their values, changes that count as 1, lower and upper bounds.
         rounds: Gauss-Newton steps.
     """
 
     controls: Array
     slots: list[int]
-    base: Array
-    change: Array
-    lower: Array
-    upper: Array
+    table: Array
     rounds: int
 
     @property
-    def table(self) -> Array:
-        """(4, f) base, change and bounds, as the compiled step takes them."""
-        return np.array([self.base, self.change, self.lower, self.upper])
+    def base(self) -> Array:
+        """(f,) values of the free controls."""
+        return self.table[0]
+
+    @property
+    def change(self) -> Array:
+        """(f,) changes that count as 1."""
+        return self.table[1]
+
+    @property
+    def lower(self) -> Array:
+        """(f,) lower bounds."""
+        return self.table[2]
+
+    @property
+    def upper(self) -> Array:
+        """(f,) upper bounds."""
+        return self.table[3]
 
 
 class StrideEnd(Protocol):

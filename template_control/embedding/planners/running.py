@@ -18,17 +18,17 @@ from template_control.checks.ranges import Index, Interval, NotNegative, Positiv
 from template_control.embedding.planners.nearby import NearbyStrides
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.regularised import FromSection, Prior
+from template_control.embedding.planners.running_limits import RunningLimits, aim_and_bounds
 from template_control.embedding.planners.within_reach import solve_within_reach
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import APEX, PADDED
+from template_control.slip.maps.section import PADDED
 from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
 
-_SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]
-_SAME = 1e-9  # rounding [m/s, m]
+_SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]  # the first three
 
 
 @dataclass(frozen=True)
@@ -107,10 +107,11 @@ class RunningPlanner:
         self._map = ReturnMap(gait.parameters, gait.stride)
         o = self.options
         self._grid = 0.5 * o.pace
-        # As arrays at once: a plan has little time.
-        self._rise = np.array([o.pace, o.climb])
-        self._drop = np.array([o.pace if o.brake is None else o.brake, o.climb])
-        self._believed = np.array([o.surprise_bound, o.offset_bound])
+        slower = o.pace if o.brake is None else o.brake
+        ranges = *o.angle_range, *o.stiffness_range, *o.change
+        reach = o.pace, o.climb, slower, o.climb
+        limits = RunningLimits(gait.parameters.rest_length, o.top_margin, *ranges, *reach)
+        self._limits = tuple(map(float, limits))
         self._strides = NearbyStrides(np.array(o.tolerance), o.near)
         # Compile now what a stride would otherwise wait for.
         self.decide(gait.apex)
@@ -129,17 +130,19 @@ class RunningPlanner:
             self.gait = self._family.at(float(target[0]))
         wanted = self.gait.apex if target is None else target
         near = self._near(z, wanted)
-        aim = np.minimum(np.maximum(wanted, z - self._drop), z + self._rise)
-        prior = self._prior(z, near, angles)
-        stride = FromSection(self._map, z, prior.slots)
+        legs = near.controls[: len(_SLOTS)]
+        numbers = wanted, self.offset, legs, angles, self._limits
+        goal, table, at_target = aim_and_bounds(z, *numbers)
+        prior = Prior(near.controls, _SLOTS, table, self.options.rounds)
+        stride = FromSection(self._map, z, _SLOTS)
 
         def solve(goal: Array) -> tuple[Array, Array | None]:
             return self._strides.solve(stride, goal, prior)
 
-        u, end = solve_within_reach(solve, z, aim - self.offset[:2], self.options.miss)
+        u, end = solve_within_reach(solve, z, goal, self.options.miss)
         completed = end is not None
-        predicted = APEX.padded(z if end is None else end) + self.offset
-        at_target = bool(abs(wanted[0] - aim[0]) < _SAME and abs(wanted[1] - aim[1]) < _SAME)
+        predicted = self.offset.copy()
+        predicted[:2] += z if end is None else end
         return Decision(u, predicted, completed, completed, completed and at_target)
 
     def _near(self, z: Array, wanted: Array) -> RunningGait:
@@ -148,34 +151,12 @@ class RunningPlanner:
             return self._family.at(float(wanted[0]))
         return self._family.at(self._grid * round(float(z[0]) / self._grid))
 
-    def _prior(self, z: Array, near: RunningGait, angles: tuple[float, float]) -> Prior:
-        """Controls of the near gait, and how far from them the stride's may be."""
-        o, p = self.options, self.gait.parameters
-        base = near.controls[_SLOTS].tolist()
-        alpha, before, after = base
-        top = float(np.arcsin(min(z[1] / p.rest_length, 1.0))) - o.top_margin
-        low, high = (
-            min(max(min(alpha + turn, top), angles[0]), angles[1], top) for turn in o.angle_range
-        )
-        softest, stiffest = o.stiffness_range
-        turn, sooner, later = o.change
-        # In Python's numbers, and as arrays at once: numpy's calls took longer than the algebra.
-        least = low, softest * before, softest * after
-        most = high, stiffest * before, stiffest * after
-        table = (
-            [min(max(x, a), b) for x, a, b in zip(base, least, most, strict=True)],
-            (turn, sooner * before, later * after),
-            least,
-            most,
-        )
-        start, change, lower, upper = np.array(table)
-        return Prior(near.controls, _SLOTS, start, change, lower, upper, o.rounds)
-
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal strides teach."""
         if not (decision.feasible and decision.nominal):
             return
-        limit, bound = self._believed
-        surprise = np.minimum(np.maximum(z - decision.predicted[:2], -limit), limit)
-        offset = self.offset[:2] + self.options.offset_gain * surprise
-        self.offset[:2] = np.minimum(np.maximum(offset, -bound), bound)
+        o, come, told = self.options, z.tolist(), decision.predicted.tolist()
+        for i, (limit, bound) in enumerate(zip(o.surprise_bound, o.offset_bound, strict=True)):
+            surprise = min(max(come[i] - told[i], -limit), limit)
+            offset = self.offset.item(i) + o.offset_gain * surprise
+            self.offset[i] = min(max(offset, -bound), bound)

@@ -157,7 +157,8 @@ class TransitionPlanner:
         stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE]
         base = controls[stiff]
         lower, upper = (share * base for share in o.again_bounds)
-        prior = Prior(controls.copy(), stiff, base, o.again * base, lower, upper, o.rounds)
+        table = np.array([base, o.again * base, lower, upper])
+        prior = Prior(controls.copy(), stiff, table, o.rounds)
         tolerance = np.array(o.tolerance)[: len(target)]
         u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
         return self._decision(u, end, target)
@@ -183,7 +184,7 @@ class TransitionPlanner:
         change = np.where(turns, o.broken_turn, o.again * base)
         u = controls.copy()
         u[own] = gait.controls[[chosen[slot] for slot in own]]
-        prior = Prior(u, slots, base, change, lower, upper, o.rounds)
+        prior = Prior(u, slots, np.array([base, change, lower, upper]), o.rounds)
         tolerance = np.array(o.tolerance)[: len(target)]
         u, end = solve_stride(FromHere(ahead, slots), target, prior, tolerance)
         return self._decision(u, end, target)
@@ -209,4 +210,5 @@ class TransitionPlanner:
         upper[turns] = np.minimum(upper[turns], top)
         lower[turns] = np.minimum(lower[turns], upper[turns])
         change = np.array(o.change) * np.where(turns, 1.0, base)
-        return Prior(controls, slots, np.clip(base, lower, upper), change, lower, upper, o.rounds)
+        table = np.array([np.clip(base, lower, upper), change, lower, upper])
+        return Prior(controls, slots, table, o.rounds)

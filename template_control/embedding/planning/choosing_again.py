@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.planner import Decision, LandingPlanner, PricingPlanner
+from template_control.embedding.planners.planner import Decision, PricingPlanner, lands
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.planning.unexpected_ground import choose_legs
 from template_control.embedding.section_report import SectionReport
@@ -69,7 +69,7 @@ def stiffnesses(
         None of a planner that has no ``land``.
     """
     planner = rest.planners.of(report.goal)
-    if not isinstance(planner, LandingPlanner):
+    if not lands(planner):
         return None
     free = free_controls(rest.automaton, node)
     return planner.land(rest.ahead(node, sensed), report.decision, report.goal.target, free)

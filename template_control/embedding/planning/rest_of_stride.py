@@ -158,12 +158,12 @@ class RestOfStride:
         Returns:
             None where the template cannot have come from there.
         """
-        x, y, dx, dy = sensed.state
+        x, y, dx, dy = sensed.state.tolist()
         before = self.automaton.before(node.name)
         u = controls.copy()
         if before.rear is not None and node.rear is not None:
             u[before.rear] = u[node.rear]
-        mirrored = [sensed.toes[0] - x, y, dx, -dy]
+        mirrored = [float(sensed.toes[0]) - x, y, dx, -dy]
         past = self._mirrored.run(before.name, mirrored, u)
         if not past.completed:
             return None

@@ -117,8 +117,10 @@ class StridePath(PlannedPath):
         self, node: Node, state: Array, sensed: Sensed, now: float, angle_drop: float = 0.0
     ) -> Node:
         report = self.reports[-1]
-        u = report.decision.controls.copy()
-        u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
+        u = report.decision.controls
+        if angle_drop:
+            u = u.copy()
+            u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
         self.reaching = angle_drop > 0.0
         if node.name in self.curved:
             self.reports[-1], first = follow_curve(self._rest, node.name, sensed, state, report)

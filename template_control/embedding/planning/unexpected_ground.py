@@ -96,7 +96,8 @@ def choose_legs(
     base = nominal[stiff]
     lower, upper = (share * base for share in o.bounds)
     now = np.clip(controls[stiff], lower, upper)
-    prior = Prior(controls.copy(), stiff, now, o.change * base, lower, upper, o.rounds)
+    table = np.array([now, o.change * base, lower, upper])
+    prior = Prior(controls.copy(), stiff, table, o.rounds)
     u, end = solve_stride(FromHere(ahead, stiff), target, prior, np.array(o.tolerance))
     if price is not None:
         u, end = _cheapest(u, end, prior, ahead, _Pricing(price, nominal[stiff], o))

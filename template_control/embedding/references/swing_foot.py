@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, sqrt
+from functools import cached_property
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,12 @@ class SwingOptions(Checked):
     drop_acceleration: Positive = tuned(10.0, ACCELERATION)
     leg_share: Share = tuned(0.98)
 
+    @cached_property
+    def shape(self) -> tuple[float, float, float, float, float, float]:
+        """What :func:`swing_step` takes of it: a tuple, which is quick to hand over."""
+        descent = inf if self.descent is None else self.descent
+        return self.clearance, self.rise, descent, self.landing_speed, self.horizon, self.early
+
 
 @compiled
 def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
@@ -80,22 +87,41 @@ def quintic_step(state: Array, target: float, speed: float, time: float, dt: flo
 
 
 @compiled
-def two_quintic_steps(
+def swing_step(
     x: Array,
     y: Array,
-    x_end: tuple[float, float, float],
-    y_end: tuple[float, float, float],
+    foothold: tuple[float, float, float],
+    shape: tuple[float, float, float, float, float, float],
+    so_far: tuple[float, float],
     dt: float,
 ) -> None:
-    """Advance two coordinates as :func:`quintic_step` does; one call takes half the time of two.
+    """Advance a foot's reference by ``dt`` towards its foothold.
 
     Args:
         x, y: (3,) position, velocity, acceleration of either [m, m/s, m/s^2]; overwritten.
-        x_end, y_end: target [m], velocity there [m/s], and time until then [s].
+        foothold: x and y of the foothold [m], and the time until the foot is due there [s].
+        shape: of the swing, from :attr:`SwingOptions.shape`.
+        so_far: time since the foot left the ground [s]; the height that it keeps at least [m].
         dt: how far to advance [s].
     """
-    _advance(x, x_end[0], x_end[1], x_end[2], dt)
-    _advance(y, y_end[0], y_end[1], y_end[2], dt)
+    place, ground, to_go = foothold
+    clearance, rise, descent, landing_speed, horizon, early = shape
+    if to_go <= horizon or not np.isfinite(place):
+        # Nearly there: hold the horizontal position, keep coming down.
+        x[1] = x[2] = y[2] = 0.0
+        y[1] = -landing_speed
+        y[0] -= landing_speed * dt
+        return
+    _advance(x, place, 0.0, max(to_go - early, horizon), dt)
+    top = max(ground + clearance, so_far[1])
+    rising = rise * to_go - (1.0 - rise) * so_far[0]
+    if rising > horizon:
+        _advance(y, top, 0.0, rising, dt)
+    elif to_go > descent:
+        # Up: stay there, and come to rest where the rise was cut short.
+        _advance(y, top, 0.0, max(2.0 * horizon, dt), dt)
+    else:
+        _advance(y, ground, -landing_speed, to_go, dt)
 
 
 @callee
@@ -155,21 +181,8 @@ class SwingFoot:
             dt: control period [s].
             ground: height of the foothold [m].
         """
-        o = self.options
-        top = max(ground + o.clearance, self._over)
-        if time_to_go <= o.horizon or not isfinite(foothold):
-            self._coast(dt)
-        else:
-            along = (foothold, 0.0, max(time_to_go - o.early, o.horizon))
-            rising = o.rise * time_to_go - (1.0 - o.rise) * self._elapsed
-            if rising > o.horizon:
-                up = (top, 0.0, rising)
-            elif o.descent is not None and time_to_go > o.descent:
-                # Up: stay there, and come to rest where the rise was cut short.
-                up = (top, 0.0, max(2.0 * o.horizon, dt))
-            else:
-                up = (ground, -o.landing_speed, time_to_go)
-            two_quintic_steps(self.x, self.y, along, up, dt)
+        aim, so_far = (foothold, ground, time_to_go), (self._elapsed, self._over)
+        swing_step(self.x, self.y, aim, self.options.shape, so_far, dt)
         self._elapsed += dt
 
     def meet_wall(self, position: Array, foothold: float, time_to_go: float, dt: float) -> None:
@@ -209,9 +222,3 @@ class SwingFoot:
         height = hip[1] - float(self.y[0])
         reach = self.options.leg_share * leg_length
         return hip[0] + sqrt(max(reach**2 - height**2, 0.0))
-
-    def _coast(self, dt: float) -> None:
-        """Nearly there: hold the horizontal position, keep coming down."""
-        for axis, speed in ((self.x, 0.0), (self.y, -self.options.landing_speed)):
-            axis[1], axis[2] = speed, 0.0
-            axis[0] += speed * dt

@@ -140,16 +140,17 @@ def join(strides: Sequence[Stride], options: PathOptions | None = None) -> Templ
     """
     meta = np.concatenate([stride.meta for stride in strides])
     coefficients = np.empty((2, len(meta), ORDER + 1))
+    np.concatenate([stride.cx for stride in strides], out=coefficients[0])
+    np.concatenate([stride.cy for stride in strides], out=coefficients[1])
     events, resets = [], []
     row, offset = 0, 0.0
     for stride in strides:
-        rows = slice(row, row + len(stride.meta))
-        meta[rows, 0] += offset
-        coefficients[0, rows], coefficients[1, rows] = stride.cx, stride.cy
-        for fired in stride.events:
-            events.append((offset + fired.time, fired.event))
-            resets.append((offset + fired.time, fired.reset))
-        row, offset = rows.stop, offset + stride.duration
+        if row:
+            meta[row : row + len(stride.meta), 0] += offset
+        for time, event, _, _, _, reset in stride.events:
+            events.append((offset + time, event))
+            resets.append((offset + time, reset))
+        row, offset = row + len(stride.meta), offset + stride.duration
     o = options or PathOptions()
     return TemplatePath(
         strides=tuple(strides),

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.hybrid import Automaton, Edge
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset, Slot
 from template_control.slip.dynamics.kernel import new_scratch, plain, record_stride
 from template_control.slip.dynamics.model import Kernel, kernel_model
@@ -159,8 +159,8 @@ def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
     array = np.array(values, dtype=float)
     if array.shape != (size,):
         raise ParameterError(f"{name} has shape {array.shape}: give {size} numbers")
-    # The product is much quicker, and not finite where a number is not.
-    if not isfinite(array @ array) and not np.isfinite(array).all():
+    # The sum is much quicker, and not finite where a number is not.
+    if not isfinite(sum(array.tolist())) and not np.isfinite(array).all():
         raise ParameterError(f"{name} is {array.tolist()}: give finite numbers")
     return array
 
@@ -189,7 +189,7 @@ class StrideSimulator:
         self._plain = tuple(self._scratch)
         self._names = tuple(node.name for node in automaton.nodes)
         # By numbers: to hash a member of an enumeration takes long.
-        self._edges = [{int(e.event): (e.event, e.reset) for e in n.edges} for n in automaton.nodes]
+        self._edges = [{int(e.event): _told(n.name, e) for e in n.edges} for n in automaton.nodes]
         self._kernels = {
             name: plain(Kernel(automaton.tables, *self._model, node=index))
             for name, index in automaton.index.items()
@@ -243,13 +243,17 @@ class StrideSimulator:
 
     def _fired(self, rows: Array) -> tuple[FiredEvent, ...]:
         """Events from the kernel's rows (n, 8): time, event, nodes left and entered, state."""
-        fired, names = [], self._names
+        fired, edges = [], self._edges
         for row, state in zip(rows.tolist(), rows[:, 4:8].copy(), strict=True):
-            source, target = int(row[2]), int(row[3])
-            event, reset = self._edges[source][int(row[1])]
-            entered = names[target] if target >= 0 else ""
-            fired.append(FiredEvent(row[0], event, names[source], entered, state, reset))
+            event, source, entered, reset = edges[int(row[2])][int(row[1])]
+            fired.append(FiredEvent(row[0], event, source, entered, state, reset))
         return tuple(fired)
+
+
+def _told(source: str, edge: Edge) -> tuple[Event, str, str, Reset]:
+    """What a :class:`FiredEvent` tells of an edge."""
+    entered = edge.target if isinstance(edge.target, str) else ""
+    return edge.event, source, entered, edge.reset
 
 
 @checked

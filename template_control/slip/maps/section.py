@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +41,11 @@ class Section:
         """Size n of the section's state."""
         return len(self.order)
 
+    @cached_property
+    def _places(self) -> NDArray[np.int64]:
+        """:attr:`order` as an array, which NumPy need not make of it each time."""
+        return np.array(self.order)
+
     @property
     def name(self) -> str:
         """``"VLO"``, ``"APEX"`` or ``"REST"``."""
@@ -47,7 +53,7 @@ class Section:
 
     def of(self, state: ArrayLike) -> Array:
         """The section's (n,) state of ``state`` (4 or more,) x, y, dx/dt, dy/dt; a copy."""
-        return np.asarray(state, dtype=float)[list(self.order)]
+        return np.asarray(state, dtype=float)[self._places]
 
     def state(self, z: ArrayLike, x: float = 0.0) -> Array:
         """The CoM's state (4,) x, y, dx/dt, dy/dt at section state ``z`` (n,).

@@ -72,15 +72,10 @@ def choose_rest(law: Law, costs: Array, ahead: Ahead, controls: Array, free: Seq
     softest = law.softest if slow else 0.0
     places = [place for place, slot in enumerate(law.slots) if place and slot in free]
     slots = [int(law.slots[place]) for place in places]
-    prior = Prior(
-        controls=controls,
-        slots=slots,
-        base=controls[slots],
-        change=law.stiffness / np.sqrt(costs[places]),
-        lower=np.maximum(law.lower[places], softest) * law.stiffness,
-        upper=law.upper[places] * law.stiffness,
-        rounds=_ROUNDS,
-    )
+    change = law.stiffness / np.sqrt(costs[places])
+    lower = np.maximum(law.lower[places], softest) * law.stiffness
+    upper = law.upper[places] * law.stiffness
+    prior = Prior(controls, slots, np.array([controls[slots], change, lower, upper]), _ROUNDS)
     root: Array = np.linalg.cholesky(law.cost).T.astype(np.float64)
     rest = FromHere(_Weighed(ahead, root), slots)
     u, weighed = solve_stride(rest, root @ law.target, prior, np.ones(3))

@@ -9,12 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.embedding.planners.gauss_newton import improve
+from template_control.embedding.planners.nearby import improve_nearby
+from template_control.embedding.planners.running_limits import (
+    RunningLimits,
+    aim_and_bounds,
+)
 from template_control.embedding.planners.walking.step_law import Law, Strain
 from template_control.embedding.planners.walking.step_search import Grid, Trust, choose
 from template_control.embedding.references.leg_forces import leg_forces
 from template_control.embedding.references.swing_foot import (
+    SwingOptions,
     quintic_step,
-    two_quintic_steps,
+    swing_step,
 )
 from template_control.embedding.references.template_path import LOCATE
 from template_control.robot.library import load_robot
@@ -27,6 +33,7 @@ from template_control.slip.dynamics.taylor import ORDER
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.whole_body.foot_task import follow_foot
 from template_control.whole_body.problem import (
     Matrices,
     assemble,
@@ -65,6 +72,8 @@ def whole_body() -> None:
     contact, tasks, out = np.zeros((1, 2, 4)), np.zeros((1, 5)), tuple(matrices)
     assemble(mass_matrix, bias, contact, tasks, costs, limits, out)
     torques(np.ones((1, 1)), np.zeros(1), np.ones(1), np.zeros(1))
+    feet, wish = np.zeros((2, 2)), (np.zeros((2, 2, 3)), np.zeros(2))
+    follow_foot(0, (feet, feet, np.zeros((2, 2, 2)), feet), wish, 0.0, (1.0,) * 4, np.zeros((2, 5)))
     follow(matrices.a_map, matrices.f_map, np.zeros(1), np.zeros(2), np.zeros(2))
 
 
@@ -109,12 +118,17 @@ def references() -> None:
         locate(coefficients, meta, np.ones(3), 0.1, 1.0, 0.0, np.zeros(6))
     leg_forces(meta[0], 0.1, np.ones(6), np.array([1.0, 1.0, 1.0, 0.0]), np.zeros((2, 2)))
     quintic_step(np.zeros(3), 0.1, 0.0, 1.0, 1e-3)
-    two_quintic_steps(np.zeros(3), np.zeros(3), (0.1, 0.0, 1.0), (0.1, 0.0, 1.0), 1e-3)
+    shape = SwingOptions().shape
+    swing_step(np.zeros(3), np.zeros(3), (0.1, 0.0, 1.0), shape, (0.0, 0.0), 1e-3)
 
 
 def catch() -> None:
-    """A planner's step towards a stride that a walk breaks into."""
-    improve(np.ones(1), np.ones((1, 1)), np.ones((2, 1)), np.ones(1), np.ones((4, 1)))
+    """The planner of the run that a walk breaks into."""
+    one, square, prior = np.ones(1), np.ones((1, 1)), np.ones((4, 1))
+    improve(one, square, np.ones((2, 1)), one, prior)
+    improve_nearby((one, one, one, square, square), one, one, one, prior)
+    apex, limits = np.ones(2), tuple(1.0 for _ in RunningLimits._fields)
+    aim_and_bounds(apex, apex, np.zeros(3), np.ones(3), (0.0, 1.0), limits)
 
 
 # The search calls the maps, so it comes after them; the others in order of their length.
