@@ -23,6 +23,7 @@ from .planners.default import default_planners as default_planners
 from .planners.planner import BreakingPlanner as BreakingPlanner
 from .planners.planner import CurvePlanner as CurvePlanner
 from .planners.planner import Decision as Decision
+from .planners.planner import ForgettingPlanner as ForgettingPlanner
 from .planners.planner import Free as Free
 from .planners.planner import LandingPlanner as LandingPlanner
 from .planners.planner import Planner as Planner
