@@ -112,5 +112,9 @@ def step_between(
 def improve(
     end: Array, jacobian: Array, goal: Array, x: Array, prior: Array
 ) -> tuple[float, float, Array]:
-    """:func:`step_between` for Python."""
+    """:func:`step_between` for Python; compiled functions call that.
+
+    Args:
+        The rest as in :func:`step_between`.
+    """
     return step_between(end, jacobian, goal, x, prior)
