@@ -5,6 +5,8 @@ Compiled, because numpy's calls for such small matrices took most of a plan's ti
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,48 +75,66 @@ def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Ar
     return there
 
 
-@callee
-def step_between(
-    end: Array, jacobian: Array, goal: Array, x: Array, prior: Array
-) -> tuple[float, float, Array]:
+class Linear(NamedTuple):
+    """A stride to first order.
+
+    Attributes:
+        z: (n,) where it begins.
+        x: (f,) its free controls.
+        end: (m,) where it ends.
+        by_state: (m, n) derivatives.
+        by_controls: (m, f) derivatives.
+    """
+
+    z: Array
+    x: Array
+    end: Array
+    by_state: Array
+    by_controls: Array
+
+
+@compiled
+def improve(
+    linear: tuple[Array, Array, Array, Array, Array],
+    z: Array,
+    aim: Array,
+    tolerance: Array,
+    prior: Array,
+) -> tuple[float, float, Array, Array]:
     """One step towards the least |(end - aim) / tolerance|^2 + |(x - base) / change|^2.
 
     Args:
-        end: (m,) where x leads.
-        jacobian: (m, f) derivatives of the end by x.
-        goal: (2, m) aim and tolerance.
-        x: (f,) present point.
+        linear: a :class:`Linear`; compiled code takes a plain tuple more quickly.
+        z: (n,) where the stride begins, near that of ``linear``.
+        aim: (m,) where it should end.
+        tolerance: (m,) errors that count as 1.
         prior: (4, f) base, change, lower and upper bounds.
 
     Returns:
-        The cost at x; the longest component of the step in units of its change; (f,) the next x.
+        The cost at x; the longest component of the step in units of its change; (f,) the next x;
+        (m,) where that leads, to first order.
     """
-    m, size = jacobian.shape
+    known, x, end, by_state, by_controls = linear
+    m, size = by_controls.shape
+    there = np.empty(m)
     rows, residual = np.zeros((m + size, size)), np.empty(m + size)
     cost = 0.0
     for i in range(m):
-        residual[i] = (end[i] - goal[0, i]) / goal[1, i]
+        there[i] = end[i]
+        for j in range(z.shape[0]):
+            there[i] += by_state[i, j] * (z[j] - known[j])
+        residual[i] = (there[i] - aim[i]) / tolerance[i]
         for j in range(size):
-            rows[i, j] = jacobian[i, j] / goal[1, i]
+            rows[i, j] = by_controls[i, j] / tolerance[i]
     for j in range(size):
         residual[m + j] = (x[j] - prior[0, j]) / prior[1, j]
         rows[m + j, j] = 1.0 / prior[1, j]
     for i in range(m + size):
         cost += residual[i] * residual[i]
-    there = bounded_step(rows, residual, x, prior[2], prior[3])
+    better = bounded_step(rows, residual, x, prior[2], prior[3])
     longest = 0.0
     for j in range(size):
-        longest = max(longest, abs(there[j] - x[j]) / prior[1, j])
-    return cost, longest, there
-
-
-@compiled
-def improve(
-    end: Array, jacobian: Array, goal: Array, x: Array, prior: Array
-) -> tuple[float, float, Array]:
-    """:func:`step_between` for Python; compiled functions call that.
-
-    Args:
-        The rest as in :func:`step_between`.
-    """
-    return step_between(end, jacobian, goal, x, prior)
+        longest = max(longest, abs(better[j] - x[j]) / prior[1, j])
+        for i in range(m):
+            there[i] += by_controls[i, j] * (better[j] - x[j])
+    return cost, longest, better, there

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from collections import deque
 from operator import gt, lt, sub
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import compiled
-from template_control.embedding.planners.gauss_newton import step_between
+from template_control.embedding.planners.gauss_newton import Linear, improve
 from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
 from template_control.slip.maps.section import PADDED
 
@@ -24,59 +22,6 @@ Array = NDArray[np.float64]
 _STEADY = 1.5  # a run that is to change its state by this many tolerances is not steady
 _TURN = 0.3  # controls this far from a solution's, in units of change, are another stride's
 _KEPT = 4  # solutions: of the stride that begins, as its foot lands, of the next, and one to come
-
-
-class Linear(NamedTuple):
-    """A stride about a solution, to first order.
-
-    Attributes:
-        z: (n,) where it begins.
-        x: (f,) its free controls.
-        end: (m,) where it ends.
-        by_state: (m, n) derivatives.
-        by_controls: (m, f) derivatives.
-    """
-
-    z: Array
-    x: Array
-    end: Array
-    by_state: Array
-    by_controls: Array
-
-
-@compiled
-def improve_nearby(
-    linear: tuple[Array, Array, Array, Array, Array],
-    z: Array,
-    aim: Array,
-    tolerance: Array,
-    prior: Array,
-) -> tuple[float, Array, Array]:
-    """As :func:`~.gauss_newton.improve`, from a solution that is known, for another state.
-
-    Args:
-        linear: a :class:`Linear`; compiled code takes a plain tuple more quickly.
-        z: (n,) where the stride begins.
-        aim: (m,) where it should end.
-        tolerance: (m,) errors that count as 1.
-        prior: (4, f) base, change, lower and upper bounds of the free controls.
-
-    Returns:
-        The longest change of a control in units of its change; (f,) the controls; (m,) where they
-        lead, to first order.
-    """
-    known, x, end, by_state, by_controls = linear
-    m = end.shape[0]
-    there, goal = np.empty(m), np.empty((2, m))
-    for i in range(m):
-        there[i], goal[0, i], goal[1, i] = end[i], aim[i], tolerance[i]
-        for j in range(z.shape[0]):
-            there[i] += by_state[i, j] * (z[j] - known[j])
-    _, turn, better = step_between(there, by_controls, goal, x, prior)
-    for i in range(m):
-        for j in range(x.shape[0]):
-            there[i] += by_controls[i, j] * (better[j] - x[j])
-    return turn, better, there
 
 
 class _Solution:
@@ -152,7 +97,7 @@ class NearbyStrides:
         self, linear: Linear, z: Array, aim: Array, prior: Prior
     ) -> tuple[Array, Array] | None:
         """On the derivatives of a solution that is known; None where they do not hold."""
-        turn, x, end = improve_nearby(tuple(linear), z, aim, self.tolerance, prior.table)
+        _, turn, x, end = improve(tuple(linear), z, aim, self.tolerance, prior.table)
         if turn > _TURN:
             return None
         u = prior.controls.copy()

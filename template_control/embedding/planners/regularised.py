@@ -146,7 +146,8 @@ def solve_stride(
         it.
     """
     u = prior.controls.copy()
-    goal, limits = np.array([aim, tolerance]), prior.table
+    wish, errors = np.array([aim, tolerance])
+    here, by_state = np.empty(0), np.empty((len(wish), 0))  # the state is what it is
     x = prior.base
     best: tuple[float, Array, Array] | None = None
     for number in range(prior.rounds + 1):
@@ -160,7 +161,8 @@ def solve_stride(
             else:
                 break
             continue
-        cost, longest, there = improve(end, jacobian, goal, x, limits)
+        linear = here, x, end, by_state, jacobian
+        cost, longest, there, _ = improve(linear, here, wish, errors, prior.table)
         if best is not None and cost >= best[0]:
             x = 0.5 * (x + best[1])
             continue

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.embedding.planners.gauss_newton import improve
-from template_control.embedding.planners.nearby import improve_nearby
 from template_control.embedding.planners.running_limits import (
     RunningLimits,
     aim_and_bounds,
@@ -125,8 +124,7 @@ def references() -> None:
 def catch() -> None:
     """The planner of the run that a walk breaks into."""
     one, square, prior = np.ones(1), np.ones((1, 1)), np.ones((4, 1))
-    improve(one, square, np.ones((2, 1)), one, prior)
-    improve_nearby((one, one, one, square, square), one, one, one, prior)
+    improve((one, one, one, square, square), one, one, one, prior)
     apex, limits = np.ones(2), tuple(1.0 for _ in RunningLimits._fields)
     aim_and_bounds(apex, apex, np.zeros(3), np.ones(3), (0.0, 1.0), limits)
 
