@@ -63,22 +63,22 @@ class StridePlanning(StridePath):
             state[:4] = section.state(start, state[0])
         node = self._follow(node, state, sensed, now)
         if not report.decision.lasting and not self.arrived:
-            return self._break(node, sensed, 0.0, now)
+            return self._break(node, sensed, 0.0, now) or node
         return node
 
-    def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
+    def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node | None:
         """Break into another stride where the present one cannot go on.
 
         Arguments as for :meth:`reconsider`.
 
         Returns:
-            The node that the robot is in then, with the path from there; ``node`` where the route
+            The node that the robot is in then, with the path from there; None where the route
             knows no other stride, or the template does not complete it.
         """
         turn = reachable_turn(self.options, self.due(Event.TOUCHDOWN) - phase_time)
         found = find_break(self._rest, node, self.reports[-1], sensed, (self._excess, turn))
         if found is None or not isinstance(self.route, BreakingRoute):
-            return node
+            return None
         self.reports[-1] = found.report
         self._broken = True
         self.route.take(found.goal)
@@ -146,7 +146,7 @@ class StridePlanning(StridePath):
         rest, report = self._rest, self.reports[-1]
         if self._broken:
             other = self._break(node, sensed, phase_time, now)
-            if self._planned_at == now:
+            if other is not None:
                 return other
             if not isinstance(self.planner, BreakingPlanner):
                 self.hold(choosing_again.stiffnesses(rest, node, sensed, report))
@@ -161,4 +161,6 @@ class StridePlanning(StridePath):
             self.hold(decision)
             lasting = decision is None or decision.lasting
         node = self.follow(node, sensed, now)
-        return node if lasting and self._whole else self._break(node, sensed, 0.0, now)
+        if lasting and self._whole:
+            return node
+        return self._break(node, sensed, 0.0, now) or node

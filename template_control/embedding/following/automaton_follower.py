@@ -6,6 +6,8 @@ feet, plans at every section, and plans again where a foot has landed or a distu
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -112,19 +114,27 @@ class AutomatonFollower:
         goal = self.planning.first_goal()
         return self.options.lean.pitch(goal, self.options.trunk_pitch)
 
-    def start(self, rear: int = 0, swung: tuple[float, float] | None = None) -> None:
+    def start(
+        self,
+        rear: int = 0,
+        swung: tuple[float, float] | None = None,
+        *,
+        first: tuple[Planner, Node] | None = None,
+    ) -> None:
         """Begin where the route begins; the robot's model must be up to date.
 
         Args:
             rear: the foot that is the rear leg's.
             swung: time since rear and front foot left the ground [s], for those in the air; None:
                 they are in the middle of their swings.
+            first: planner and node that ``planning.begin`` has returned for this run; None: it is
+                called here.
 
         Raises:
             ParameterError: if the route begins with a stride for which there is no planner.
         """
         section = self.planning.route.section
-        planner, node = self.planning.begin(section)
+        planner, node = first or self.planning.begin(section)
         self.learners.lean.reset()
         self.frame.reset()
         self._enter(node.name)
@@ -207,14 +217,12 @@ class AutomatonFollower:
         higher, s = self.sensing.land(leg), self.sensing.now
         if leans:
             self.planning.steady(self.node, s)
-        measured = s.state[2:].copy()
         if self.station.control.unhit:
-            s.state[2:] = self.sensing.unhit
+            s = replace(s, state=np.concatenate((s.state[:2], self.sensing.unhit)))
         if self.station.control.lands:
             self.planning.land(self.node, s, self.time)
         else:
             self._enter(self.planning.land_off(self.node, s, self.time, higher).name)
-        s.state[2:] = measured
         self.place.restart()
 
     def _feel_slope(self, foot: int) -> bool:

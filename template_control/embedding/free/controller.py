@@ -25,7 +25,7 @@ from template_control.embedding.references.swing_foot import quintic_step
 from template_control.parts import ready
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Event, Leg
 from template_control.slip.lateral.cycle import LateralWish
 from template_control.slip.maps.section import Section
@@ -70,11 +70,17 @@ class FreeController(EmbeddingController):
         self.sideways = Sideways(self.parameters, unscaled.lateral, wish)
         self.turning: Callable[[float], float] = lambda time: 0.0
 
-    def start(self, rear: int = 0, swung: tuple[float, float] | None = None) -> None:
+    def start(
+        self,
+        rear: int = 0,
+        swung: tuple[float, float] | None = None,
+        *,
+        first: tuple[Planner, Node] | None = None,
+    ) -> None:
         """As :meth:`~template_control.embedding.controller.EmbeddingController.start`."""
-        planner, _ = self.planning.begin(self.planning.route.section)
-        self.sideways.reset(planner.gait)
-        super().start(rear, swung)
+        first = first or self.planning.begin(self.planning.route.section)
+        self.sideways.reset(first[0].gait)
+        super().start(rear, swung, first=first)
 
     def tick(
         self,

@@ -82,7 +82,7 @@ class Free(Kind):
                 f"{self.robot.name} walks free: its run begins at VLO, without a pose"
             )
         z = route.start if o.start is None else np.array(o.start)
-        planner, _ = controller.planning.begin(VLO)
+        planner, node = controller.planning.begin(VLO)
         sideways, course = controller.sideways, o.course
         sideways.wish = LateralWish(
             course.step_width or sideways.wish.width,
@@ -104,7 +104,7 @@ class Free(Kind):
             pitch=controller.first_pitch(),
         )
         q, v = free_state_in(self.robot, pose)
-        controller.start(_REAR)
+        controller.start(_REAR, first=(planner, node))
         return q, v
 
     def plant(self, world: World) -> AbstractContextManager[Plant]:

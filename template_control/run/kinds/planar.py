@@ -68,7 +68,7 @@ class Planar(Kind):
                 " or take a free robot"
             )
         robot, route, pose = self.robot, controller.planning.route, o.pose
-        planner, node = controller.planning.begin(route.section)  # anew, if it was used before
+        first = planner, node = controller.planning.begin(route.section)
         z = route.start if o.start is None else np.array(o.start)
         if pose is None and route.section == APEX:
             pose = self._apex_pose(controller, z[: APEX.dimension], planner, node)
@@ -76,14 +76,14 @@ class Planar(Kind):
             pose = standing_pose(route.parameters)
         if pose is not None:
             q, v = state_in(robot, pose)
-            controller.start(pose.rear, pose.swung)
+            controller.start(pose.rear, pose.swung, first=first)
             return q, v
         # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
         shape = controller.swings.towards(controller.planning.first_goal())
         swing = np.array([0.0, shape.clearance])
         pitch = controller.first_pitch()
         q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
-        controller.start()
+        controller.start(first=first)
         return q, v
 
     def _apex_pose(
