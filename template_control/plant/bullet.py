@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
+from template_control.plant.agreement import check_mass_matrix
 from template_control.plant.bullet_bodies import ground_bodies, load_body
 from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import silenced
@@ -83,7 +84,7 @@ class BulletPlant:
         options: friction, physics step, mass error, ground.
 
     Raises:
-        RobotError: if PyBullet does not read the URDF, or reads another mass.
+        RobotError: if PyBullet does not read the URDF, or reads another robot.
 
     Attributes:
         client, body: PyBullet's handles of the world and the robot.
@@ -102,14 +103,15 @@ class BulletPlant:
         try:
             self.body = self._load()
             info = self._info()
+            by_name = {row[1].decode(): row[0] for row in info}
+            # Pinocchio sorts sibling joints by name, Bullet keeps the file's order.
+            self.joints = [by_name[name] for name in robot.model.names if name in by_name]
             self._compare_masses(info)
+            check_mass_matrix(robot, "PyBullet", self._mass_matrix)
         except RobotError:
             self.close()
             raise
-        by_name = {row[1].decode(): row[0] for row in info}
         by_link = {row[12].decode(): row[0] for row in info}
-        # Pinocchio sorts sibling joints by name, Bullet keeps the file's order.
-        self.joints = [by_name[name] for name in robot.model.names if name in by_name]
         self._actuated = [by_name[name] for name in robot.joint_names]
         self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
         self._trunk = self._trunk_link()
@@ -143,6 +145,20 @@ class BulletPlant:
                     f"{self.robot.path}: link {link!r} weighs {mass:g} kg in PyBullet and"
                     f" {told[link]:g} kg in the URDF: give it an <inertial> with its mass"
                 )
+
+    def _mass_matrix(self, q: Array) -> Array:
+        """PyBullet's (nv, nv) in the model's coordinates, at a configuration (nq,)."""
+        order = np.argsort(self.joints)
+        found = np.empty((self.robot.nv, self.robot.nv))
+        found[np.ix_(order, order)] = self._joint_space(q[order])
+        return found
+
+    def _joint_space(self, q: Array) -> Array:
+        """The same in PyBullet's own coordinates; ``q`` holds the joints in its own order."""
+        angles = q.tolist()
+        return np.array(
+            pybullet.calculateMassMatrix(self.body, angles, physicsClientId=self.client)
+        )
 
     def _configure(self, joints: int) -> None:
         p, c, body = pybullet, self.client, self.body

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
+from template_control.plant.agreement import check_mass_matrix
 from template_control.plant.bullet import AXES, PlantOptions
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.robot.biped import Biped
@@ -69,7 +70,7 @@ class MujocoPlant:
 
     Raises:
         ParameterError: if MuJoCo is not installed.
-        RobotError: if MuJoCo does not take the model.
+        RobotError: if MuJoCo does not take the model, or makes another robot of it.
 
     Attributes:
         model, data: MuJoCo's.
@@ -93,6 +94,16 @@ class MujocoPlant:
         self._feet = {shapes.index(f"{FOOT}{i}"): i for i in range(len(robot.feet))}
         self._trunk_shapes = {i for i, name in enumerate(shapes) if name.startswith(TRUNK)}
         self._force = np.zeros(6)
+        check_mass_matrix(robot, "MuJoCo", self._mass_matrix)
+
+    def _mass_matrix(self, q: Array) -> Array:
+        """MuJoCo's (nv, nv) in the model's coordinates, at a configuration (nq,)."""
+        self.reset(q, np.zeros(self.model.nv))
+        self._engine.mj_forward(self.model, self.data)
+        columns = np.zeros((self.model.nv, self.model.nv))
+        for unit, column in zip(np.eye(self.model.nv), columns, strict=True):
+            self._engine.mj_mulM(self.model, self.data, column, unit)
+        return columns / self.options.mass_scale
 
     def _text(self, robot: Biped) -> str:
         """The world as MJCF."""

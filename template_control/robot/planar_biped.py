@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.errors import RobotError
 from template_control.robot.biped import Biped, leg_joints, sagittal_length
+from template_control.robot.fixed_links import drop_world, gather_inertias
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planar_terms import PlanarTerms, gather, sources
 from template_control.robot.planarise import planarise
@@ -131,10 +132,12 @@ class PlanarBiped(Biped):
         """
         path = Path(path)
         tree = read_urdf(path)
+        drop_world(tree)
         if sagittal_joints:
             planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
         find_meshes(path, tree)
         check_shapes(path, tree)
+        gather_inertias(tree)
         write_out_massless(tree)
         urdf = ElementTree.tostring(tree, encoding="unicode")
         model = build_model(path, urdf)

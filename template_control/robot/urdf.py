@@ -18,7 +18,9 @@ from template_control.errors import RobotError
 
 Array = NDArray[np.float64]
 
-_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+"""Of an ``<inertia>``: the upper triangle, row by row."""
+
 _LIMITS = ("lower", "upper", "effort", "velocity")
 _SIZES = (
     ("box", "size", 3),
@@ -82,7 +84,7 @@ def write_out_massless(robot: ET.Element) -> None:
         if link.find("inertial") is None:
             inertial = ET.SubElement(link, "inertial")
             ET.SubElement(inertial, "mass", value="0")
-            ET.SubElement(inertial, "inertia", dict.fromkeys(_MOMENTS, "0"))
+            ET.SubElement(inertial, "inertia", dict.fromkeys(MOMENTS, "0"))
 
 
 def link_masses(urdf: str) -> dict[str, float]:
@@ -204,7 +206,7 @@ def _check_inertial(path: Path, link: ET.Element) -> None:
     if _numbers(f"{where}: mass", mass, "value", 1)[0] < 0.0:
         raise RobotError(f"{where}: mass has value {mass.get('value')!r}: give none below zero")
     xx, xy, xz, yy, yz, zz = (
-        _numbers(f"{where}: inertia", inertia, name, 1, "0")[0] for name in _MOMENTS
+        _numbers(f"{where}: inertia", inertia, name, 1, "0")[0] for name in MOMENTS
     )
     moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     slack = _ROUNDING * np.abs(moments).max()

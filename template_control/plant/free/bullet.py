@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 _BASE = -1  # PyBullet's index of the base link
 _POSITION = BASE_DOF + 1
+_ANGULAR_FIRST = (3, 4, 5, 0, 1, 2)  # places of a velocity's components, linear first
 
 
 class FreeBulletPlant(BulletPlant):
@@ -35,18 +36,28 @@ class FreeBulletPlant(BulletPlant):
         options: friction, physics step, mass error, step of the ground.
 
     Raises:
-        RobotError: if PyBullet does not read the URDF, or reads another mass.
+        RobotError: if PyBullet does not read the URDF, or reads another robot.
     """
 
     @checked
     def __init__(self, robot: FreeBiped, options: PlantOptions) -> None:
         super().__init__(robot, options)
-        found = pybullet.getDynamicsInfo(self.body, _BASE, physicsClientId=self.client)
-        self._inertial = _pose(found[3], found[4])
         self._away = self._inertial.inverse()
 
     def _load(self) -> int:
-        return load_body(self.robot, self.client, held=False)
+        body = load_body(self.robot, self.client, held=False)
+        found = pybullet.getDynamicsInfo(body, _BASE, physicsClientId=self.client)
+        self._inertial = _pose(found[3], found[4])
+        return body
+
+    def _mass_matrix(self, q: Array) -> Array:
+        # PyBullet's base: angular velocity first, about its CoM in its axes of inertia.
+        order = np.argsort(self.joints)
+        place = np.concatenate((_ANGULAR_FIRST, BASE_DOF + order))
+        found, turned = np.empty((self.robot.nv, self.robot.nv)), np.eye(self.robot.nv)
+        found[np.ix_(place, place)] = self._joint_space(q[_POSITION:][order])
+        turned[:BASE_DOF, :BASE_DOF] = self._inertial.toActionMatrixInverse()
+        return turned.T @ found @ turned
 
     def _trunk_link(self) -> int:
         return _BASE

@@ -33,7 +33,7 @@ class FreeMujocoPlant(MujocoPlant):
 
     Raises:
         ParameterError: if MuJoCo is not installed.
-        RobotError: if MuJoCo does not take the model.
+        RobotError: if MuJoCo does not take the model, or makes another robot of it.
     """
 
     @checked

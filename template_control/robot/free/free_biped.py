@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.robot.biped import Biped, sagittal_length
+from template_control.robot.fixed_links import drop_world, gather_inertias
 from template_control.robot.free.free_terms import BASE_DOF, FreeTerms, gather, sources
 from template_control.robot.free.requirements import check_free, set_limits, set_ranges
 from template_control.robot.meshes import find_meshes
@@ -148,6 +149,7 @@ class FreeBiped(Biped):
         """
         path = Path(path)
         tree = read_urdf(path)
+        drop_world(tree)
         if limits is not None:
             set_limits(tree, limits.torque, limits.velocity)
             if limits.ranges:
@@ -155,6 +157,7 @@ class FreeBiped(Biped):
         spheres(tree, feet, foot_radius)
         find_meshes(path, tree)
         check_shapes(path, tree)
+        gather_inertias(tree)
         write_out_massless(tree)
         urdf = ElementTree.tostring(tree, encoding="unicode")
         build_model(path, urdf)  # which tells what is wrong with it

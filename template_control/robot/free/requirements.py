@@ -14,6 +14,7 @@ from template_control.robot.biped import leg_joints
 from template_control.robot.free.free_terms import BASE_DOF
 from template_control.robot.requirements import UNLIMITED, check_feet, check_legs_apart
 
+_ROOT = 1  # Pinocchio's index of the free flyer
 _LATERAL = 2  # hip and knee, the last joints of a leg
 _LEAST, _MOST = 3, 4  # joints of a leg
 _CLOSE = 1e-6
@@ -94,6 +95,11 @@ def check_free(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
             )
     legs = leg_joints(model, feet, 1)
     check_legs_apart(path, feet, legs)
+    if model.inertias[_ROOT].mass <= 0.0:
+        raise RobotError(
+            f"{path}: the root link weighs nothing, and so does what is fixed to it: give the trunk"
+            " an <inertial> with its mass"
+        )
     axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[3:]
     for leg, foot in zip(legs, feet, strict=True):
         if not _LEAST <= len(leg) <= _MOST:

@@ -1,0 +1,220 @@
+"""What is simulated is the robot of the URDF: every engine lets it fall as Pinocchio does."""
+
+import re
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from template_control.errors import RobotError
+from template_control.plant.bullet import BulletPlant, PlantOptions
+from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.plant.free.mujoco import FreeMujocoPlant
+from template_control.plant.ideal import IdealOptions, IdealPlant
+from template_control.plant.mujoco import MujocoOptions, MujocoPlant
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.library import (
+    FREE_ROBOTS,
+    ROBOTS,
+    load_free_robot,
+    load_robot,
+    robot_path,
+)
+from template_control.robot.planar_biped import PlanarBiped
+
+DT = 1e-4  # [s]
+FALL = 0.1  # [s]
+FREE = {"pybullet": (FreeBulletPlant, PlantOptions), "mujoco": (FreeMujocoPlant, MujocoOptions)}
+PLANAR = {
+    "pybullet": (BulletPlant, PlantOptions),
+    "mujoco": (MujocoPlant, MujocoOptions),
+    "ideal": (IdealPlant, IdealOptions),
+}
+SAGITTAL = ("left_hip", "left_knee", "right_hip", "right_knee")
+FIXED = (
+    '<joint name="{0}_{1}" type="fixed"><origin xyz="{2}" rpy="{3}"/><parent link="{0}"/>'
+    '<child link="{1}"/></joint>'
+)
+BACKPACK = (
+    '<link name="backpack"><inertial><origin xyz="-0.1 0.02 0.05" rpy="0.4 0.3 -0.2"/>'
+    '<mass value="7.5"/><inertia ixx="0.3" ixy="0.02" ixz="-0.01" iyy="0.2" iyz="0.03"'
+    ' izz="0.25"/></inertial></link>'
+)
+
+
+def before_end(text, added):
+    return text.replace("</robot>", added + "</robot>")
+
+
+def on_footprint(text):
+    joint = FIXED.format("base_footprint", "trunk", "0.02 0 0.95", "0 0 0")
+    return before_end(text, '<link name="base_footprint"/>' + joint)
+
+
+def on_two_links(text):
+    """A trunk below two massless links, with another one's mass on its back."""
+    chain = '<link name="base_footprint"/><link name="base_link"/>' + BACKPACK
+    chain += FIXED.format("base_footprint", "base_link", "0 0 0.9", "0 0 0.3")
+    chain += FIXED.format("base_link", "trunk", "0.01 0 0.05", "0 0 -0.3")
+    chain += FIXED.format("trunk", "backpack", "-0.2 0.05 0.4", "0.1 -0.5 0.9")
+    return before_end(text, chain)
+
+
+def massless_thigh(text):
+    """The thigh's mass is in a link that is fixed to it."""
+    inertial = re.search(r'<link name="left_thigh">\s*(<inertial>.*?</inertial>)', text, re.S)[1]
+    moved = f'<link name="motor">{inertial}</link>'
+    moved += FIXED.format("left_thigh", "motor", "0 0 0", "0 0 0")
+    return before_end(text.replace(inertial, "", 1), moved)
+
+
+def floating(text):
+    joint = '<joint name="j" type="floating"><parent link="world"/><child link="trunk"/></joint>'
+    return before_end(text, '<link name="world"/>' + joint)
+
+
+KINDS = {
+    "footprint": on_footprint,
+    "two links": on_two_links,
+    "thigh": massless_thigh,
+    "world": floating,
+    "world and footprint": lambda text: floating(on_footprint(text)).replace(
+        'type="floating"><parent link="world"/><child link="trunk"/>',
+        'type="floating"><parent link="world"/><child link="base_footprint"/>',
+    ),
+}
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(change):
+        path = tmp_path / "robot.urdf"
+        path.write_text(change(robot_path("five-link-3d").read_text()))
+        return path
+
+    return write
+
+
+def falls_as_pinocchio_says(robot, plant, seed=3):
+    """Let a robot fall, its joints moving, and compare with the model's own fall."""
+    rng = np.random.default_rng(seed)
+    q, nu = robot.neutral(), len(robot.joint_names)
+    middle = np.clip(robot.joint_range.mean(axis=1), -1.0, 1.0)
+    q[-nu:] = middle + rng.uniform(-0.1, 0.1, nu)
+    q[1 if robot.base_dof == 3 else 2] = 5.0
+    v = np.concatenate([rng.uniform(-0.5, 0.5, robot.base_dof), rng.uniform(-1, 1, nu)])
+    torque = 0.005 * robot.mass * rng.uniform(-1.0, 1.0, nu)
+    with plant:
+        plant.reset(q, v)
+        for _ in range(round(FALL / DT)):
+            plant.step(torque)
+        found_q, found_v = robot.neutral(), np.zeros(robot.nv)
+        plant.read(found_q, found_v)
+    data, drive = robot.model.createData(), np.concatenate([np.zeros(robot.base_dof), torque])
+
+    def rate(q, v):
+        return pin.aba(robot.model, data, q, v, drive)
+
+    h = 1e-3
+    for _ in range(round(FALL / h)):  # the classical Runge-Kutta method
+        a1 = rate(q, v)
+        v2 = v + 0.5 * h * a1
+        a2 = rate(pin.integrate(robot.model, q, 0.5 * h * v), v2)
+        v3 = v + 0.5 * h * a2
+        a3 = rate(pin.integrate(robot.model, q, 0.5 * h * v2), v3)
+        v4 = v + h * a3
+        a4 = rate(pin.integrate(robot.model, q, h * v3), v4)
+        q = pin.integrate(robot.model, q, h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4))
+        v = v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    assert v[1 if robot.base_dof == 3 else 2] < -0.3  # it fell
+    np.testing.assert_allclose(pin.difference(robot.model, q, found_q), 0.0, atol=3e-4)
+    np.testing.assert_allclose(found_v, v, atol=3e-3)
+
+
+@pytest.mark.parametrize("engine", FREE)
+@pytest.mark.parametrize("name", FREE_ROBOTS)
+def test_a_shipped_free_robot_falls_as_its_model(name, engine):
+    plant, options = FREE[engine]
+    robot = load_free_robot(name)
+    falls_as_pinocchio_says(robot, plant(robot, options(time_step=DT)))
+
+
+@pytest.mark.parametrize("engine", PLANAR)
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_shipped_planar_robot_falls_as_its_model(name, engine):
+    plant, options = PLANAR[engine]
+    robot = load_robot(name)
+    falls_as_pinocchio_says(robot, plant(robot, options(time_step=DT)))
+
+
+@pytest.mark.parametrize("engine", FREE)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_massless_root_link_falls_with_the_trunk(written, kind, engine):
+    plant, options = FREE[engine]
+    robot = FreeBiped.from_urdf(written(KINDS[kind]))
+    falls_as_pinocchio_says(robot, plant(robot, options(time_step=DT)))
+
+
+@pytest.mark.parametrize("engine", PLANAR)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_massless_root_link_falls_with_the_trunk_in_its_plane(written, kind, engine):
+    plant, options = PLANAR[engine]
+    robot = PlanarBiped.from_urdf(written(KINDS[kind]), sagittal_joints=SAGITTAL)
+    falls_as_pinocchio_says(robot, plant(robot, options(time_step=DT)))
+
+
+@pytest.mark.parametrize("kind", ["footprint", "two links"])
+def test_a_push_acts_on_the_whole_trunk(written, kind):
+    robot = PlanarBiped.from_urdf(written(KINDS[kind]), sagittal_joints=SAGITTAL)
+    ends = []
+    for plant, options in PLANAR.values():
+        q, v = robot.neutral(), np.zeros(robot.nv)
+        q[1], q[4], q[6] = 5.0, 0.5, 0.5  # off the knees' stops
+        with plant(robot, options(time_step=DT)) as world:
+            world.reset(q, v)
+            for _ in range(200):
+                world.step(np.zeros(4), 500.0)
+            world.read(q, v)
+        ends.append(v)
+    assert abs(ends[0][2]) > 0.02
+    np.testing.assert_allclose(ends[1:], [ends[0]] * 2, atol=2e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_masses_and_centre_are_those_of_the_file(written, kind):
+    made = FreeBiped.from_urdf(written(KINDS[kind]))
+    model = pin.buildModelFromXML(KINDS[kind](robot_path("five-link-3d").read_text()).replace(
+        "floating", "fixed"), pin.JointModelFreeFlyer())  # fmt: skip
+    q = pin.neutral(model)
+    assert made.mass == pytest.approx(pin.computeTotalMass(model), rel=1e-12)
+    np.testing.assert_allclose(
+        made.space.com, pin.centerOfMass(model, model.createData(), q), atol=1e-12
+    )
+    assert made.feet == ("left_foot", "right_foot")
+
+
+def test_a_trunk_that_weighs_nothing_at_all_is_refused(written):
+    def empty(text):
+        return re.sub(r'(<link name="trunk">)\s*<inertial>.*?</inertial>', r"\1", text, flags=re.S)
+
+    with pytest.raises(RobotError, match="the root link weighs nothing"):
+        FreeBiped.from_urdf(written(empty))
+
+
+@pytest.mark.parametrize("plant", [BulletPlant, MujocoPlant])
+def test_another_robot_in_the_engine_is_refused(monkeypatch, plant):
+    """The engine is given another shank: longer by 1 mm in the text, or in the model."""
+    robot, other = load_robot("five-link"), load_robot("five-link")
+    text = robot.urdf.replace('0 0 -0.45"', '0 0 -0.451"', 1)
+    assert text != robot.urdf
+    robot.urdf = text
+    monkeypatch.setattr("template_control.plant.mujoco.mjcf", lambda *_: changed_mjcf(other))
+    options = PlantOptions() if plant is BulletPlant else MujocoOptions()
+    with pytest.raises(RobotError, match="another mass matrix than the model at"):
+        plant(robot, options)
+
+
+def changed_mjcf(robot):
+    from template_control.plant.mjcf import mjcf
+
+    return mjcf(robot, MujocoOptions(), 4e-3).replace("-0.45", "-0.451", 1)
