@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from template_control.errors import RobotError
+from template_control.plant.c_locale import decimal_points
 from template_control.plant.quiet import silenced
 from template_control.plant.terrain.pieces import pieces
 from template_control.plant.terrain.terrain import Terrain
@@ -38,9 +39,10 @@ def load_body(robot: Biped, client: int, held: bool = True) -> int:
         path = Path(folder) / "robot.urdf"
         path.write_bytes(ElementTree.tostring(tree, encoding="utf-8"))
         try:
-            body = pybullet.loadURDF(
-                str(path), useFixedBase=held, flags=_FLAGS, physicsClientId=client
-            )
+            with decimal_points():
+                body = pybullet.loadURDF(
+                    str(path), useFixedBase=held, flags=_FLAGS, physicsClientId=client
+                )
         except pybullet.error as error:
             raise RobotError(f"PyBullet does not read {robot.path} ({error}): change it") from None
     return int(body)
