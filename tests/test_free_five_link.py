@@ -206,7 +206,7 @@ MISTAKES = {
     "the legs do not reach a CoM height of …": lambda _: start(
         load_free_robot("five-link-3d"), 1.4
     ),
-    "needs joints beyond their limits": lambda _: start(
+    "a start at height … needs joint … beyond its limits": lambda _: start(
         limited(((-0.5, 0.5), (-1.0, 1.0), (0.0, 0.3)))
     ),
 }

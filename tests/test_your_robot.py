@@ -84,16 +84,13 @@ MISTAKES = {
     "has no foot link …": feet("left_foot", "toe"),
     "feet were named for … a biped has two": feet("left_foot"),
     "must have one sphere as collision shape": bolt(radius=None),
-    "from the link's origin: put the origin into its centre": changed(
-        SPHERE, SPHERE.replace("<geometry>", '<origin xyz="0 0 -0.02"/><geometry>')
-    ),
     "the feet have different radii": changed(SPHERE, SPHERE.replace("0.01", "0.02"), 1),
     "has no joint …": bolt((*BOLT_JOINTS[:3], "KFE")),
     "turns about … and not about the lateral axis y": bolt((*BOLT_JOINTS[:3], "FR_HAA")),
     "the legs do not reach a CoM height of …": lambda _: walk(
         tc.load_robot("five-link"), (1.1, 1.3, 0.0)
     ),
-    "needs joints beyond limits": lambda folder: walk(
+    "a start at height … needs joint … beyond its limits": lambda folder: walk(
         changed('lower="0" upper="2.5"', 'lower="0" upper="0.3"')(folder)
     ),
     "… is …: give a positive number": linked,

@@ -202,7 +202,7 @@ class IdealPlant:
         """Generalised forces less nonlinear effects at the robot's last update."""
         right = self._drive - self.robot.nonlinear_effects
         if self._push:
-            x, _, z = self.robot.model.inertias[BASE_DOF].lever
+            x, _, z = self.robot.trunk_lever
             right[0] += self._push
             right[2] += self._push * (z * cos(q[2]) - x * sin(q[2]))
         return right

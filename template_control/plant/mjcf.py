@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.terrain.pieces import pieces
 from template_control.plant.trunk_box import trunk_corners
-from template_control.robot.biped import Biped
+from template_control.robot.biped import Biped, foot_frame
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF, UNLIMITED
 
@@ -119,6 +119,9 @@ def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
     """One body for each link that has mass, with the joints that lead to it."""
     model = robot.model
     axes = _axes(model)
+    # MuJoCo weighs a contact's give by the robot's pose with all joints at their `ref`.
+    data, neutral = model.createData(), robot.neutral()
+    pin.forwardKinematics(model, data, neutral)
     bodies: dict[int, Element] = {0: ground}
     waiting: dict[int, list[int]] = {0: []}  # joints above a link, which has no body of its own
     for joint in range(1, model.njoints):
@@ -129,21 +132,22 @@ def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
             continue
         pose = pin.SE3.Identity()
         for above in chain:
-            pose = pose * model.jointPlacements[above]
+            pose = pose * data.liMi[above]
         name = TRUNK if joint == BASE_DOF else model.names[joint] + " link"
         body = add(bodies[parent], "body", name=name, **place(pose))
         here = pose.inverse()
         for above in chain:
-            here = here * model.jointPlacements[above]
-            _add_joint(body, model, above, here, axes[:, above - 1])
-        _add_inertia(body, model.inertias[joint], mass_scale)
+            here = here * data.liMi[above]
+            _add_joint(body, model, above, here, axes[:, above - 1], ref=float(neutral[above - 1]))
+        _add_inertia(body, model.inertias[joint], axes[3:, joint - 1], mass_scale)
         bodies[joint] = body
     for i, foot in enumerate(robot.feet):
-        frame = model.frames[model.getFrameId(foot)]
+        frame = model.frames[foot_frame(model, foot)]
         centre = text(frame.placement.translation)
         add_ball(bodies[frame.parentJoint], f"{FOOT}{i}", centre, robot.foot_radius)
     for i, (x, z) in enumerate(trunk_corners(robot).T):
-        add_ball(bodies[BASE_DOF], f"{TRUNK}{i}", text((x, 0.0, z)), _CORNER)
+        centre = text(np.array((x, 0.0, z)) @ robot.trunk_axes)
+        add_ball(bodies[BASE_DOF], f"{TRUNK}{i}", centre, _CORNER)
 
 
 def _axes(model: pin.Model) -> Array:
@@ -163,14 +167,17 @@ def place(pose: pin.SE3) -> dict[str, str]:
     return {"pos": text(pose.translation), "quat": text((w, x, y, z))}
 
 
-def _add_joint(body: Element, model: pin.Model, joint: int, here: pin.SE3, axis: Array) -> None:
-    """A joint of a body; ``here`` is its frame in the body's."""
+def _add_joint(
+    body: Element, model: pin.Model, joint: int, here: pin.SE3, axis: Array, *, ref: float
+) -> None:
+    """A joint of a body; ``here`` is its frame in the body's where its angle is ``ref``."""
     hinge = bool(np.any(axis[3:]))
     about = {
         "name": model.names[joint],
         "type": "hinge" if hinge else "slide",
         "axis": text(here.rotation @ (axis[3:] if hinge else axis[:3])),
         "pos": text(here.translation),
+        "ref": repr(ref),
     }
     low, high = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
     if joint > BASE_DOF and max(abs(low), abs(high)) < UNLIMITED:
@@ -178,10 +185,10 @@ def _add_joint(body: Element, model: pin.Model, joint: int, here: pin.SE3, axis:
     add(body, "joint", **about)
 
 
-def _add_inertia(body: Element, inertia: pin.Inertia, scale: float) -> None:
-    # The robot turns about y only, where any rotation leaves the inertia as it is. MuJoCo refuses
-    # the flat inertias of a planar model, in which the other two axes have none.
-    about_y = scale * inertia.inertia[1, 1]
+def _add_inertia(body: Element, inertia: pin.Inertia, axis: Array, scale: float) -> None:
+    # The robot turns about the axis of its hinges only, where any rotation leaves the inertia as it
+    # is. MuJoCo refuses the flat inertias of a planar model, in which the other two axes have none.
+    about_y = scale * (axis @ inertia.inertia @ axis)
     add(
         body,
         "inertial",

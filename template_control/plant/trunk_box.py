@@ -13,7 +13,7 @@ from template_control.robot.requirements import BASE_DOF
 
 
 def trunk_corners(robot: PlanarBiped) -> NDArray[np.float64]:
-    """x and z (2, n) of the corners of boxes around the trunk's shapes, in its frame [m]."""
+    """x and z (2, n) of the corners of boxes around the upright trunk's shapes [m]."""
     geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.GeometryType.COLLISION)
     corners = []
     for shape in geometry.geometryObjects:
@@ -22,5 +22,6 @@ def trunk_corners(robot: PlanarBiped) -> NDArray[np.float64]:
         shape.geometry.computeLocalAABB()
         box = shape.geometry.aabb_local
         for corner in product(*zip(box.min_, box.max_, strict=True)):
-            corners.append(shape.placement.act(np.array(corner))[[0, 2]])
+            point = robot.trunk_axes @ shape.placement.act(np.array(corner))
+            corners.append(point[[0, 2]])
     return np.array(corners).reshape(-1, 2).T

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.errors import ParameterError
+from template_control.errors import ParameterError, RobotError
+from template_control.robot.legs import HINGES, middle, straight_legs
 
 Array = NDArray[np.float64]
 
+_BENT = np.array([-0.4, 0.8])  # of hip and knee [rad]
+_CENTRE = " sphere's centre"  # ends a frame's name
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
@@ -44,6 +47,8 @@ class Biped(ABC):
         joint_range: (nu, 2) URDF ``lower`` and ``upper`` [rad].
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
         leg_length: from hip to the foot sphere's centre with a straight knee [m].
+        joint_sign: (nu,) 1 of a hip or knee that turns about +y, -1 about -y; of joints above the
+            hip the sign of their axis' y.
         leg_mass: of the heavier leg [kg].
         trunk_com: height of the trunk's own CoM above the hips [m].
 
@@ -87,6 +92,7 @@ class Biped(ABC):
     joint_range: Array
     legs: tuple[tuple[int, ...], ...]
     leg_length: float
+    joint_sign: Array
     leg_mass: float
     trunk_com: float
     mass_matrix: Array
@@ -133,9 +139,12 @@ class Biped(ABC):
         self.joint_range = np.column_stack(limits)[-nu:]
         self.joint_angle = np.zeros(nu)
         self.fastest, self.soonest_stop = 0.0, np.inf
-        self._foot_ids = tuple(model.getFrameId(foot) for foot in feet)
+        self._foot_ids = tuple(foot_frame(model, foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
+        straight = straight_legs(model, self._leg_joints, self._foot_ids)
+        self.leg_length, self._neutral = straight.length, straight.q
+        self.joint_sign = np.sign(straight.axes[1, self.base_dof :])
         self.leg_mass = max(
             float(sum(model.inertias[j].mass for j in leg)) for leg in self._leg_joints
         )
@@ -190,9 +199,24 @@ class Biped(ABC):
             ParameterError: if a value is NaN or infinite.
         """
 
-    @abstractmethod
     def neutral(self) -> Array:
         """(nq,) upright, with straight vertical legs."""
+        return self._neutral.copy()
+
+    def bent(self, backward: bool = False) -> Array:
+        """(nq,) as :meth:`neutral`, with bent legs: knees ahead, unless their range is behind.
+
+        Args:
+            backward: bend them the other way.
+        """
+        q = self.neutral()
+        for leg in self._leg_joints:
+            joints = leg[-HINGES:]
+            places = [self.model.idx_qs[joint] for joint in joints]
+            sign = self.joint_sign[[self.model.idx_vs[joint] - self.base_dof for joint in joints]]
+            ahead = sign[-1] * (middle(self.model, joints[-1]) - q[places[-1]]) >= 0.0
+            q[places] += (1.0 if ahead != backward else -1.0) * sign * _BENT
+        return q
 
     @abstractmethod
     def moved(self, q: Array, step: Array) -> Array:
@@ -232,14 +256,31 @@ class Biped(ABC):
         """Angle of the trunk from the upright [rad], at the last update."""
 
 
-def sagittal_length(placement: pin.SE3) -> float:
-    """Length of a placement's translation in the x-z plane [m].
+def foot_frame(model: pin.Model, foot: str) -> int:
+    """Pinocchio's frame at the centre of a foot's sphere, or of its link where none was added.
 
     Args:
-        placement: of a joint or a frame.
+        model: of the robot.
+        foot: name of the link; a joint may have the same.
     """
-    translation = placement.translation
-    return float(np.hypot(translation[0], translation[2]))
+    centre = foot + _CENTRE
+    if model.existFrame(centre, pin.FrameType.OP_FRAME):
+        return int(model.getFrameId(centre, pin.FrameType.OP_FRAME))
+    return int(model.getFrameId(foot, pin.FrameType.BODY))
+
+
+def add_foot_frame(model: pin.Model, foot: str, placement: pin.SE3) -> None:
+    """Add the frame that :func:`foot_frame` finds.
+
+    Args:
+        model: of the robot; changed.
+        foot: name of the link.
+        placement: of the sphere, in the frame of the joint that moves it.
+    """
+    frame = foot_frame(model, foot)
+    joint = model.frames[frame].parentJoint
+    kind = pin.FrameType.OP_FRAME
+    model.addFrame(pin.Frame(foot + _CENTRE, joint, frame, placement, kind))
 
 
 def leg_joints(model: pin.Model, feet: Sequence[str], base_joints: int) -> list[list[int]]:
@@ -250,7 +291,7 @@ def leg_joints(model: pin.Model, feet: Sequence[str], base_joints: int) -> list[
         feet: names of the two foot frames.
         base_joints: the first joints, which move the base.
     """
-    parents = (model.frames[model.getFrameId(foot)].parentJoint for foot in feet)
+    parents = (model.frames[foot_frame(model, foot)].parentJoint for foot in feet)
     return [[j for j in model.supports[parent] if j > base_joints] for parent in parents]
 
 
@@ -267,3 +308,47 @@ def carrying(model: pin.Model, frames: Sequence[int]) -> Array:
             first = model.idx_vs[joint]
             row[first : first + model.nvs[joint]] = 1.0
     return carries
+
+
+def bent_to(
+    robot: Biped,
+    solve: Callable[[Array, float], Array | None],
+    longest: Sequence[float],
+    height: float,
+) -> Array:
+    """(nq,) configuration of a pose, with knees bent as their ranges allow.
+
+    Args:
+        robot: whose pose it is.
+        solve: finds the pose from a configuration with bent legs by steps of a largest length
+            [rad, m], or None.
+        longest: the lengths to try, one after the other.
+        height: of the CoM, for the message [m].
+
+    Raises:
+        RobotError: naming the joint that would be beyond its range, or the legs that were tried.
+    """
+    beyond = ""
+    low, high = robot.joint_range.T
+    for backward in (False, True):
+        for length in longest:
+            q = solve(robot.bent(backward), length)
+            if q is None:
+                continue
+            angles = q[-len(low) :]
+            out = np.flatnonzero((angles < low) | (angles > high))
+            if not len(out):
+                return q
+            joint = out[0]
+            beyond = beyond or (
+                f"joint {robot.joint_names[joint]!r} at {angles[joint]:.3g} rad, beyond its limits"
+                f" of {low[joint]:.3g} to {high[joint]:.3g} rad"
+            )
+    if beyond:
+        raise RobotError(f"{robot.name}: a start at height {height:g} m needs {beyond}")
+    straight = robot.neutral()[-len(low) :]
+    legs = ", ".join(f"{n} = {q:.3g}" for n, q in zip(robot.joint_names, straight, strict=True))
+    raise RobotError(
+        f"{robot.name}: the legs do not reach a CoM height of {height:g} m, with knees bent forward"
+        f" or backward from the straight legs at {legs} rad"
+    )

@@ -18,18 +18,19 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import RobotError
-from template_control.robot.biped import Biped, leg_joints, sagittal_length
+from template_control.robot.biped import Biped, leg_joints
 from template_control.robot.fixed_links import drop_world, gather_inertias
+from template_control.robot.legs import HINGES
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planar_terms import PlanarTerms, gather, sources
 from template_control.robot.planarise import planarise
 from template_control.robot.requirements import (
     BASE_DOF,
+    add_feet,
     check_feet,
     check_hips,
     check_legs_apart,
     check_planar,
-    foot_radius_of,
 )
 from template_control.robot.urdf import (
     build_model,
@@ -59,7 +60,8 @@ class PlanarBiped(Biped):
         walk: the robot's own gait, or None.
 
     Attributes:
-        joint_sign: (nv - 3,) 1 where a joint turns about +y, -1 where it does about -y.
+        trunk_axes: (3, 3) rotation from the frame of the upright trunk to the world.
+        trunk_lever: (3,) from the hips to the upright trunk's own CoM, in the world's axes [m].
         foot_turning: (2, nv) maps v to each foot's angular velocity, forward positive; and q to
             its angle.
     """
@@ -69,14 +71,10 @@ class PlanarBiped(Biped):
 
     def _prepare(self) -> None:
         model = self.model
-        self.leg_length = min(
-            sum(sagittal_length(model.jointPlacements[j]) for j in leg[1:])
-            + sagittal_length(model.frames[foot].placement)
-            for leg, foot in zip(self._leg_joints, self._foot_ids, strict=True)
-        )
-        axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
-        self.joint_sign: Array = np.array(axes[BASE_DOF:])
-        self.trunk_com = float(model.inertias[BASE_DOF].lever[2])
+        pin.forwardKinematics(model, self._data, self._neutral)
+        self.trunk_axes: Array = self._data.oMi[BASE_DOF].rotation.copy()
+        self.trunk_lever: Array = self.trunk_axes @ model.inertias[BASE_DOF].lever
+        self.trunk_com = float(self.trunk_lever[2])
         self.foot_turning: Array = np.zeros((2, self.nv))
         self.foot_turning[:, _PITCH] = 1.0
         for row, leg in zip(self.foot_turning, self.legs, strict=True):
@@ -155,8 +153,13 @@ class PlanarBiped(Biped):
         for foot, leg in zip(feet, legs, strict=True):
             if not leg:
                 raise RobotError(f"{path}: foot {foot!r} hangs on no leg: name the link at its end")
+            if len(leg) != HINGES:
+                raise RobotError(
+                    f"{path}: {len(leg)} joints move foot {foot!r}: name a hip and a knee of each"
+                    " leg"
+                )
         check_hips(path, model, [leg[0] for leg in legs])
-        radius = foot_radius_of(path, urdf, model, feet)
+        radius = add_feet(path, urdf, model, feet)
         return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
 
     def update(self, q: Array, v: Array) -> None:
@@ -182,10 +185,6 @@ class PlanarBiped(Biped):
             angle: of the axes' x over the horizontal [rad].
         """
         self.model.gravity.linear = self.gravity * np.array([-sin(angle), 0.0, -cos(angle)])
-
-    def neutral(self) -> Array:
-        """See :meth:`~.biped.Biped.neutral`."""
-        return np.zeros(self.nq)
 
     def moved(self, q: Array, step: Array) -> Array:
         """See :meth:`~.biped.Biped.moved`."""

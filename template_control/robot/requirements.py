@@ -7,13 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from template_control.errors import RobotError
+from template_control.robot.biped import add_foot_frame, foot_frame
+
+Array = NDArray[np.float64]
 
 BASE_DOF = 3
-_BASE = ("JointModelPX", "JointModelPZ", "JointModelRY")
 UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 _CLOSE = 1e-4  # [m]
+_PARALLEL = 1e-6  # 1 - cosine of the angle between two axes
 
 
 def check_planar(path: Path, model: pin.Model) -> None:
@@ -28,22 +32,32 @@ def check_planar(path: Path, model: pin.Model) -> None:
     """
     kinds = [joint.shortname() for joint in model.joints][1:]
     names = list(model.names)[1:]
-    if tuple(kinds[:BASE_DOF]) != _BASE:
+    hinged = [joint.nq == joint.nv == 1 for joint in model.joints[1:]]
+    columns = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))
+    base = np.eye(6)[[0, 2, 4]].T  # in the world's axes, the pitch joint at its origin
+    given = columns[:, :BASE_DOF]
+    if not all(hinged[:BASE_DOF]) or given.shape != base.shape or not _near(given[3:], base[3:]):
         first = list(zip(names, kinds, strict=True))[:BASE_DOF]
         raise RobotError(
             f"{path} is not planar: its first joints are {first},"
             " and must be prismatic x, prismatic z, revolute y; of a 3D robot, name the hips and"
             " knees as sagittal_joints"
         )
-    hinged = all(joint.nq == joint.nv == 1 for joint in model.joints[1:])
-    axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
-    for i, joint in enumerate(model.joints[1:]):
-        lateral = not hinged or abs(abs(axes[i]) - 1.0) < 1e-6
-        if i >= BASE_DOF and not (joint.nq == joint.nv == 1 and lateral):
+    for name, turns, joint in zip(names, hinged, model.joints[1:], strict=True):
+        if name in names[:BASE_DOF]:
+            continue
+        axis = columns[:, joint.idx_v]
+        if not turns or abs(abs(axis[4]) - 1.0) > _PARALLEL:
             raise RobotError(
-                f"{path} is not planar: joint {names[i]!r} is {kinds[i]},"
+                f"{path} is not planar: joint {name!r} is {joint.shortname()},"
                 " and must be revolute about y (with limits, not continuous)"
             )
+    if not _near(given, base):
+        raise RobotError(
+            f"{path}: joint {names[2]!r}, the base's pitch, is not at the world's origin with all"
+            " joints at 0, or a slide is not along the world's x or z: give the base's joints no"
+            " offset"
+        )
     if model.nv != BASE_DOF + 4:
         raise RobotError(
             f"{path}: {model.nv - BASE_DOF} hinges in its legs: a hip and a knee each is what is"
@@ -73,8 +87,10 @@ def check_hips(path: Path, model: pin.Model, hips: Sequence[int]) -> None:
     Raises:
         RobotError: naming the hip that is elsewhere.
     """
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
     for hip in hips:
-        place = model.jointPlacements[hip].translation
+        place = data.oMi[hip].translation - data.oMi[BASE_DOF].translation
         if np.hypot(place[0], place[2]) > _CLOSE:
             raise RobotError(
                 f"{path}: hip {model.names[hip]!r} is {place.round(4).tolist()} m from the base's"
@@ -82,17 +98,20 @@ def check_hips(path: Path, model: pin.Model, hips: Sequence[int]) -> None:
             )
 
 
-def foot_radius_of(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> float:
-    """Radius of the feet's spheres [m].
+def add_feet(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> float:
+    """Add frames at the centres of the feet's spheres.
 
     Args:
         path: of the URDF, for the message.
         urdf: its text, in which the collision shapes are.
-        model: of the robot, made from this text.
+        model: of the robot, made from this text; changed.
         feet: names of the two foot links.
 
+    Returns:
+        Radius of the spheres [m].
+
     Raises:
-        RobotError: if a foot has no sphere about its link's origin, or the radii differ.
+        RobotError: if a foot has not one sphere, or the radii differ.
     """
     try:
         geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
@@ -103,7 +122,7 @@ def foot_radius_of(path: Path, urdf: str, model: pin.Model, feet: Sequence[str])
         ) from None
     radii = set()
     for foot in feet:
-        frame = model.getFrameId(foot)
+        frame = foot_frame(model, foot)
         spheres = [
             g
             for g in geometry.geometryObjects
@@ -111,12 +130,7 @@ def foot_radius_of(path: Path, urdf: str, model: pin.Model, feet: Sequence[str])
         ]
         if len(spheres) != 1:
             raise RobotError(f"{path}: foot link {foot!r} must have one sphere as collision shape")
-        centre = model.frames[frame].placement.actInv(spheres[0].placement).translation
-        if np.hypot(centre[0], centre[2]) > _CLOSE:
-            raise RobotError(
-                f"{path}: the sphere of foot link {foot!r} is {centre.round(4).tolist()} m from the"
-                " link's origin: put the origin into its centre"
-            )
+        add_foot_frame(model, foot, spheres[0].placement)
         radii.add(float(spheres[0].geometry.radius))
     if len(radii) != 1:
         raise RobotError(f"{path}: the feet have different radii {sorted(radii)}")
@@ -137,9 +151,13 @@ def check_feet(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
     if len(feet) != 2:
         raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
     for foot in feet:
-        if not model.existFrame(foot):
+        if not model.existFrame(foot, pin.FrameType.BODY):
             links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
             raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
+
+
+def _near(given: Array, wanted: Array) -> bool:
+    return bool(np.abs(given - wanted).max() <= _CLOSE)
 
 
 def check_legs_apart(path: Path, feet: Sequence[str], legs: Sequence[Sequence[int]]) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Pair, Range, Shape, Triple
 from template_control.errors import RobotError
+from template_control.robot.biped import bent_to
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import BASE_DOF
 
@@ -63,44 +64,28 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     Raises:
         RobotError: if the legs do not reach, or joints would be beyond their limits.
     """
-    height = pose.com[1]
     # From far away Newton's full step may bend a knee the wrong way; short ones do not.
-    for longest in (np.inf, _SHORT):
-        q = _configuration(robot, pose, longest)
-        limits = robot.model
-        within = np.all((q >= limits.lowerPositionLimit) & (q <= limits.upperPositionLimit))
-        if within:
-            break
-    if not np.all(np.isfinite(q)):
-        raise RobotError(f"{robot.name}: the legs do not reach a CoM height of {height:g} m")
-    if not within:
-        raise RobotError(f"{robot.name}: a start at height {height:g} m needs joints beyond limits")
+    q = bent_to(
+        robot,
+        lambda q, longest: _configuration(robot, pose, q, longest),
+        (np.inf, _SHORT),
+        pose.com[1],
+    )
+    robot.update(q, np.zeros(robot.nv))
     return q, _velocity(robot, pose, q)
 
 
-def _configuration(robot: PlanarBiped, pose: Pose, longest: float) -> Array:
-    """(nv,) q of a pose, NaN where it is not found.
+def _configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: float) -> Array | None:
+    """(nv,) q of a pose, None where it is not found.
 
     Args:
         robot: the model; its last update is overwritten.
         pose: what is wanted.
+        q: (nv,) bent legs, from which the search begins; changed.
         longest: step of Newton's method, the largest change of any joint [rad].
     """
     stance, swing = pose.rear, 1 - pose.rear
-    height = pose.com[1]
-    q = np.zeros(robot.nv)
-    q[0], q[1] = pose.com[0], 0.8 * height
-    q[2] = pose.pitch
-    for leg in robot.legs:
-        # Knees forward, unless the knee's range says otherwise.
-        hip, knee = (BASE_DOF + joint for joint in leg)
-        sign = robot.joint_sign[[*leg]]
-        model = robot.model
-        ranges = sign * (
-            model.lowerPositionLimit[[hip, knee]] + model.upperPositionLimit[[hip, knee]]
-        )
-        bend = 1.0 if ranges[1] >= 0.0 else -1.0
-        q[[hip, knee]] = bend * sign * [-0.4, 0.8]
+    q[:BASE_DOF] = pose.com[0], 0.8 * pose.com[1], pose.pitch
     zero = np.zeros(robot.nv)
 
     def residual() -> Array:
@@ -130,7 +115,7 @@ def _configuration(robot: PlanarBiped, pose: Pose, longest: float) -> Array:
             return q
         step = _solved(robot, jacobian(), error)
         q -= step * min(1.0, longest / np.max(np.abs(step)))
-    return np.full(robot.nv, np.nan)
+    return None
 
 
 def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.plant.mjcf import FOOT, TRUNK, add, add_ball, place, text, world_element
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
-from template_control.robot.biped import Biped
+from template_control.robot.biped import Biped, foot_frame
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.free.free_terms import BASE_DOF
 
@@ -43,19 +43,20 @@ class FreeMujocoPlant(MujocoPlant):
     def _text(self, robot: Biped) -> str:
         root, ground = world_element(robot, self.options, self.options.contact_time)
         model, scale = robot.model, self.options.mass_scale
-        axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))
-        data = model.createData()
-        pin.forwardKinematics(model, data, pin.neutral(model))
+        # MuJoCo weighs a contact's give by the robot's pose with all joints at their `ref`.
+        data, neutral = model.createData(), robot.neutral()
+        axes = pin.computeJointJacobians(model, data, neutral)
         bodies = {0: ground}
         for joint in range(_ROOT, model.njoints):
             name = TRUNK if joint == _ROOT else f"{model.names[joint]} link"
             parent = bodies[model.parents[joint]]
-            body = add(parent, "body", name=name, **place(model.jointPlacements[joint]))
+            body = add(parent, "body", name=name, **place(data.liMi[joint]))
             if joint == _ROOT:
                 add(body, "freejoint", name=TRUNK)
             else:
                 axis = data.oMi[joint].rotation.T @ axes[3:, model.idx_vs[joint]]
-                add(body, "joint", name=model.names[joint], type="hinge", axis=text(axis))
+                about = {"axis": text(axis), "ref": repr(float(neutral[model.idx_qs[joint]]))}
+                add(body, "joint", name=model.names[joint], type="hinge", **about)
             inertia = model.inertias[joint]
             i = scale * inertia.inertia
             add(
@@ -67,7 +68,7 @@ class FreeMujocoPlant(MujocoPlant):
             )
             bodies[joint] = body
         for number, foot in enumerate(robot.feet):
-            frame = model.frames[model.getFrameId(foot)]
+            frame = model.frames[foot_frame(model, foot)]
             centre = text(frame.placement.translation)
             add_ball(bodies[frame.parentJoint], f"{FOOT}{number}", centre, robot.foot_radius)
         return ElementTree.tostring(root, encoding="unicode")

@@ -23,13 +23,14 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
-from template_control.robot.biped import Biped, sagittal_length
+from template_control.robot.biped import Biped
 from template_control.robot.fixed_links import drop_world, gather_inertias
 from template_control.robot.free.free_terms import BASE_DOF, FreeTerms, gather, sources
 from template_control.robot.free.requirements import check_free, set_limits, set_ranges
+from template_control.robot.legs import HINGES
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planarise import spheres
-from template_control.robot.requirements import foot_radius_of
+from template_control.robot.requirements import add_feet
 from template_control.robot.urdf import (
     build_model,
     check_bodies,
@@ -85,14 +86,10 @@ class FreeBiped(Biped):
 
     def _prepare(self) -> None:
         model = self.model
-        self.leg_length = min(
-            sagittal_length(model.jointPlacements[leg[-1]])
-            + sagittal_length(model.frames[foot].placement)
-            for leg, foot in zip(self._leg_joints, self._foot_ids, strict=True)
-        )
         data = self._data
         self.rotation: Array = data.oMi[_ROOT].rotation
-        self._hips = [data.oMi[leg[-2]].translation for leg in self._leg_joints]
+        self._hips = [data.oMi[leg[-HINGES]] for leg in self._leg_joints]
+        self._in_leg = [np.zeros(3), np.zeros(3)]
         limits = self.velocity_limit, self.joint_range
         self._sources = sources(model, data, self._foot_ids, self.foot_radius, limits)
         self.space = FreeTerms.zeros(self.nv)
@@ -101,9 +98,14 @@ class FreeBiped(Biped):
         self.origin = self._frame[:2]
         self.heading = 0.0
         self._look()
-        self.update(pin.neutral(model), np.zeros(self.nv))
+        self.update(self._neutral, np.zeros(self.nv))
+        # A hip is the point of its axis that is in the plane in which the leg swings.
+        for hip, foot, point in zip(self._hips, self._foot_ids, self._in_leg, strict=True):
+            away = data.oMf[foot].translation[1] - hip.translation[1]
+            point[:] = hip.rotation.T @ (0.0, away, 0.0)
         lever = model.inertias[_ROOT].lever[2]
-        self.trunk_com = float(lever - self.hip_height(pin.neutral(model)))
+        self.trunk_com = float(lever - self.hip_height(self._neutral))
+        self._aside = float(self._middle()[1])  # of the trunk's origin
 
     def _look(self) -> None:
         """The sagittal terms are the space's x and z."""
@@ -164,7 +166,7 @@ class FreeBiped(Biped):
         model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
         check_free(path, model, feet)
         check_bodies(path, tree, model, _ROOT + 1)
-        radius = foot_radius_of(path, urdf, model, feet)
+        radius = add_feet(path, urdf, model, feet)
         return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
 
     def update(self, q: Array, v: Array) -> None:
@@ -218,10 +220,6 @@ class FreeBiped(Biped):
         out[..., 0], out[..., 1] = x0 + c * x - s * y, y0 + s * x + c * y
         return out
 
-    def neutral(self) -> Array:
-        """See :meth:`~template_control.robot.biped.Biped.neutral`."""
-        return np.asarray(pin.neutral(self.model))
-
     def moved(self, q: Array, step: Array) -> Array:
         """See :meth:`~template_control.robot.biped.Biped.moved`."""
         return np.asarray(pin.integrate(self.model, q, step))
@@ -234,6 +232,14 @@ class FreeBiped(Biped):
         """
         return np.asarray(pin.difference(self.model, q, other))
 
+    def _middle(self) -> Array:
+        """(3,) between the hips, in the world, at the last update [m]."""
+        left, right = (
+            hip.translation + hip.rotation @ point
+            for hip, point in zip(self._hips, self._in_leg, strict=True)
+        )
+        return np.asarray(0.5 * (left + right))
+
     def joint_positions(self, out: Array) -> None:
         """See :meth:`~template_control.robot.biped.Biped.joint_positions`."""
         x0, y0, c, s = self._frame
@@ -242,17 +248,16 @@ class FreeBiped(Biped):
 
     def hip_height(self, q: Array) -> float:
         """Mean height of the hips that swing the legs forward [m], at the last update."""
-        left, right = self._hips
-        return float(0.5 * (left[2] + right[2]))
+        return float(self._middle()[2])
 
     def hips(self, q: Array, v: Array) -> tuple[Array, float]:
         """See :meth:`~template_control.robot.biped.Biped.hips`: their mean."""
         x0, y0, c, s = self._frame
-        x, y, z = (0.5 * (self._hips[0] + self._hips[1])).tolist()
+        x, y, z = self._middle().tolist()
         away = z - float(q[2])
-        # The hips move with the trunk, whose origin is above them.
-        moving = self.rotation @ v[:3]
-        speed = c * moving[0] + s * moving[1] + self.space.turning[1] * away
+        # The hips move with the trunk, whose origin is elsewhere.
+        moving, turning = self.rotation @ v[:3], self.space.turning
+        speed = c * moving[0] + s * moving[1] + turning[1] * away - turning[2] * self._aside
         return np.array([c * (x - x0) + s * (y - y0), z]), float(speed)
 
     def trunk(self, q: Array, v: Array) -> tuple[float, float]:

@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 
 from template_control.errors import RobotError
-from template_control.robot.biped import leg_joints
+from template_control.robot.biped import foot_frame, leg_joints
 from template_control.robot.free.free_terms import BASE_DOF
+from template_control.robot.legs import HINGES, straight_legs
 from template_control.robot.requirements import UNLIMITED, check_feet, check_legs_apart
 
 _ROOT = 1  # Pinocchio's index of the free flyer
-_LATERAL = 2  # hip and knee, the last joints of a leg
 _LEAST, _MOST = 3, 4  # joints of a leg
 _CLOSE = 1e-6
 
@@ -100,14 +100,15 @@ def check_free(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
             f"{path}: the root link weighs nothing, and so does what is fixed to it: give the trunk"
             " an <inertial> with its mass"
         )
-    axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[3:]
     for leg, foot in zip(legs, feet, strict=True):
         if not _LEAST <= len(leg) <= _MOST:
             raise RobotError(
                 f"{path}: {len(leg)} joints move foot {foot!r}: three or four are needed, the last"
                 " two of them hip and knee about the lateral axis"
             )
-        for joint in leg[-_LATERAL:]:
+    axes = straight_legs(model, legs, [foot_frame(model, foot) for foot in feet]).axes
+    for leg, foot in zip(legs, feet, strict=True):
+        for joint in leg[-HINGES:]:
             if abs(abs(axes[1, model.idx_vs[joint]]) - 1.0) > _CLOSE:
                 raise RobotError(
                     f"{path}: joint {model.names[joint]!r} of foot {foot!r} does not turn about the"

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Range, Shape, Triple
 from template_control.errors import RobotError
+from template_control.robot.biped import bent_to, foot_frame
 from template_control.robot.free.free_biped import FreeBiped
-from template_control.robot.free.free_terms import BASE_DOF
 
 Array = NDArray[np.float64]
 
 _LONGEST = 0.2  # step of Newton's method [rad, m]
 _EXACT = 1e-12  # [m, rad]
-_BEND = 0.4  # of a hip, against twice as much of its knee, where the search begins [rad]
 
 
 @dataclass(frozen=True)
@@ -59,11 +58,10 @@ def free_state_in(robot: FreeBiped, pose: FreePose) -> tuple[Array, Array]:
         RobotError: if the legs do not reach, or joints would be beyond their limits.
     """
     robot.face(0.0, np.zeros(2))
-    q = _configuration(robot, pose)
-    low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
-    joints = slice(BASE_DOF + 1, None)
-    if np.any(q[joints] < low[joints]) or np.any(q[joints] > high[joints]):
-        raise RobotError(f"{robot.name}: a start in this pose needs joints beyond their limits")
+    q = bent_to(
+        robot, lambda q, longest: _configuration(robot, pose, q, longest), (_LONGEST,), pose.com[2]
+    )
+    robot.update(q, np.zeros(robot.nv))
     rows, feet = _rows(robot), [pose.rear, 1 - pose.rear]
     weight = robot.mass * pose.com[2]
     rows[0] += robot.space.momentum_jacobian[1] / weight
@@ -77,17 +75,16 @@ def free_state_in(robot: FreeBiped, pose: FreePose) -> tuple[Array, Array]:
     return q, v
 
 
-def _configuration(robot: FreeBiped, pose: FreePose) -> Array:
-    """(nq,) q of a pose.
+def _configuration(robot: FreeBiped, pose: FreePose, q: Array, longest: float) -> Array | None:
+    """(nq,) q of a pose, None where it is not found.
 
-    Raises:
-        RobotError: if the legs do not reach.
+    Args:
+        robot: the model; its last update is overwritten.
+        pose: what is wanted.
+        q: (nq,) bent legs, from which the search begins.
+        longest: step of Newton's method, the largest change of any coordinate [rad, m].
     """
-    q = robot.neutral()
     q[:3] = pose.com[0], pose.com[1], 0.9 * pose.com[2]
-    for leg in robot.legs:
-        hip, knee = (BASE_DOF + 1 + joint for joint in leg[-2:])
-        q[hip], q[knee] = -_BEND, 2.0 * _BEND
     rest = np.zeros(robot.nv)
     upright = pin.rpy.rpyToMatrix(0.0, pose.pitch, 0.0)
     feet = np.empty((2, 3))
@@ -107,10 +104,8 @@ def _configuration(robot: FreeBiped, pose: FreePose) -> Array:
             jacobian[6 + 3 * foot] += r * turning[1]
             jacobian[7 + 3 * foot] -= r * turning[0]
         step = _solved(robot, jacobian, -error)
-        q = pin.integrate(robot.model, q, step * min(1.0, _LONGEST / np.max(np.abs(step))))
-    raise RobotError(
-        f"{robot.name}: the legs do not reach a CoM height of {pose.com[2]:g} m in this pose"
-    )
+        q = pin.integrate(robot.model, q, step * min(1.0, longest / np.max(np.abs(step))))
+    return None
 
 
 def _rows(robot: FreeBiped) -> Array:
@@ -123,7 +118,7 @@ def _rows(robot: FreeBiped) -> Array:
 def _foot_turning(robot: FreeBiped, q: Array, foot: int) -> Array:
     """(3, nv) Jacobian of a foot's angular velocity, in the world's axes."""
     data = robot.model.createData()
-    frame = robot.model.getFrameId(robot.feet[foot])
+    frame = foot_frame(robot.model, robot.feet[foot])
     world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     return np.asarray(pin.computeFrameJacobian(robot.model, data, q, frame, world)[3:])
 

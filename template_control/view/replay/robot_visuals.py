@@ -13,6 +13,7 @@ from meshcat import geometry as mg
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
+from template_control.robot.biped import foot_frame
 from template_control.run.kinds.free_record import FreeRecord
 from template_control.run.record import Record
 
@@ -115,7 +116,7 @@ def foot_sides(model: pin.Model, feet: list[str]) -> Array:
     """
     data = model.createData()
     pin.framesForwardKinematics(model, data, pin.neutral(model))
-    return np.array([data.oMf[model.getFrameId(foot)].translation[1] for foot in feet])
+    return np.array([data.oMf[foot_frame(model, foot)].translation[1] for foot in feet])
 
 
 def _check_meshes(text: str) -> None:

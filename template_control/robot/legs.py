@@ -1,0 +1,118 @@
+"""Geometry of the legs: their lengths, and the joint angles at which they hang straight down.
+
+Only the joints' axes and the feet's points count, not the frames of the links nor the zeros of
+the angles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import atan2, hypot, pi
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+HINGES = 2  # hip and knee, the last joints of a leg
+_EXACT = 1e-13  # of an axis' direction
+_ITERATIONS = 30
+_QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)  # where the search for a lateral hip begins [rad]
+
+
+@dataclass(frozen=True)
+class StraightLegs:
+    """Legs that hang straight down from an upright trunk.
+
+    Attributes:
+        q: (nq,) configuration; the angle of a hinge is the one next to the middle of its range.
+        length: from the hip's axis over the knee's to the foot, of the shorter leg [m].
+        axes: (3, nv) directions of the joints' axes in the world, in ``q``.
+    """
+
+    q: Array
+    length: float
+    axes: Array
+
+
+def straight_legs(
+    model: pin.Model, legs: Sequence[Sequence[int]], feet: Sequence[int]
+) -> StraightLegs:
+    """Find the configuration with straight legs.
+
+    Joints above the hip are turned until its axis is lateral, if they can.
+
+    Args:
+        model: of the robot; its neutral configuration has an upright trunk.
+        legs: Pinocchio's joints of each, from the trunk on; the last two are hip and knee.
+        feet: frame of each foot.
+    """
+    data, q = model.createData(), pin.neutral(model)
+    for leg in legs:
+        _turn_lateral(model, data, q, leg)
+    axes = np.array(pin.computeJointJacobians(model, data, q)[3:])
+    pin.updateFramePlacements(model, data)
+    lengths = []
+    for (*_, hip, knee), foot in zip(legs, feet, strict=True):
+        thigh = data.oMi[knee].translation - data.oMi[hip].translation
+        shank = data.oMf[foot].translation - data.oMi[knee].translation
+        lengths.append(hypot(thigh[0], thigh[2]) + hypot(shank[0], shank[2]))
+        lean = atan2(-thigh[0], -thigh[2])
+        bend = atan2(-shank[0], -shank[2]) - lean
+        for joint, angle in ((hip, lean), (knee, bend)):
+            sign = np.sign(axes[1, model.idx_vs[joint]])
+            place = model.idx_qs[joint]
+            q[place] = _in_range(model, joint, q[place] - sign * angle)
+    return StraightLegs(q, min(lengths), np.array(pin.computeJointJacobians(model, data, q)[3:]))
+
+
+def middle(model: pin.Model, joint: int) -> float:
+    """Middle of a hinge's range [rad], 0 if it has none.
+
+    Args:
+        model: of the robot.
+        joint: Pinocchio's index.
+    """
+    place = model.idx_qs[joint]
+    half = 0.5 * model.lowerPositionLimit[place] + 0.5 * model.upperPositionLimit[place]
+    return float(half) if np.isfinite(half) else 0.0
+
+
+def _in_range(model: pin.Model, joint: int, angle: float) -> float:
+    """The same angle [rad], by full turns next to the middle of the range."""
+    turns = round((middle(model, joint) - angle) / (2.0 * pi))
+    return angle + 2.0 * pi * turns
+
+
+def _turn_lateral(model: pin.Model, data: pin.Data, q: Array, leg: Sequence[int]) -> None:
+    """Turn the joints above a hip until its axis is lateral; q is overwritten if they can.
+
+    Of several ways, the one next to the middles of their ranges is taken.
+    """
+    upper, hip = leg[:-HINGES], leg[-HINGES]
+    places = [model.idx_qs[joint] for joint in upper]
+    columns = [model.idx_vs[joint] for joint in upper]
+    middles = np.array([middle(model, joint) for joint in upper])
+    best, found = np.inf, q
+    for start in product(_QUARTERS, repeat=len(upper)):
+        tried = q.copy()
+        tried[places] = start
+        for _ in range(_ITERATIONS):
+            axes = pin.computeJointJacobians(model, data, tried)[3:]
+            axis = axes[:, model.idx_vs[hip]]
+            error = axis[[0, 2]]
+            if np.abs(error).max() < _EXACT:
+                break
+            slope = np.cross(axes[:, columns].T, axis).T[[0, 2]]
+            tried[places] -= np.linalg.lstsq(slope, error, rcond=1e-9)[0]
+        else:
+            continue
+        for place, joint in zip(places, upper, strict=True):
+            tried[place] = _in_range(model, joint, tried[place])
+        away = float(np.abs(tried[places] - middles).max(initial=0.0))
+        if away < best - 1e-6:
+            best, found = away, tried
+    q[:] = found
