@@ -1,4 +1,4 @@
-"""The same robot in other words: turned and shifted frames of links, other zeros of angles."""
+"""The same robot in other words: other frames of links, zeros of angles, and lengths of axes."""
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
@@ -73,7 +73,7 @@ def rewritten(text, seed, keep=(), turn=True, shift=3.0):
             if name not in keep:
                 zero, sign = rng.uniform(-shift, shift), float(rng.choice([-1.0, 1.0]))
             pose = pose * pin.SE3(pin.exp3(axis * zero), np.zeros(3))
-            turned = sign * child.rotation.T @ axis
+            turned = rng.uniform(0.3, 3.0) * sign * child.rotation.T @ axis
             joint.find("axis").set("xyz", " ".join(map(repr, turned.tolist())))
             limit = joint.find("limit")
             ends = sorted(sign * (float(limit.get(end)) - zero) for end in ("lower", "upper"))

@@ -3,12 +3,20 @@
 import logging
 import re
 
+import numpy as np
 import pytest
 
+from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.robot_template import default_gait
 from template_control.errors import RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions
-from template_control.robot.library import load_robot, robot_path
+from template_control.plant.ideal import IdealOptions
+from template_control.plant.mujoco import MujocoOptions
+from template_control.robot.library import load_free_robot, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.run.options import SimulationOptions
+from template_control.run.simulation import simulate
+from template_control.view.replay.robot_visuals import load_visuals
 
 BOLT = {
     "feet": ("FL_FOOT", "FR_FOOT"),
@@ -270,3 +278,138 @@ def test_a_foot_radius_without_sagittal_joints_is_refused(tmp_path, refused, fiv
         PlanarBiped.from_urdf(path, foot_radius=0.5)
     with pytest.raises(RobotError, match="locked is for a 3D URDF"):
         PlanarBiped.from_urdf(path, locked={"left_hip": 0.1})
+
+
+@pytest.mark.parametrize("axis", ["0 0 0", "0 5 0", "nan 0 0"])
+def test_a_fixed_joint_s_axis_and_limits_mean_nothing(load, five_link, axis):
+    ankle = '<joint name="left_ankle" type="fixed">'
+    odd = f'{ankle}<axis xyz="{axis}"/><limit lower="2" upper="1"/><mimic joint="left_knee"/>'
+    assert load(five_link.replace(ankle, odd)).leg_length == pytest.approx(0.9)
+
+
+def test_links_and_joints_may_share_names_in_every_engine(tmp_path, five_link):
+    text = five_link
+    for joint, link in (
+        ("left_ankle", "left_foot"),
+        ("right_ankle", "right_foot"),
+        ("left_knee", "left_shank"),
+        ("right_hip", "right_thigh"),
+        ("base_pitch", "trunk"),
+    ):
+        text = text.replace(f'name="{joint}"', f'name="{link}"')
+    path = tmp_path / "same.urdf"
+    path.write_text(text)
+    options = {"ideal": IdealOptions(), "pybullet": PlantOptions(), "mujoco": MujocoOptions()}
+    for plant in options.values():
+        own, same = (
+            simulate(r, LqrPlanner(default_gait(r)), SimulationOptions(steps=1, plant=plant))
+            for r in (load_robot("five-link"), load_robot(path))
+        )
+        assert not own.fell
+        np.testing.assert_array_equal(own.q, same.q)
+    assert len(load_visuals(same)[2]) == len(load_visuals(own)[2]) > 0
+
+
+def same_body(own, other):
+    """The models are equal."""
+    for mine, theirs in zip(own.model.jointPlacements, other.model.jointPlacements, strict=True):
+        np.testing.assert_allclose(mine.homogeneous, theirs.homogeneous, atol=1e-12)
+    for mine, theirs in zip(own.model.inertias, other.model.inertias, strict=True):
+        np.testing.assert_allclose(mine.matrix(), theirs.matrix(), atol=1e-12)
+
+
+def test_an_axis_s_length_does_not_stretch_a_locked_angle(load, bolt):
+    locked = {"locked": {"FL_HAA": 0.0, "FR_HAA": 0.0, "NECK": 0.4}}
+    neck = """<link name="head"><inertial><origin xyz="0.1 0 0.1"/><mass value="0.2"/>
+    <inertia ixx="1e-3" iyy="1e-3" izz="1e-3"/></inertial></link><joint name="NECK" type="revolute">
+    <parent link="base_link"/><child link="head"/><axis xyz="{}"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    own, other = (
+        load(bolt.replace("</robot>", neck.format(axis)), **BOLT, **locked)
+        for axis in ("0 0.6 0.8", "0 3 4")
+    )
+    same_body(own, other)
+
+
+ARM = """<link name="{0}"><inertial><origin xyz="0.1 0 0.1"/><mass value="0.2"/>
+<inertia ixx="1e-3" iyy="1e-3" izz="1e-3"/></inertial></link><joint name="{0}_joint" type="{1}">
+<parent link="base_link"/><child link="{0}"/><axis xyz="0 1 0"/>{2}
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
+
+
+def armed(bolt, kind, mimic):
+    arms = ARM.format("leader", kind, "") + ARM.format("follower", kind, mimic)
+    return bolt.replace("</robot>", arms + "</robot>")
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_locked_joint_that_mimics_another_is_locked_at_its_multiple(load, bolt, kind):
+    mimic = '<mimic joint="leader_joint" multiplier="-2" offset="0.1"/>'
+    led = load(armed(bolt, kind, mimic), **BOLT, locked={"leader_joint": 0.3})
+    both = {"leader_joint": 0.3, "follower_joint": -0.5}
+    same_body(led, load(armed(bolt, kind, ""), **BOLT, locked=both))
+    # A locked slide is moved, not turned.
+    turned = (
+        led.model.inertias[3].lever - load(armed(bolt, kind, ""), **BOLT).model.inertias[3].lever
+    )
+    assert (abs(turned[1]) > 1e-6) == (kind == "prismatic")
+
+
+REFUSED = {
+    "'left_knee' mimics joint 'left_hip', which is not simulated": (
+        '<joint name="left_knee" type="revolute">',
+        '<joint name="left_knee" type="revolute"><mimic joint="left_hip"/>',
+    ),
+    "'left_knee' has lower 2.5 and upper 0: give a range": (
+        'lower="0" upper="2.5"', 'lower="2.5" upper="0"'
+    ),
+    "'left_knee': limit has no lower and no upper: give the range": ('lower="0" upper="2.5"', ""),
+    "is a xacro file: run xacro first": (
+        "</robot>", '<xacro:leg xmlns:xacro="http://www.ros.org/wiki/xacro"/></robot>'
+    ),
+    "give a finite number; run xacro first": ('value="4.8"', 'value="${thigh_mass}"'),
+    "a mass of 1.3e+06 kg and legs of 0.9 m do not fit": ('value="4.8"', 'value="1.3e6"'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_is_no_robot_is_refused_by_name(load, five_link, message):
+    with pytest.raises(RobotError, match=re.escape(message)):
+        load(changed(five_link, *REFUSED[message]))
+
+
+def test_a_robot_in_millimetres_is_refused(load, five_link):
+    def longer(match):
+        return f'{match[1]}="{" ".join(str(1000 * float(x)) for x in match[2].split())}"'
+
+    text = re.sub(r'(xyz|radius|length|size)="([-.\d ]+)"', longer, five_link)
+    text = text.replace('xyz="0.0 1000.0 0.0"', 'xyz="0 1 0"')
+    with pytest.raises(RobotError, match="a mass of 80 kg and legs of 900 m do not fit each other"):
+        load(text)
+
+
+def test_the_text_of_a_urdf_is_no_name(five_link):
+    for load_it in (load_robot, load_free_robot):
+        with pytest.raises(RobotError, match="not the URDF's text") as error:
+            load_it(five_link)
+        assert len(str(error.value)) < 200
+
+
+@pytest.mark.parametrize("root", ["{0}", "{0}/robot_parts"])
+def test_meshes_are_found_in_the_packages_of_the_environment(
+    load, tmp_path, tmp_path_factory, monkeypatch, five_link, root
+):
+    packages = tmp_path_factory.mktemp("packages")
+    mesh = packages / "robot_parts" / "meshes" / "a.stl"
+    mesh.parent.mkdir(parents=True)
+    mesh.write_text(TETRAHEDRON)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"/none:{root.format(packages)}")
+    name = "package://robot_parts/meshes/a.stl"
+    robot = load(changed(five_link, TRUNK, TRUNK + MESH.format("visual", name)))
+    assert str(mesh) in robot.urdf
+
+
+def test_moments_that_are_not_written_are_zero(load, five_link):
+    short = re.sub(r' (ixy|ixz|iyz)="0"', "", five_link)
+    assert short != five_link
+    same_body(load(five_link), load(short))

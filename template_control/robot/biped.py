@@ -16,6 +16,9 @@ from template_control.robot.legs import HINGES, middle, straight_legs
 Array = NDArray[np.float64]
 
 _BENT = np.array([-0.4, 0.8])  # of hip and knee [rad]
+# Mass over the cube of the leg's length [kg/m^3]: 20 of bolt, 110 of five-link; 100 times denser
+# and lighter ones than those that are built, and a unit of g, cm or mm is out of it.
+_DENSITY = (0.1, 2e4)
 _CENTRE = " sphere's centre"  # ends a frame's name
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -144,6 +147,7 @@ class Biped(ABC):
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
         straight = straight_legs(model, self._leg_joints, self._foot_ids)
         self.leg_length, self._neutral = straight.length, straight.q
+        check_size(path, self.mass, self.leg_length)
         self.joint_sign = np.sign(straight.axes[1, self.base_dof :])
         self.leg_mass = max(
             float(sum(model.inertias[j].mass for j in leg)) for leg in self._leg_joints
@@ -308,6 +312,25 @@ def carrying(model: pin.Model, frames: Sequence[int]) -> Array:
             first = model.idx_vs[joint]
             row[first : first + model.nvs[joint]] = 1.0
     return carries
+
+
+def check_size(path: Path, mass: float, leg_length: float) -> None:
+    """Check that mass and size could be those of one robot.
+
+    Args:
+        path: of the URDF, for the message.
+        mass: of the robot [kg].
+        leg_length: [m].
+
+    Raises:
+        RobotError: if not.
+    """
+    low, high = _DENSITY
+    if not low <= mass / leg_length**3 <= high:
+        raise RobotError(
+            f"{path}: a mass of {mass:.4g} kg and legs of {leg_length:.4g} m do not fit each other:"
+            " write masses in kg and lengths in m, not in g or mm"
+        )
 
 
 def bent_to(

@@ -13,6 +13,7 @@ from template_control.errors import RobotError
 from template_control.robot.free.free_biped import FreeBiped, JointLimits
 from template_control.robot.planar_biped import PlanarBiped
 
+_FILES = (".urdf", ".xacro")
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -119,6 +120,21 @@ def _files(entry: _Entry) -> list[Path]:
     return [Path(str(f.locate())) for f in files if f.name == entry.file]
 
 
+def _name(name: str | Path) -> str:
+    """A robot's name or path as text.
+
+    Raises:
+        RobotError: if it is the text of a URDF.
+    """
+    text = str(name)
+    if text.lstrip("\ufeff \n").startswith("<"):
+        raise RobotError(
+            "a robot's name or the path of its URDF is wanted, not the URDF's text: write it to a"
+            " file, and give the file's path"
+        )
+    return text
+
+
 @checked
 def load_robot(name: str | Path) -> PlanarBiped:
     """A shipped robot by name, or any planar biped by the path of its URDF.
@@ -126,8 +142,8 @@ def load_robot(name: str | Path) -> PlanarBiped:
     Raises:
         RobotError: if there is no such robot or file, or it is no planar biped.
     """
-    text = str(name)
-    if text not in _ENTRIES and (text.endswith(".urdf") or "/" in text):
+    text = _name(name)
+    if text not in _ENTRIES and (text.endswith(_FILES) or "/" in text):
         return PlanarBiped.from_urdf(text)
     path, entry = robot_path(text), _ENTRIES[text]
     return PlanarBiped.from_urdf(
@@ -146,8 +162,8 @@ def load_free_robot(name: str | Path) -> FreeBiped:
     Raises:
         RobotError: if there is no such robot or file, or it is planar.
     """
-    text = str(name)
-    if text not in _ENTRIES and (text.endswith(".urdf") or "/" in text):
+    text = _name(name)
+    if text not in _ENTRIES and (text.endswith(_FILES) or "/" in text):
         return FreeBiped.from_urdf(text)
     path, entry = robot_path(text), _ENTRIES[text]
     if not entry.free:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import xml.etree.ElementTree as ET
 from functools import cache
 from pathlib import Path
@@ -22,7 +23,8 @@ def find_meshes(path: Path, robot: ET.Element) -> None:
 
     Args:
         path: of the URDF. A relative name counts from its folder; that of a package counts from
-            each folder above it, with and without the package's name.
+            each folder above it, with and without the package's name, and from those of the
+            environment variable ``ROS_PACKAGE_PATH``.
         robot: its root element; changed.
 
     Raises:
@@ -58,11 +60,19 @@ def _file(path: Path, name: str) -> Path | None:
     if package is not None:
         inside = name.removeprefix(package)
         without = inside.partition("/")[2]
-        places = [f / part for f in (folder, *folder.parents) for part in (inside, without)]
+        above = [f / part for f in (folder, *folder.parents) for part in (inside, without)]
+        places = [*above, *(Path(root) / inside for root in _package_folders(inside))]
     else:
         file = name.removeprefix("file://")
         places = [folder / file, folder / unquote(file)]
     return next((place for place in places if place.is_file()), None)
+
+
+def _package_folders(inside: str) -> list[str]:
+    """Folders of ``ROS_PACKAGE_PATH`` that hold packages, or are the one that a file is in."""
+    roots = [root for root in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if root]
+    package = inside.partition("/")[0]
+    return [str(Path(r).parent) if Path(r).name == package else r for r in roots]
 
 
 @cache

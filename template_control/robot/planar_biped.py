@@ -35,6 +35,7 @@ from template_control.robot.requirements import (
 from template_control.robot.urdf import (
     build_model,
     check_bodies,
+    check_motion,
     check_shapes,
     read_urdf,
     write_out_massless,
@@ -133,6 +134,7 @@ class PlanarBiped(Biped):
         drop_world(tree)
         if sagittal_joints:
             planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
+        check_motion(path, tree)
         find_meshes(path, tree)
         check_shapes(path, tree)
         gather_inertias(tree)

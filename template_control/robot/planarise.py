@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import RobotError
-from template_control.robot.urdf import build_model
+from template_control.robot.urdf import build_model, strip_motion
 
 Array = NDArray[np.float64]
 
@@ -69,11 +69,10 @@ def planarise(
                 f"{path}: joint {name!r} is {joints[name].get('type')}: name hips and knees, which"
                 " are revolute, as sagittal_joints"
             )
-    for name, joint in joints.items():
-        if name not in sagittal_joints and joint.get("type") != "fixed":
-            _fix(joint, locked.get(name, 0.0))
-        elif joint.get("type") == "continuous":
-            _bound(path, joint)
+    lock(path, robot, sagittal_joints, locked)
+    for name in sagittal_joints:
+        if joints[name].get("type") == "continuous":
+            _bound(path, joints[name])
     hips = _check_axes(path, robot, sagittal_joints)
     root = _root_link(robot)
     _shift(robot, root, hips)
@@ -126,16 +125,58 @@ def _text(vector: Array) -> str:
     return " ".join(f"{x:.12g}" for x in vector)
 
 
-def _fix(joint: ET.Element, angle: float) -> None:
-    """Turn a hinge into a fixed joint at ``angle`` [rad]."""
-    joint.set("type", "fixed")
+def lock(
+    path: Path, robot: ET.Element, moving: Collection[str], locked: Mapping[str, float]
+) -> None:
+    """Hold joints where they are.
+
+    A joint that mimics a locked one and is not named itself is held at its multiple.
+
+    Args:
+        path: of the URDF, for the message.
+        robot: its root element; changed.
+        moving: names of the joints that stay as they are.
+        locked: position of each joint [rad, m]; 0 of those not named.
+
+    Raises:
+        RobotError: if a joint that is not named mimics one that moves.
+    """
+    joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
+    places: dict[str, float] = dict(locked)
+
+    def place(name: str) -> float:
+        mimic = joints[name].find("mimic")
+        if name not in places and mimic is None:
+            places[name] = 0.0
+        elif name not in places and mimic is not None:
+            leader = str(mimic.get("joint"))
+            if leader in moving or leader not in joints:
+                state = "moves" if leader in moving else "is not there"
+                raise RobotError(
+                    f"{path}: joint {name!r} mimics joint {leader!r}, which {state}: name"
+                    f" {name!r} among the locked joints"
+                )
+            places[name] = 0.0  # of a joint that mimics itself
+            multiplier = float(mimic.get("multiplier", "1"))
+            places[name] = multiplier * place(leader) + float(mimic.get("offset", "0"))
+        return places[name]
+
+    held = {n: place(n) for n, j in joints.items() if n not in moving and j.get("type") != "fixed"}
+    for name, position in held.items():
+        _fix(joints[name], position)
+
+
+def _fix(joint: ET.Element, position: float) -> None:
+    """Turn a joint into a fixed one at ``position`` [rad, m]."""
     origin, axis = _origin(joint), joint.find("axis")
-    direction = _vector(axis.get("xyz") if axis is not None else None, "1 0 0")
-    rotation = pin.rpy.rpyToMatrix(_vector(origin.get("rpy"))) @ pin.exp3(direction * angle)
-    origin.set("rpy", _text(pin.rpy.matrixToRpy(rotation)))
-    for name in ("axis", "limit", "dynamics", "mimic"):
-        for element in joint.findall(name):
-            joint.remove(element)
+    direction = _vector(axis.get("xyz") if axis is not None else None, "1 0 0") * position
+    rotation = pin.rpy.rpyToMatrix(_vector(origin.get("rpy")))
+    if joint.get("type") == "prismatic":
+        origin.set("xyz", _text(_vector(origin.get("xyz")) + rotation @ direction))
+    else:
+        origin.set("rpy", _text(pin.rpy.matrixToRpy(rotation @ pin.exp3(direction))))
+    joint.set("type", "fixed")
+    strip_motion(joint)
 
 
 def _bound(path: Path, joint: ET.Element) -> None:

@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """Of an ``<inertia>``: the upper triangle, row by row."""
 
+_XACRO = "ros.org/wiki/xacro"  # in the names of xacro's own elements
+_ABOUT_AXIS = ("revolute", "continuous", "prismatic", "planar")
+_RANGED = ("revolute", "prismatic")
+_ENDS = ("lower", "upper")
 _LIMITS = ("lower", "upper", "effort", "velocity")
 _SIZES = (
     ("box", "size", 3),
@@ -36,6 +40,9 @@ _ROUNDING = 1e-6  # of a link's largest moment of inertia: URDFs are written wit
 def read_urdf(path: Path) -> ET.Element:
     """The root element of a URDF; entities of its DTD are replaced, whatever its encoding.
 
+    Axes are made as long as 1, which PyBullet takes them for. Of a fixed joint, axis, limits and
+    the like mean nothing and are removed.
+
     Args:
         path: the file.
 
@@ -50,6 +57,10 @@ def read_urdf(path: Path) -> ET.Element:
         raise RobotError(f"{path} is no URDF that can be read ({_line(error)})") from None
     if robot.tag != "robot":
         raise RobotError(f"{path} is no URDF: its root is <{robot.tag}> and not <robot>")
+    if path.suffix == ".xacro" or any(_XACRO in element.tag for element in robot.iter()):
+        raise RobotError(
+            f"{path} is a xacro file: run xacro first, as in `xacro robot.urdf.xacro > robot.urdf`"
+        )
     _check_names(path, robot)
     for link in robot.findall("link"):
         _check_inertial(path, link)
@@ -72,6 +83,50 @@ def build_model(path: Path, urdf: str) -> pin.Model:
         return pin.buildModelFromXML(urdf)
     except (ValueError, RuntimeError) as error:
         raise RobotError(f"{path} is no URDF that Pinocchio reads ({_line(error)})") from None
+
+
+def strip_motion(joint: ET.Element) -> None:
+    """Remove what says how a joint moves.
+
+    Args:
+        joint: that is fixed; changed.
+    """
+    for name in ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration"):
+        for element in joint.findall(name):
+            joint.remove(element)
+
+
+def check_motion(path: Path, robot: ET.Element) -> None:
+    """Check that the joints that are left to move have a range, and move by themselves.
+
+    Args:
+        path: of the file, for the message.
+        robot: its root element.
+
+    Raises:
+        RobotError: naming the joint that follows another one, or whose range is none.
+    """
+    for joint in robot.findall("joint"):
+        where = f"{path}: joint {joint.get('name')!r}"
+        mimic = joint.find("mimic")
+        if mimic is not None:
+            raise RobotError(
+                f"{where} mimics joint {mimic.get('joint')!r}, which is not simulated: make it"
+                " fixed, lock it with its leader, or remove its <mimic> if it has a motor"
+            )
+        for limit in joint.findall("limit") if joint.get("type") in _RANGED else ():
+            missing = [name for name in _ENDS if limit.get(name) is None]
+            lower, upper = (float(limit.get(name, "0")) for name in _ENDS)
+            if missing and not lower < upper:
+                raise RobotError(
+                    f"{where}: limit has no {' and no '.join(missing)}: give the range that it can"
+                    " turn in"
+                )
+            if not lower < upper:
+                raise RobotError(
+                    f"{where} has lower {lower:g} and upper {upper:g}: give a range that it can"
+                    " turn in"
+                )
 
 
 def write_out_massless(robot: ET.Element) -> None:
@@ -181,7 +236,8 @@ def _numbers(where: str, element: ET.Element, name: str, count: int, default: st
         values = np.array([])
     if len(values) != count or not np.isfinite(values).all():
         wanted = "a finite number" if count == 1 else f"{count} finite numbers"
-        raise RobotError(f"{where} has {name} {text!r}: give {wanted}")
+        hint = "; run xacro first" if "$" in text else ""
+        raise RobotError(f"{where} has {name} {text!r}: give {wanted}{hint}")
     return values
 
 
@@ -205,8 +261,10 @@ def _check_inertial(path: Path, link: ET.Element) -> None:
         raise RobotError(f"{where}: <inertial> lacks <mass> or <inertia>: give both")
     if _numbers(f"{where}: mass", mass, "value", 1)[0] < 0.0:
         raise RobotError(f"{where}: mass has value {mass.get('value')!r}: give none below zero")
+    for name in MOMENTS:  # Pinocchio passes over an <inertial> that lacks one
+        inertia.set(name, inertia.get(name, "0"))
     xx, xy, xz, yy, yz, zz = (
-        _numbers(f"{where}: inertia", inertia, name, 1, "0")[0] for name in MOMENTS
+        _numbers(f"{where}: inertia", inertia, name, 1)[0] for name in MOMENTS
     )
     moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     slack = _ROUNDING * np.abs(moments).max()
@@ -222,10 +280,18 @@ def _check_inertial(path: Path, link: ET.Element) -> None:
 def _check_joint(path: Path, joint: ET.Element) -> None:
     where = f"{path}: joint {joint.get('name')!r}"
     _check_origin(where, joint)
+    if joint.get("type") == "fixed":
+        strip_motion(joint)
     for axis in joint.findall("axis"):
         direction = _numbers(f"{where}: axis", axis, "xyz", 3, "1 0 0")
-        if not direction.any():
+        length = float(np.linalg.norm(direction))
+        if length == 0.0 and joint.get("type") in _ABOUT_AXIS:
             raise RobotError(f"{where}: axis is 0 0 0: give its direction")
+        if length not in (0.0, 1.0):
+            axis.set("xyz", " ".join(map(repr, (direction / length).tolist())))
+    for mimic in joint.findall("mimic"):
+        _numbers(f"{where}: mimic", mimic, "multiplier", 1, "1")
+        _numbers(f"{where}: mimic", mimic, "offset", 1, "0")
     for limit in joint.findall("limit"):
         for name, most in (("effort", "torque or force"), ("velocity", "speed")):
             if limit.get(name) is None:

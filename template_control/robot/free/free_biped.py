@@ -34,6 +34,7 @@ from template_control.robot.requirements import add_feet
 from template_control.robot.urdf import (
     build_model,
     check_bodies,
+    check_motion,
     check_shapes,
     read_urdf,
     write_out_massless,
@@ -157,6 +158,7 @@ class FreeBiped(Biped):
             if limits.ranges:
                 set_ranges(path, tree, feet, limits.ranges)
         spheres(tree, feet, foot_radius)
+        check_motion(path, tree)
         find_meshes(path, tree)
         check_shapes(path, tree)
         gather_inertias(tree)

@@ -124,11 +124,3 @@ def check_free(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
                 raise RobotError(
                     f"{path}: joint {model.names[joint]!r} has {kind} {limit}: give its limit"
                 )
-    for joint in (*legs[0], *legs[1]):
-        place = model.idx_qs[joint]
-        lower, upper = model.lowerPositionLimit[place], model.upperPositionLimit[place]
-        if not lower < upper:
-            raise RobotError(
-                f"{path}: joint {model.names[joint]!r} has lower {lower:g} and upper {upper:g}:"
-                " give a range that it can turn in"
-            )
