@@ -1,16 +1,14 @@
-"""What is simulated is the robot of the URDF: every engine lets it fall as Pinocchio does."""
+"""The robot that is simulated is that of the URDF: in every engine it falls as in Pinocchio."""
 
 import re
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from falling import DT, FREE, PLANAR, falls_as_pinocchio_says
 
 from template_control.errors import RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions
-from template_control.plant.free.bullet import FreeBulletPlant
-from template_control.plant.free.mujoco import FreeMujocoPlant
-from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.library import (
@@ -22,14 +20,6 @@ from template_control.robot.library import (
 )
 from template_control.robot.planar_biped import PlanarBiped
 
-DT = 1e-4  # [s]
-FALL = 0.1  # [s]
-FREE = {"pybullet": (FreeBulletPlant, PlantOptions), "mujoco": (FreeMujocoPlant, MujocoOptions)}
-PLANAR = {
-    "pybullet": (BulletPlant, PlantOptions),
-    "mujoco": (MujocoPlant, MujocoOptions),
-    "ideal": (IdealPlant, IdealOptions),
-}
 SAGITTAL = ("left_hip", "left_knee", "right_hip", "right_knee")
 FIXED = (
     '<joint name="{0}_{1}" type="fixed"><origin xyz="{2}" rpy="{3}"/><parent link="{0}"/>'
@@ -93,42 +83,6 @@ def written(tmp_path):
         return path
 
     return write
-
-
-def falls_as_pinocchio_says(robot, plant, seed=3):
-    """Let a robot fall, its joints moving, and compare with the model's own fall."""
-    rng = np.random.default_rng(seed)
-    q, nu = robot.neutral(), len(robot.joint_names)
-    middle = np.clip(robot.joint_range.mean(axis=1), -1.0, 1.0)
-    q[-nu:] = middle + rng.uniform(-0.1, 0.1, nu)
-    q[1 if robot.base_dof == 3 else 2] = 5.0
-    v = np.concatenate([rng.uniform(-0.5, 0.5, robot.base_dof), rng.uniform(-1, 1, nu)])
-    torque = 0.005 * robot.mass * rng.uniform(-1.0, 1.0, nu)
-    with plant:
-        plant.reset(q, v)
-        for _ in range(round(FALL / DT)):
-            plant.step(torque)
-        found_q, found_v = robot.neutral(), np.zeros(robot.nv)
-        plant.read(found_q, found_v)
-    data, drive = robot.model.createData(), np.concatenate([np.zeros(robot.base_dof), torque])
-
-    def rate(q, v):
-        return pin.aba(robot.model, data, q, v, drive)
-
-    h = 1e-3
-    for _ in range(round(FALL / h)):  # the classical Runge-Kutta method
-        a1 = rate(q, v)
-        v2 = v + 0.5 * h * a1
-        a2 = rate(pin.integrate(robot.model, q, 0.5 * h * v), v2)
-        v3 = v + 0.5 * h * a2
-        a3 = rate(pin.integrate(robot.model, q, 0.5 * h * v2), v3)
-        v4 = v + h * a3
-        a4 = rate(pin.integrate(robot.model, q, h * v3), v4)
-        q = pin.integrate(robot.model, q, h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4))
-        v = v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-    assert v[1 if robot.base_dof == 3 else 2] < -0.3  # it fell
-    np.testing.assert_allclose(pin.difference(robot.model, q, found_q), 0.0, atol=3e-4)
-    np.testing.assert_allclose(found_v, v, atol=3e-3)
 
 
 @pytest.mark.parametrize("engine", FREE)

@@ -31,12 +31,8 @@ def check_mass_matrix(robot: Biped, engine: str, mass_matrix: Callable[[Array], 
     Raises:
         RobotError: naming the joint or the base where they differ.
     """
-    q = robot.neutral()
-    nu = len(robot.joint_names)
-    q[-nu:] = np.resize(_ANGLES, nu)
-    upper = np.triu(pin.crba(robot.model, robot.model.createData(), q))
-    ours = upper + np.triu(upper, 1).T
-    theirs = mass_matrix(q)
+    q = _bent(robot)
+    ours, theirs = _mass_matrix(robot, q), mass_matrix(q)
     scale = np.sqrt(np.diag(ours))
     off = np.abs(theirs - ours) / np.outer(scale, scale)
     if not np.isfinite(off).all() or off.max() > _CLOSE:
@@ -48,3 +44,42 @@ def check_mass_matrix(robot: Biped, engine: str, mass_matrix: Callable[[Array], 
             f" {off[row].max():.2g} of its entries: {engine} reads the URDF otherwise; write its"
             " inertias and joints more plainly, or take another plant"
         )
+
+
+def check_damping(robot: Biped, time_step: float) -> None:
+    """Check that damping held for a time step takes away no more speed than there is.
+
+    PyBullet and the integrator of the ideal plant overshoot then, and diverge.
+
+    Args:
+        robot: the model.
+        time_step: of the engine [s].
+
+    Raises:
+        RobotError: naming the joint of the largest damping, and the time step that would do.
+    """
+    damping = robot.joint_damping
+    # Of the joints alone: nothing holds the base, so their inertia is at its least.
+    answer = np.linalg.inv(_mass_matrix(robot, _bent(robot)))[robot.base_dof :, robot.base_dof :]
+    root = np.sqrt(damping)
+    rate = float(np.linalg.eigvalsh(root[:, None] * answer * root).max())
+    if rate * time_step > 1.0:
+        worst = robot.joint_names[int(np.argmax(damping))]
+        raise RobotError(
+            f"{robot.path}: joint {worst!r} has a damping of {damping.max():g} N m s/rad, too much"
+            f" for a time step of {time_step:g} s: take {0.9 / rate:.2g} s, or load the robot"
+            " lossless"
+        )
+
+
+def _bent(robot: Biped) -> Array:
+    """(nq,) a configuration at which no term vanishes."""
+    q, nu = robot.neutral(), len(robot.joint_names)
+    q[-nu:] = np.resize(_ANGLES, nu)
+    return q
+
+
+def _mass_matrix(robot: Biped, q: Array) -> Array:
+    """Pinocchio's (nv, nv)."""
+    upper = np.triu(pin.crba(robot.model, robot.model.createData(), q))
+    return upper + np.triu(upper, 1).T

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
-from template_control.plant.agreement import check_mass_matrix
+from template_control.plant.agreement import check_damping, check_mass_matrix
 from template_control.plant.bullet_bodies import ground_bodies, load_body
 from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import silenced
@@ -108,6 +108,7 @@ class BulletPlant:
             self.joints = [by_name[name] for name in robot.model.names if name in by_name]
             self._compare_masses(info)
             check_mass_matrix(robot, "PyBullet", self._mass_matrix)
+            check_damping(robot, options.time_step)
         except RobotError:
             self.close()
             raise
@@ -163,6 +164,7 @@ class BulletPlant:
     def _configure(self, joints: int) -> None:
         p, c, body = pybullet, self.client, self.body
         friction = self.options.friction
+        damping = dict(zip(self._actuated, self.robot.joint_damping, strict=True))
         # One property a call: a combined call silently drops some of them.
         for ground, own in self._ground.items():
             share = 1.0 if own is None else own / friction
@@ -174,7 +176,7 @@ class BulletPlant:
                 ("restitution", 0.0),
                 ("linearDamping", 0.0),
                 ("angularDamping", 0.0),
-                ("jointDamping", 0.0),
+                ("jointDamping", damping.get(link, 0.0)),
                 ("maxJointVelocity", 1e4),
             ):
                 p.changeDynamics(body, link, **{name: value}, physicsClientId=c)
@@ -189,8 +191,12 @@ class BulletPlant:
                     localInertiaDiagonal=[i * scale for i in inertia],
                     physicsClientId=c,
                 )
+        dry = dict(zip(self._actuated, self.robot.joint_friction, strict=True))
         for joint in self.joints:
-            p.setJointMotorControl2(body, joint, p.VELOCITY_CONTROL, force=0.0, physicsClientId=c)
+            # A motor that holds a joint with so much torque at most is dry friction.
+            p.setJointMotorControl2(
+                body, joint, p.VELOCITY_CONTROL, force=dry.get(joint, 0.0), physicsClientId=c
+            )
 
     @property
     def time_step(self) -> float:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError
+from template_control.plant.agreement import check_damping
 from template_control.plant.rigid_contact import pressing, solve
 from template_control.plant.terrain.rolling_feet import RollingFeet
 from template_control.plant.terrain.terrain import Terrain
@@ -35,6 +36,7 @@ _HALVINGS = 24  # of a time step, to locate an event in
 _EVENTS = 16  # in one time step; beyond them it is integrated to its end as it is
 _PULL = 1e-6  # of the weight: a foot that would pull this much is released
 _REST = 1e-3  # [m/s] a foot that an impact lifts more slowly than this stays on the ground
+_SWEEPS = 30  # over the joints with friction; four coupled joints need no more
 _DRIFT = 1e-12  # constraint error [m, m/s] that is projected away
 
 
@@ -106,6 +108,8 @@ class IdealPlant:
         self._push = 0.0
         self._feet = RollingFeet(self.robot, options.ground)
         self._impulse = np.zeros((2, 2))
+        check_damping(self.robot, options.time_step)
+        self._rubbing = np.flatnonzero(robot.joint_friction) + BASE_DOF
         self._trunk_corners = tuple(trunk_corners(self.robot).T.tolist())
 
     @property
@@ -166,12 +170,36 @@ class IdealPlant:
         self._push = push
         self._impulse[:] = 0.0
         try:
+            if self._rubbing.size:
+                self._rub()
             self._advance(self.options.time_step)
         except np.linalg.LinAlgError:
             raise ParameterError(
                 f"{self.robot.name}: the contacts' forces are not determined at q ="
                 f" {self._q.tolist()}"
             ) from None
+
+    def _rub(self) -> None:
+        """Add the joints' dry friction to the drive, held during the step as the torques are.
+
+        It is what stops a joint within the step, or as much of it as there is: a problem of
+        complementarity in the joints' speeds at the end of the step, solved in sweeps.
+        """
+        r, h, joints = self.robot, self.options.time_step, self._rubbing
+        self._see(self._q, self._v)
+        rows, gamma = self._feet.rows()
+        a, _ = solve(r.mass_matrix, self._right(self._q), rows, gamma, self.contacts)
+        units = np.eye(r.nv)[joints]
+        none = np.zeros((2, 2))
+        answer = [solve(r.mass_matrix, unit, rows, none, self.contacts)[0] for unit in units]
+        per_torque = np.array(answer)[:, joints]
+        ends = self._v[joints] / h + a[joints]
+        most, torque = r.joint_friction[joints - BASE_DOF], np.zeros(len(joints))
+        for _ in range(_SWEEPS):
+            for i, own in enumerate(per_torque):
+                wanted = torque[i] - (ends[i] + own @ torque) / own[i]
+                torque[i] = min(max(wanted, -most[i]), most[i])
+        self._drive[joints] += torque
 
     def _advance(self, left: float) -> None:
         """Go on for ``left`` seconds, from event to event."""

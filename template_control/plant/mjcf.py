@@ -28,6 +28,7 @@ TRUNK = "trunk"
 """What the names of shapes that touch the ground begin with."""
 
 _MASSLESS = 1e-12  # of the robot's mass
+_HELD = 0.9999  # MuJoCo's largest impedance
 _CORNER = 1e-3  # radius of the balls at the trunk's corners [m]
 
 
@@ -44,7 +45,7 @@ def mjcf(robot: PlanarBiped, world: PlantOptions, contact_time: float) -> str:
         contact_time: time constant with which a contact gives way [s].
     """
     root, ground = world_element(robot, world, contact_time)
-    _add_robot(ground, robot, world.mass_scale)
+    _add_robot(ground, robot, world)
     return ElementTree.tostring(root, encoding="unicode")
 
 
@@ -115,7 +116,7 @@ def _add_ground(parent: Element, world: PlantOptions, contact_time: float) -> No
         add(parent, "geom", **box, **how)
 
 
-def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
+def _add_robot(ground: Element, robot: PlanarBiped, world: PlantOptions) -> None:
     """One body for each link that has mass, with the joints that lead to it."""
     model = robot.model
     axes = _axes(model)
@@ -138,8 +139,10 @@ def _add_robot(ground: Element, robot: PlanarBiped, mass_scale: float) -> None:
         here = pose.inverse()
         for above in chain:
             here = here * data.liMi[above]
-            _add_joint(body, model, above, here, axes[:, above - 1], ref=float(neutral[above - 1]))
-        _add_inertia(body, model.inertias[joint], axes[3:, joint - 1], mass_scale)
+            ref, hinge = float(neutral[above - 1]), above - 1 - BASE_DOF
+            lost = losses(robot, hinge, world.time_step) if hinge >= 0 else {}
+            _add_joint(body, model, above, here, axes[:, above - 1], ref=ref, lost=lost)
+        _add_inertia(body, model.inertias[joint], axes[3:, joint - 1], world.mass_scale)
         bodies[joint] = body
     for i, foot in enumerate(robot.feet):
         frame = model.frames[foot_frame(model, foot)]
@@ -168,9 +171,19 @@ def place(pose: pin.SE3) -> dict[str, str]:
 
 
 def _add_joint(
-    body: Element, model: pin.Model, joint: int, here: pin.SE3, axis: Array, *, ref: float
+    body: Element,
+    model: pin.Model,
+    joint: int,
+    here: pin.SE3,
+    axis: Array,
+    *,
+    ref: float,
+    lost: dict[str, str],
 ) -> None:
-    """A joint of a body; ``here`` is its frame in the body's where its angle is ``ref``."""
+    """A joint of a body; ``here`` is its frame in the body's where its angle is ``ref``.
+
+    ``lost`` holds the attributes of its damping and friction.
+    """
     hinge = bool(np.any(axis[3:]))
     about = {
         "name": model.names[joint],
@@ -182,7 +195,27 @@ def _add_joint(
     low, high = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
     if joint > BASE_DOF and max(abs(low), abs(high)) < UNLIMITED:
         about["range"] = text((low, high))
-    add(body, "joint", **about)
+    add(body, "joint", **about, **lost)
+
+
+def losses(robot: Biped, joint: int, time_step: float) -> dict[str, str]:
+    """Attributes of a joint that has damping or friction.
+
+    Args:
+        robot: whose joint.
+        joint: its index among the actuated ones.
+        time_step: of the world [s].
+    """
+    found = {}
+    damping, friction = robot.joint_damping[joint], robot.joint_friction[joint]
+    if damping > 0.0:
+        found["damping"] = repr(float(damping))
+    if friction > 0.0:
+        found["frictionloss"] = repr(float(friction))
+        # As stiff as MuJoCo allows: by default a joint that friction holds creeps.
+        found["solreffriction"] = text((2.0 * time_step, 1.0))
+        found["solimpfriction"] = text((_HELD, _HELD, 1e-3, 0.5, 2.0))
+    return found
 
 
 def _add_inertia(body: Element, inertia: pin.Inertia, axis: Array, scale: float) -> None:

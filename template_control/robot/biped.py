@@ -48,6 +48,9 @@ class Biped(ABC):
         torque_limit: (nu,) URDF ``effort`` [N m].
         velocity_limit: (nu,) URDF ``velocity`` [rad/s].
         joint_range: (nu, 2) URDF ``lower`` and ``upper`` [rad].
+        joint_damping: (nu,) URDF ``damping``: viscous [N m s/rad].
+        joint_friction: (nu,) URDF ``friction``: dry, at most this much [N m]. Plants have it; no
+            term of the model does.
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
         leg_length: from hip to the foot sphere's centre with a straight knee [m].
         joint_sign: (nu,) 1 of a hip or knee that turns about +y, -1 about -y; of joints above the
@@ -57,7 +60,7 @@ class Biped(ABC):
 
     Attributes (written by :meth:`update`; views that the next call overwrites):
         mass_matrix: (nv, nv) M(q).
-        nonlinear_effects: (nv,) C(q, v) v + g(q) [N, N m].
+        nonlinear_effects: (nv,) C(q, v) v + g(q), and the joints' damping [N, N m].
         com, com_velocity: (2,) [m, m/s].
         com_jacobian: (2, nv) maps v to the CoM's velocity.
         com_bias: (2,) dJ/dt v of this Jacobian [m/s^2].
@@ -93,6 +96,8 @@ class Biped(ABC):
     torque_limit: Array
     velocity_limit: Array
     joint_range: Array
+    joint_damping: Array
+    joint_friction: Array
     legs: tuple[tuple[int, ...], ...]
     leg_length: float
     joint_sign: Array
@@ -140,6 +145,9 @@ class Biped(ABC):
         nu = len(self.joint_names)
         limits = (model.lowerPositionLimit, model.upperPositionLimit)
         self.joint_range = np.column_stack(limits)[-nu:]
+        self.joint_damping = np.array(model.damping[self.base_dof :])
+        self.joint_friction = np.array(model.upperDryFrictionLimit[self.base_dof :])
+        self._damped = bool(self.joint_damping.any())
         self.joint_angle = np.zeros(nu)
         self.fastest, self.soonest_stop = 0.0, np.inf
         self._foot_ids = tuple(foot_frame(model, foot) for foot in feet)
@@ -176,6 +184,8 @@ class Biped(ABC):
         model, data = self.model, self._data
         self.joint_angle[:] = q[-len(self.joint_angle) :]
         pin.computeAllTerms(model, data, q, v)
+        if self._damped:
+            self.nonlinear_effects[self.base_dof :] += self.joint_damping * v[self.base_dof :]
         pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
         left, right = self._foot_ids
         pin.updateFramePlacement(model, data, left)

@@ -20,6 +20,7 @@ from template_control.checks.checked import checked
 from template_control.errors import RobotError
 from template_control.robot.biped import Biped, leg_joints
 from template_control.robot.fixed_links import drop_world, gather_inertias
+from template_control.robot.joint_losses import check_guide, read_losses
 from template_control.robot.legs import HINGES
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planar_terms import PlanarTerms, gather, sources
@@ -108,6 +109,8 @@ class PlanarBiped(Biped):
         locked: Mapping[str, float] | None = None,
         foot_radius: float | None = None,
         walk: tuple[float, float] | None = None,
+        *,
+        lossless: bool = False,
     ) -> PlanarBiped:
         """Load a planar URDF, or a 3D one that is held in its sagittal plane.
 
@@ -121,6 +124,7 @@ class PlanarBiped(Biped):
             locked: angles [rad] of locked joints; 0 for those not named.
             foot_radius: of spheres to be put into the feet of a 3D URDF [m].
             walk: see the attribute.
+            lossless: whether the joints' damping and friction are left out.
 
         Meshes are looked for beside the URDF and in its package. One that is only shown may be
         missing: the log says so.
@@ -132,6 +136,7 @@ class PlanarBiped(Biped):
         path = Path(path)
         tree = read_urdf(path)
         drop_world(tree)
+        read_losses(path, tree, lossless)
         if sagittal_joints:
             planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
         check_motion(path, tree)
@@ -142,6 +147,7 @@ class PlanarBiped(Biped):
         urdf = ElementTree.tostring(tree, encoding="unicode")
         model = build_model(path, urdf)
         check_planar(path, model)
+        check_guide(path, model)
         for name, value in (("foot_radius", foot_radius), ("locked", locked or None)):
             if value is not None and not sagittal_joints:
                 raise RobotError(

@@ -66,6 +66,12 @@ def add_robot_options(parser: argparse.ArgumentParser) -> None:
         metavar="M",
         help="of a 3D URDF: radius of the spheres put into its feet",
     )
+    own.add_argument(
+        "--lossless",
+        action="store_const",
+        const=True,
+        help="leave out the damping and friction of the URDF's joints",
+    )
 
 
 def robot_choice(options: argparse.Namespace, base: RobotChoice) -> RobotChoice:
@@ -85,8 +91,9 @@ def robot_choice(options: argparse.Namespace, base: RobotChoice) -> RobotChoice:
             given[name] = tuple(getattr(options, name))
     if options.foot_radius is not None:
         given["foot_radius"] = options.foot_radius
-    if options.free is not None:
-        given["free"] = True
+    for name in ("free", "lossless"):
+        if getattr(options, name) is not None:
+            given[name] = True
     if options.locked is not None:
         given["locked"] = dict(map(_locked, options.locked))
     return replace(base, **given)

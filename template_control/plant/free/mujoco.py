@@ -9,7 +9,16 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.plant.mjcf import FOOT, TRUNK, add, add_ball, place, text, world_element
+from template_control.plant.mjcf import (
+    FOOT,
+    TRUNK,
+    add,
+    add_ball,
+    losses,
+    place,
+    text,
+    world_element,
+)
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.robot.biped import Biped, foot_frame
 from template_control.robot.free.free_biped import FreeBiped
@@ -56,6 +65,7 @@ class FreeMujocoPlant(MujocoPlant):
             else:
                 axis = data.oMi[joint].rotation.T @ axes[3:, model.idx_vs[joint]]
                 about = {"axis": text(axis), "ref": repr(float(neutral[model.idx_qs[joint]]))}
+                about |= losses(robot, joint - 1 - _ROOT, self.options.time_step)
                 add(body, "joint", name=model.names[joint], type="hinge", **about)
             inertia = model.inertias[joint]
             i = scale * inertia.inertia

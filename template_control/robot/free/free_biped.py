@@ -27,6 +27,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.fixed_links import drop_world, gather_inertias
 from template_control.robot.free.free_terms import BASE_DOF, FreeTerms, gather, sources
 from template_control.robot.free.requirements import check_free, set_limits, set_ranges
+from template_control.robot.joint_losses import read_losses
 from template_control.robot.legs import HINGES
 from template_control.robot.meshes import find_meshes
 from template_control.robot.planarise import spheres
@@ -134,6 +135,8 @@ class FreeBiped(Biped):
         foot_radius: float | None = None,
         limits: JointLimits | None = None,
         walk: tuple[float, float] | None = None,
+        *,
+        lossless: bool = False,
     ) -> FreeBiped:
         """Load a URDF whose root link is the trunk: x forward, y left, z up.
 
@@ -145,6 +148,7 @@ class FreeBiped(Biped):
             foot_radius: of spheres to be put into the feet [m]; None to keep the feet's own.
             limits: in place of the URDF's; None to keep those.
             walk: see :class:`~template_control.robot.biped.Biped`.
+            lossless: whether the joints' damping and friction are left out.
 
         Raises:
             RobotError: if the file is missing, no URDF, no such biped, or lacks a foot; if a mass,
@@ -153,6 +157,7 @@ class FreeBiped(Biped):
         path = Path(path)
         tree = read_urdf(path)
         drop_world(tree)
+        read_losses(path, tree, lossless)
         if limits is not None:
             set_limits(tree, limits.torque, limits.velocity)
             if limits.ranges:

@@ -23,6 +23,7 @@ class RobotChoice(Checked):
         sagittal_joints: of a 3D URDF, hips and knees.
         foot_radius: of the spheres put into the feet of a 3D URDF [m].
         locked: angle of each locked joint of a 3D URDF that is not at 0 [rad].
+        lossless: whether damping and friction of a URDF's joints are left out.
         free: whether nothing holds the robot; its URDF is a 3D one, and all its joints move.
     """
 
@@ -32,6 +33,7 @@ class RobotChoice(Checked):
     foot_radius: float | None = None
     locked: Mapping[str, float] = field(default_factory=dict)
     free: bool = False
+    lossless: bool = False
 
     def load(self) -> Biped:
         """The robot.
@@ -45,8 +47,9 @@ class RobotChoice(Checked):
             "sagittal_joints": self.sagittal_joints,
             "foot_radius": self.foot_radius,
             "locked": self.locked,
+            "lossless": self.lossless,
         }
-        given = {name: value for name, value in own.items() if value not in (None, (), {})}
+        given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
         if not given:
             return load_free_robot(self.model) if self.free else load_robot(self.model)
         if self.model in ROBOTS:
