@@ -29,7 +29,7 @@ class FileLock:
     twice, and nobody waits for ever.
 
     Args:
-        path: of an empty file that stands for what is locked; its folder is made.
+        path: of a folder or a file, which is made if need be, with its folder.
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,7 +42,8 @@ class FileLock:
             return True
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+            way = os.O_RDONLY if self.path.is_dir() else os.O_RDWR | os.O_CREAT
+            file = os.open(self.path, way, 0o666)
         except OSError:
             return True
         try:

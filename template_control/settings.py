@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import numpy as np
 
-from template_control.errors import ParameterError
+from template_control.errors import ParameterError, TemplateControlError
 
 T = TypeVar("T")
 
@@ -45,7 +45,7 @@ def read(kind: type[T], path: str | Path) -> T:
             value of another type, or the dataclass refuses a value.
     """
     try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        table = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ParameterError(f"cannot read {path}: {error.strerror}; give a TOML file") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -82,7 +82,11 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
     for name, f in known.items():
         if name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise ParameterError(f"{where or 'the table'} has no {name}: give one")
-    return kind(**values)
+    try:
+        return kind(**values)
+    except TemplateControlError as error:  # which names the class, and not the key
+        text = str(error).replace(f"{kind.__name__}.", f"{where}." if where else "")
+        raise type(error)(text) from None
 
 
 def _read(hint: Any, value: Any, where: str) -> Any:

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from template_control.errors import RecordError, TemplateControlError
+from template_control.file_lock import FileLock
 
 T = TypeVar("T")
 
@@ -182,7 +183,10 @@ def _values(path: str | Path, kind: str, older: Mapping[str, Upgrade]) -> dict[s
     except KeyError as error:
         raise _NoRecordError(f"it lacks {error.args[0]}") from None
     except Exception as error:  # a damaged file has any of a dozen
-        raise _NoRecordError(f"{name} cannot be read: {error}") from None
+        # NumPy's own words for what is no array advise to load it unsafely.
+        known = isinstance(error, json.JSONDecodeError) or not isinstance(error, ValueError)
+        reason = str(error) if known else "it holds no arrays of numbers"
+        raise _NoRecordError(f"{name} cannot be read: {reason}") from None
     if found != kind:
         if found.rpartition(" ")[0] == kind.rpartition(" ")[0]:
             raise RecordError(
@@ -244,11 +248,18 @@ def write_text(path: str | Path, text: str) -> Path:
     return Path(path)
 
 
-def writable(folder: Path) -> Path:
-    """The folder, made if need be.
+@contextmanager
+def writing(folder: Path) -> Iterator[Path]:
+    """Keep a folder for one command's files: made if need be, and locked meanwhile.
+
+    Args:
+        folder: where the files go.
+
+    Yields:
+        The folder.
 
     Raises:
-        RecordError: if nothing can be written there.
+        RecordError: if nothing can be written there, or another command writes there now.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -259,4 +270,12 @@ def writable(folder: Path) -> Path:
         raise RecordError(
             f"cannot write to {folder}: {error.strerror}; give another --output"
         ) from None
-    return folder
+    lock = FileLock(folder)
+    if not lock.take():
+        raise RecordError(
+            f"another command writes to {folder} now: wait for it, or give another --output"
+        )
+    try:
+        yield folder
+    finally:
+        lock.release()

@@ -38,7 +38,7 @@ class Sample(Checked):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"count": 2.5}, "Sample.count is 2.5: give a whole number from 1 up"),
+        ({"count": 2.5}, "Sample.count is 2.5: give a whole number from 1 to 1000000"),
         ({"count": True}, "whole number"),
         ({"size": 0}, "Sample.size is 0: give a positive number"),
         ({"size": "1"}, "is '1': give a positive number"),

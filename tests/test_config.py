@@ -157,8 +157,8 @@ def test_a_wrong_file_is_one_line_with_file_and_key(text, told, refused, tmp_pat
     [
         ("--config none.toml", "cannot read none.toml"),
         ("--push 5", "--push 5: give IMPULSE@STEP or IMPULSE@STEP:PHASE"),
-        ("--push x@2", "--push x@2: give IMPULSE@STEP"),
-        ("--push 5@2.5", "--push 5@2.5: give IMPULSE@STEP"),
+        ("--push x@2", "--push x@2: impulse is 'x': give a finite number"),
+        ("--push 5@2.5", "--push 5@2.5: step is '2.5': give a whole number from 0 up"),
         ("--noise -1", "--noise is -1: give a number from 0 to 1"),
         ("--delay 2", "--delay is 2: give a number from 0 to 1"),
         ("--delay 0.0015", "give a multiple of the time step"),

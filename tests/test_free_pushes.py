@@ -62,7 +62,7 @@ def test_the_command_line_tells_a_direction(understood, refused):
     pushes = simulation_choice(understood(line), tc.SimulationOptions(), ends=False).pushes
     assert pushes == (tc.Push(0.1, 2, 0.5, direction=radians(90.0)), tc.Push(-0.1, 3))
     words = ["walk", "--robot", "bolt", "--free", "--steps", "4", "--push"]
-    assert "IMPULSE@STEP:PHASE:DIRECTION" in refused([*words, "0.1@2:0.5:left"])
+    assert "direction is 'left': give a number from -360" in refused([*words, "0.1@2:0.5:left"])
 
 
 def test_a_planar_robot_is_not_pushed_aside(refused, robot, gait):

@@ -85,11 +85,8 @@ def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, refuse
     assert not (tmp_path / "runs" / "robustness" / "hexapod").exists()
 
 
-def test_an_unknown_disturbance_is_refused(capfd):
-    with pytest.raises(SystemExit) as stop:
-        main(["robustness", "--disturbance", "wind"])
-    assert stop.value.code == 2
-    assert "push-forward" in capfd.readouterr().err
+def test_an_unknown_disturbance_is_refused(refused):
+    assert "push-forward" in refused(["robustness", "--disturbance", "wind"])
 
 
 def test_ctrl_c_tells_how_to_go_on(tmp_path, monkeypatch, capfd):

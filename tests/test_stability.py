@@ -160,7 +160,7 @@ def test_gaits_command_follows_controlled_ones(tmp_path, capfd):
     ("arguments", "culprit"),
     [
         (["--fix", "colour=3"], "names no quantity"),
-        (["--fix", "height=tall"], "has no number"),
+        (["--fix", "height=tall"], "--fix height is 'tall': give a positive number"),
         (["--fix", "height=0.98"], "give two of"),
         (["--limits", "830", "815"], "give low, then high"),
         (["--over", "speed"], "needs --limits"),

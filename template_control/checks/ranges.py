@@ -41,15 +41,20 @@ class Range(NamedTuple):
         if self.low == 0.0 and self.above and not high:
             return f"a positive {what}"
         if not high:
-            return f"a {what} {'above' if self.above else 'from'} {self.low:g}" + (
+            return f"a {what} {'above' if self.above else 'from'} {_plain(self.low)}" + (
                 "" if self.above else " up"
             )
         if not low:
-            return f"a {what} {'below' if self.below else 'up to'} {self.high:g}"
-        first = f"above {self.low:g}" if self.above else f"from {self.low:g}"
+            return f"a {what} {'below' if self.below else 'up to'} {_plain(self.high)}"
+        first = f"{'above' if self.above else 'from'} {_plain(self.low)}"
         to = "to" if not self.above else "and up to"
-        last = f"and below {self.high:g}" if self.below else f"{to} {self.high:g}"
+        last = f"{'and below' if self.below else to} {_plain(self.high)}"
         return f"a {what} {first} {last}"
+
+
+def _plain(end: float) -> str:
+    """An end of a range; a million in full."""
+    return str(round(end)) if end == round(end) and abs(end) < 1e9 else f"{end:g}"
 
 
 class Shape(NamedTuple):
@@ -90,8 +95,13 @@ Array = NDArray[np.float64]
 Positive = Annotated[float, Range(0.0, above=True)]
 NotNegative = Annotated[float, Range(0.0)]
 Share = Annotated[float, Range(0.0, 1.0)]
+Speed = Annotated[float, Range(0.0, 20.0, above=True)]
+"""Wanted of a walk or a run [m/s]; twice that of the fastest runner."""
 Angle = Annotated[float, Range(0.0, math.pi / 2.0, above=True, below=True)]
-Count = Annotated[int, Range(1)]
+Degrees = Annotated[float, Range(0.0, 90.0, above=True, below=True)]
+"""Of a leg's angle to the ground, where a user types it."""
+Count = Annotated[int, Range(1, 1_000_000)]
+"""Of things that are made or simulated one by one."""
 Index = Annotated[int, Range(0)]
 Interval = Annotated[tuple[float, float], Rising()]
 Vector = Annotated[Array, Shape((None,))]

@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from template_control.checks import option_types as values
 from template_control.errors import ParameterError, RecordError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
@@ -34,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument(
         "--output",
-        type=Path,
+        type=values.path,
         default=Path("runs/automaton.png"),
         metavar="FILE",
         help=f"file of the figure ({', '.join(_SUFFIXES)}); its folder is made if need be",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,10 @@ from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from template_control.checks import option_types as values
+from template_control.checks import typed
+from template_control.checks.fitting import check
+from template_control.checks.ranges import Degrees, Positive, Range
 from template_control.cli.report.family import make_family
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind
@@ -27,7 +32,7 @@ from template_control.slip.gaits.gait_branch import Family
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.storage import Files, writable
+from template_control.storage import Files, writing
 from template_control.terminal import plain_console
 from template_control.view.figure_file import save_figure
 from template_control.view.stability_figures import UNITS, branch_figure
@@ -79,6 +84,10 @@ _COLUMNS = {
 }
 _STRIDES = {"walk": "w", "run": "r"}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER)}
+_TYPED = {
+    **dict.fromkeys(QUANTITIES, Positive),
+    "angle": Degrees,
+}
 _TABLE_ROWS = 14
 _MOST_ROUNDS = 100
 
@@ -103,7 +112,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--rounds",
-        type=int,
+        type=values.whole(Range(0, _MOST_ROUNDS)),
         default=0,
         help="of descent on the cost of a family's gaits, which its file states",
     )
@@ -127,10 +136,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="where to look for the first gait, instead of the defaults",
     )
     parser.add_argument("--over", choices=QUANTITIES, default="energy", help="quantity to go over")
-    parser.add_argument("--limits", nargs=2, type=float, metavar=("LOW", "HIGH"), help="of --over")
-    parser.add_argument("--step", type=float, default=0.004, help="largest arclength step")
     parser.add_argument(
-        "--output", type=Path, default=Path("runs/gaits"), help="folder for the figure"
+        "--limits",
+        nargs=2,
+        type=values.number(Range()),
+        metavar=("LOW", "HIGH"),
+        help="of --over",
+    )
+    parser.add_argument(
+        "--step",
+        type=values.number(Range(0.0, 0.5, above=True)),
+        default=0.004,
+        help="largest arclength step",
+    )
+    parser.add_argument(
+        "--output", type=values.path, default=Path("runs/gaits"), help="folder for the figure"
     )
     parser.add_argument(
         "--json", action="store_true", help="print the branch as JSON, and nothing else, on stdout"
@@ -144,29 +164,46 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ParameterError: naming the option that is out of its range or does not fit another.
     """
+    wanted = _wanted(options)
+    with nullcontext() if options.no_figures else writing(options.output) as folder:
+        if wanted is None:
+            return make_family(folder, options.json, SearchEffort(rounds=options.rounds))
+        return _branch(options, wanted, folder)
+
+
+def _wanted(options: argparse.Namespace) -> _Wanted | None:
+    """The branch that was asked for; None for the family by speed.
+
+    Raises:
+        ParameterError: naming the option that is out of its range or does not fit another.
+    """
     if options.family:
-        folder = None if options.no_figures else writable(options.output)
-        if not 0 <= options.rounds <= _MOST_ROUNDS:
-            raise ParameterError(
-                f"--rounds is {options.rounds}: give a number from 0 to {_MOST_ROUNDS}"
-            )
-        return make_family(folder, options.json, SearchEffort(rounds=options.rounds))
+        idle = [n for n in ("fix", "controlled", "start", "limits") if getattr(options, n)]
+        if idle:
+            raise ParameterError(f"--{idle[0]} does not go with --family: leave one out")
+        return None
+    if options.rounds:
+        raise ParameterError("--rounds goes with --family: leave it out, or give both")
     defaults = _DEFAULTS[options.gait]
     given = _quantities("--fix", options.fix)
     limits = (options.limits[0], options.limits[1]) if options.limits else defaults.limits
     if options.limits is None and options.over != "energy":
         raise ParameterError(f"--over {options.over} needs --limits: give its range")
+    for limit in limits:
+        check("--limits", limit, _TYPED[options.over])
     if not limits[0] < limits[1]:
         raise ParameterError(f"--limits are {limits[0]:g} and {limits[1]:g}: give low, then high")
-    if not (math.isfinite(options.step) and 0.0 < options.step <= 0.5):
-        raise ParameterError(f"--step is {options.step:g}: give a number from 0 to 0.5")
-    folder = None if options.no_figures else writable(options.output)
     held = given or (defaults.held if options.controlled else defaults.fixed)
     start = _quantities("--start", options.start)
-    wanted = _Wanted(options.gait, held, start, options.over, limits, options.step)
+    if options.controlled and options.limits is None:
+        start.setdefault(options.over, defaults.target)
+    return _Wanted(options.gait, held, start, options.over, limits, options.step)
+
+
+def _branch(options: argparse.Namespace, wanted: _Wanted, folder: Path | None) -> int:
+    """Follow one branch, with its figure in ``folder``."""
+    held = wanted.fixed
     if options.controlled:
-        if options.limits is None:
-            start.setdefault(options.over, defaults.target)
         points = _controlled(wanted, _MAPS[options.controlled])
         show = [*held, "angle"]
     else:
@@ -225,19 +262,15 @@ def _quantities(option: str, pairs: list[str] | None) -> dict[str, float]:
     Raises:
         ParameterError: naming what is no quantity or no number.
     """
-    found = {}
-    for pair in pairs or []:
-        name, _, text = pair.partition("=")
+    found = typed.entries(option, pairs or [], "QUANTITY=VALUE, such as height=0.98")
+    for name in found:
         if name not in QUANTITIES:
             raise ParameterError(
-                f"{option} {pair!r} names no quantity: give one of {', '.join(QUANTITIES)}, as in"
-                " height=0.98"
+                f"{option} {name} names no quantity: give one of {', '.join(QUANTITIES)}"
             )
-        try:
-            found[name] = float(text)
-        except ValueError:
-            raise ParameterError(f"{option} {pair!r} has no number after the equals sign") from None
-    return found
+    return {
+        name: typed.number(f"{option} {name}", text, _TYPED[name]) for name, text in found.items()
+    }
 
 
 def _data(point: BranchPoint) -> dict[str, Any]:

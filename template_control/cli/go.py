@@ -11,6 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from template_control import view
+from template_control.checks import option_types as values
 from template_control.cli.options.config import add_config, prepared
 from template_control.cli.options.gait import add_strict
 from template_control.cli.options.output import add_output_options
@@ -51,7 +52,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenario",
         nargs="?",
-        type=Path,
+        type=values.path,
         metavar="FILE",
         help="the scenario, such as examples/example_one.toml; not needed with --config",
     )

@@ -10,7 +10,7 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from template_control.cli.interrupts import (
     end_at_once,
@@ -21,7 +21,7 @@ from template_control.cli.interrupts import (
     stopped,
 )
 from template_control.cli.report.output import INTERRUPTED
-from template_control.errors import TemplateControlError
+from template_control.errors import ParameterError, TemplateControlError
 
 
 class _Command(NamedTuple):
@@ -113,6 +113,21 @@ class _Parser(argparse.ArgumentParser):
             namespace: to fill.
         """
         return super().parse_known_args(_with_values(args), namespace)
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse the words in one line.
+
+        Args:
+            message: of argparse, or of a type of :mod:`~template_control.checks.option_types`,
+                whose words follow the option's name.
+
+        Raises:
+            ParameterError: always.
+        """
+        option, ours, reason = re.sub(r"^argument (\S+): ", r"\1: ", message).partition(": is ")
+        if ours:
+            raise ParameterError(f"{option} is {reason}")
+        raise ParameterError(f"{option}; {self.prog} --help lists what there is")
 
 
 def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:

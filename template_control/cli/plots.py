@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from template_control import view
+from template_control.checks import option_types as values
 from template_control.run.kinds.any_record import load_record
-from template_control.storage import writable
+from template_control.storage import writing
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -17,9 +17,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " tracking errors, energies, VLO states. Works on fallen and interrupted runs too."
         " Exit status: 0, 2 for bad input."
     )
-    parser.add_argument("run_file", type=Path, metavar="RUN", help="run.npz of a walk")
+    parser.add_argument("run_file", type=values.path, metavar="RUN", help="run.npz of a walk")
     parser.add_argument(
-        "--output", type=Path, metavar="DIR", help="folder for the figures; by default the run's"
+        "--output",
+        type=values.path,
+        metavar="DIR",
+        help="folder for the figures; by default the run's",
     )
 
 
@@ -27,6 +30,7 @@ def run(options: argparse.Namespace) -> int:
     """Draw and name the files."""
     record = load_record(options.run_file)
     folder = options.run_file.parent if options.output is None else options.output
-    for path in view.save_figures(record, writable(folder)):
-        print(path)
+    with writing(folder):
+        for path in view.save_figures(record, folder):
+            print(path)
     return 0

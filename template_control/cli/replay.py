@@ -8,10 +8,13 @@ from typing import Any
 
 from rich.text import Text
 
+from template_control.checks import option_types as values
+from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
 from template_control.run.kinds.any_record import load_record
 from template_control.run.record import Record
 from template_control.terminal import plain_console
+from template_control.view.replay.playback import FRAME_RATES, SPEEDS
 from template_control.view.replay.replay import GIF_FPS, GIF_SECONDS, replay, save_film, save_html
 
 
@@ -22,29 +25,37 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " ground forces and footholds. Without --html, --gif or --video a server shows it in"
         " the browser until Ctrl-C. Exit status: 0, 2 for bad input."
     )
-    parser.add_argument("run_file", type=Path, metavar="RUN", help="run.npz of a walk")
+    parser.add_argument("run_file", type=values.path, metavar="RUN", help="run.npz of a walk")
     parser.add_argument(
-        "--speed", type=float, default=1.0, help="1 (default) is real time, 0.25 a quarter of it"
+        "--speed",
+        type=values.number(SPEEDS),
+        default=1.0,
+        help="1 (default) is real time, 0.25 a quarter of it",
     )
     parser.add_argument(
         "--fps",
-        type=float,
+        type=values.number(FRAME_RATES),
         help=f"frames per second, by default 30, and {GIF_FPS:g} in a GIF",
     )
     parser.add_argument(
         "--start",
-        type=float,
+        type=values.number(Range()),
         metavar="S",
         help="show from here [s]; negative values count from the run's end. By default from the"
         f" beginning, in a GIF the last {GIF_SECONDS:g} s",
     )
-    parser.add_argument("--end", type=float, metavar="S", help="show up to here [s]")
     parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="write one page that needs no server or network"
+        "--end", type=values.number(Range()), metavar="S", help="show up to here [s]"
     )
-    parser.add_argument("--gif", type=Path, metavar="FILE", help="write an animated GIF")
     parser.add_argument(
-        "--video", type=Path, metavar="FILE", help="write an .mp4; needs ffmpeg installed"
+        "--html",
+        type=values.path,
+        metavar="FILE",
+        help="write one page that needs no server or network",
+    )
+    parser.add_argument("--gif", type=values.path, metavar="FILE", help="write an animated GIF")
+    parser.add_argument(
+        "--video", type=values.path, metavar="FILE", help="write an .mp4; needs ffmpeg installed"
     )
     parser.add_argument(
         "--no-browser", action="store_true", help="print the server's address, open no browser"

@@ -13,6 +13,7 @@ import numpy as np
 from rich.table import Table
 
 from template_control import view
+from template_control.checks import option_types as values
 from template_control.cli.go import NO_STANDS
 from template_control.cli.options.output import output_folder
 from template_control.slip.automaton.vocabulary import MapKind
@@ -35,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument(
-        "scenario", type=Path, help="the scenario, such as examples/example_one.toml"
+        "scenario", type=values.path, help="the scenario, such as examples/example_one.toml"
     )
     parser.add_argument(
         "--map",
@@ -43,7 +44,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="return map the controllers compute with, instead of the scenario's",
     )
     parser.add_argument(
-        "--output", type=Path, default=Path("runs/slip"), help="folder for run.npz and figures"
+        "--output",
+        type=values.path,
+        default=Path("runs/slip"),
+        help="folder for run.npz and figures",
     )
     parser.add_argument(
         "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
@@ -58,13 +62,15 @@ def run(options: argparse.Namespace) -> int:
         scenario = replace(scenario, map_kind=_MAPS[options.map])
     if scenario.stands:
         plain_console(stderr=True).print(NO_STANDS)
-    folder = output_folder(options.output)
-    with plain_console(stderr=True).status("simulating") as status:
-        record = simulate_scenario(scenario, lambda now: status.update(f"simulating, {now:.1f} s"))
     files = Files()
-    path = files.write(lambda: record.save(folder / "run.npz"))
-    if not options.no_figures:
-        files.write(lambda: view.save_scenario_figures(record, folder))
+    with output_folder(options.output) as folder:
+        with plain_console(stderr=True).status("simulating") as status:
+            record = simulate_scenario(
+                scenario, lambda now: status.update(f"simulating, {now:.1f} s")
+            )
+        path = files.write(lambda: record.save(folder / "run.npz"))
+        if not options.no_figures:
+            files.write(lambda: view.save_scenario_figures(record, folder))
     figures = {**summarise_scenario(record), "record": None if path is None else str(path)}
     if options.json:
         print(json.dumps(figures))

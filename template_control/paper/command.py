@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import nullcontext
 from pathlib import Path
 
 from rich.table import Table
 
+from template_control.checks import option_types as values
 from template_control.errors import ParameterError
 from template_control.paper.reproduction import REPRODUCTIONS, Reproduction
-from template_control.storage import Files, writable
+from template_control.storage import Files, writing
 from template_control.terminal import plain_console
 from template_control.view.figure_file import save_figure
 
@@ -28,7 +30,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="of fig10: Example I on this robot, such as runner, its template beside it",
     )
     parser.add_argument(
-        "--output", type=Path, default=Path("runs/reproduce"), help="folder for the figures"
+        "--output", type=values.path, default=Path("runs/reproduce"), help="folder for the figures"
     )
     parser.add_argument(
         "--json", action="store_true", help="print the numbers as JSON, and nothing else, on stdout"
@@ -48,12 +50,12 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.robot is not None and options.name != _ON_A_ROBOT:
         raise ParameterError(f"--robot goes with {_ON_A_ROBOT} only: leave it out")
-    folder = None if options.no_figures else writable(options.output)
-    with plain_console(stderr=True).status(f"computing {options.name}"):
-        result = REPRODUCTIONS[options.name]() if options.robot is None else _on(options.robot)
     files, paths = Files(), []
-    if folder is not None:
-        paths = files.write(lambda: _save(result, folder)) or []
+    with nullcontext() if options.no_figures else writing(options.output) as folder:
+        with plain_console(stderr=True).status(f"computing {options.name}"):
+            result = REPRODUCTIONS[options.name]() if options.robot is None else _on(options.robot)
+        if folder is not None:
+            paths = files.write(lambda: _save(result, folder)) or []
     if options.json:
         print(json.dumps({"name": options.name, **result.data, "figures": [str(p) for p in paths]}))
     else:

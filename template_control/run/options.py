@@ -24,6 +24,10 @@ from template_control.slip.similarity import tuned
 _LONGEST_DELAY = 1.0  # [s]
 
 
+Phase = Annotated[float, Range(0.0, 1.0)]
+"""Share of a step's duration."""
+
+
 @dataclass(frozen=True)
 class Push(Checked):
     """A horizontal force on the trunk.
@@ -38,7 +42,7 @@ class Push(Checked):
 
     impulse: float
     step: Index = 10
-    phase: NotNegative = 0.0
+    phase: Phase = 0.0
     duration: Positive = 0.1
     direction: float = 0.0
 

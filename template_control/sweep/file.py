@@ -6,7 +6,6 @@ killed while it writes leaves at most a torn last line, which the next one drops
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import numbers
@@ -20,6 +19,7 @@ from typing import Any, BinaryIO, NamedTuple, NoReturn
 import numpy as np
 
 from template_control.errors import SweepError
+from template_control.file_lock import FileLock
 
 _FORMAT = "template-control sweep 1"
 
@@ -129,24 +129,23 @@ class SweepFile:
             self._file: BinaryIO = self.path.open("a+b")
         except OSError as error:
             self._refuse(f"cannot be written ({error.strerror})")
+        self._lock = FileLock(self.path)
         try:
-            self._lock()
+            if not self._lock.take():
+                self._refuse("is being written by another sweep", "wait for that")
             self._read(head)
         except BaseException:
-            self._file.close()
+            self._close()
             raise
 
     def _refuse(self, why: str, mend: str = "give another path") -> NoReturn:
         raise SweepError(f"{self.path} {why}: {mend}") from None
 
-    def _lock(self) -> None:
-        """Ours until it is closed; worker processes do not inherit it, the kernel frees it."""
-        try:
-            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except (BlockingIOError, PermissionError):
-            self._refuse("is being written by another sweep", "wait for that")
-        except OSError as error:
-            self._refuse(f"cannot be locked ({error.strerror})")
+    def _close(self) -> None:
+        # What a full disk refused is told by then; closing tries it once more.
+        with suppress(OSError):
+            self._file.close()
+        self._lock.release()
 
     def _read(self, head: dict[str, Any]) -> None:
         """Take over what is there, cut a torn end off, begin an empty file."""
@@ -229,6 +228,4 @@ class SweepFile:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        # What a full disk refused is told by then; closing tries it once more.
-        with suppress(OSError):
-            self._file.close()
+        self._close()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 
+from template_control.checks import option_types as values
 from template_control.cli.options.gait import gait_choice, planner_choice, scenario_choice
 from template_control.cli.options.robot import robot_choice
 from template_control.cli.options.world import simulation_choice
@@ -23,7 +23,7 @@ def add_config(parser: argparse.ArgumentParser) -> None:
     """Add ``--config``."""
     parser.add_argument(
         "--config",
-        type=Path,
+        type=values.path,
         metavar="TOML",
         help="a run's options, such as the run.toml that lies beside every run.npz; options on the"
         " command line come before those of the file",

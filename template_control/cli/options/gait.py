@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 
-from template_control.cli.options.ranges import check_ranges
+from template_control.checks import option_types as values
+from template_control.checks.ranges import Range
 from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.embedding.planners.walking.modified import ModifiedOptions
@@ -26,16 +26,13 @@ _GIVEN = {
     "apex_height": "apex",
 }
 """By the field of a :class:`GaitChoice`, the option that sets it."""
-SPEEDS = (0.01, 10.0)
-"""That a gait may be asked for [m/s]; whether there is one is told later."""
-_RANGES = {"speed": SPEEDS, "touchdown_angle": (1.0, 89.0), "apex": (0.01, 10.0)}
 
 
 def add_gait_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--scenario``, ``--gait``, ``--speed`` and ``--touchdown-angle``."""
     parser.add_argument(
         "--scenario",
-        type=Path,
+        type=values.path,
         metavar="TOML",
         help="a speed profile to walk, as template-control slip takes it, instead of one gait; it"
         " ends with the profile, or after --steps",
@@ -49,13 +46,13 @@ def add_gait_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--speed",
-        type=float,
+        type=values.number(values.SPEED),
         metavar="M/S",
         help="mean forward speed of the gait instead of the walk gait's own",
     )
     parser.add_argument(
         "--touchdown-angle",
-        type=float,
+        type=values.number(Range(1.0, 89.0)),
         metavar="DEG",
         help="of the gait instead of the walk gait's own, from the ground to the leg",
     )
@@ -86,11 +83,14 @@ def add_stand_options(parser: argparse.ArgumentParser) -> None:
 def add_running_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--speed`` and ``--apex`` of a run."""
     parser.add_argument(
-        "--speed", type=float, metavar="M/S", help="at apex; 3 m/s for l0 = 1 m if not given"
+        "--speed",
+        type=values.number(values.SPEED),
+        metavar="M/S",
+        help="at apex; 3 m/s for l0 = 1 m if not given",
     )
     parser.add_argument(
         "--apex",
-        type=float,
+        type=values.number(Range(0.01, 10.0)),
         metavar="M",
         help="height of the apex; one that suits the speed if not given",
     )
@@ -121,9 +121,8 @@ def gait_choice(options: argparse.Namespace, base: GaitChoice) -> GaitChoice:
         base: what holds where an option was not given.
 
     Raises:
-        ParameterError: if a number is out of its range, or the options do not go together.
+        ParameterError: if the options do not go together.
     """
-    check_ranges(options, _RANGES)
     given = {field: getattr(options, name, None) for field, name in _GIVEN.items()}
     return replace(base, **{name: value for name, value in given.items() if value is not None})
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from template_control.storage import writable
+from template_control.checks import option_types as values
+from template_control.storage import writing
 
 
 def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
@@ -18,7 +21,7 @@ def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
     """
     parser.add_argument(
         "--output",
-        type=Path,
+        type=values.path,
         default=Path(folder),
         help=f"folder for run.npz, run.toml and figures, {folder} if not given; a run that is"
         " there is replaced, and the command says so",
@@ -29,19 +32,23 @@ def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
     parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
 
 
-def output_folder(folder: Path) -> Path:
-    """The folder, made if need be; says on stderr if a run in it will be replaced.
+@contextmanager
+def output_folder(folder: Path) -> Iterator[Path]:
+    """Keep a folder for a run; says on stderr if a run in it will be replaced.
 
     Args:
         folder: as asked for.
 
+    Yields:
+        The folder; see :func:`~template_control.storage.writing`.
+
     Raises:
-        RecordError: if nothing can be written there.
+        RecordError: if nothing can be written there, or another command writes there now.
     """
-    writable(folder)
-    if (folder / "run.npz").exists():
-        print(
-            f"template-control: the run in {folder} will be replaced; --output keeps both",
-            file=sys.stderr,
-        )
-    return folder
+    with writing(folder):
+        if (folder / "run.npz").exists():
+            print(
+                f"template-control: the run in {folder} will be replaced; --output keeps both",
+                file=sys.stderr,
+            )
+        yield folder

@@ -5,13 +5,16 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from template_control.errors import ParameterError
+from template_control.checks import typed
+from template_control.checks.option_types import number
+from template_control.checks.ranges import Range
 from template_control.robot.library import FREE_ROBOTS, ROBOTS
 from template_control.run.choices.robot import RobotChoice
 
 _DEFAULT = RobotChoice().model
+_TURN = Range(-6.3, 6.3)  # [rad] about once around: degrees are not taken for it
 
 
 def add_robot(parser: argparse.ArgumentParser, default: str | None = _DEFAULT) -> None:
@@ -62,7 +65,7 @@ def add_robot_options(parser: argparse.ArgumentParser) -> None:
     )
     own.add_argument(
         "--foot-radius",
-        type=float,
+        type=number(Range(0.0, 1.0, above=True)),
         metavar="M",
         help="of a 3D URDF: radius of the spheres put into its feet",
     )
@@ -95,7 +98,11 @@ def robot_choice(options: argparse.Namespace, base: RobotChoice) -> RobotChoice:
         if getattr(options, name) is not None:
             given[name] = True
     if options.locked is not None:
-        given["locked"] = dict(map(_locked, options.locked))
+        texts = typed.entries("--locked", options.locked, "JOINT=ANGLE with the angle in rad")
+        given["locked"] = {
+            joint: typed.number(f"--locked {joint}", text, Annotated[float, _TURN])
+            for joint, text in texts.items()
+        }
     return replace(base, **given)
 
 
@@ -103,11 +110,3 @@ def _model(robot: str) -> str:
     """A path is made absolute, so that what is written down does not depend on the folder."""
     own = robot not in ROBOTS and ("/" in robot or robot.endswith(".urdf"))
     return str(Path(robot).absolute()) if own else robot
-
-
-def _locked(text: str) -> tuple[str, float]:
-    joint, _, angle = text.rpartition("=")
-    try:
-        return joint, float(angle)
-    except ValueError:
-        raise ParameterError(f"--locked {text}: give JOINT=ANGLE with the angle in rad") from None

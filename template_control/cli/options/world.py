@@ -5,30 +5,23 @@ from __future__ import annotations
 import argparse
 import math
 from dataclasses import fields, replace
-from typing import Any
+from typing import Annotated, Any
 
-from template_control.cli.options.ranges import check_ranges
+from template_control.checks import typed
+from template_control.checks.option_types import MANY, SEED, number, whole
+from template_control.checks.ranges import Index, NotNegative, Range
 from template_control.embedding.free.options import FreeOptions
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.terrain.spec import terrain_from
-from template_control.run.options import Course, Push, SimulationOptions
+from template_control.run.options import Course, Phase, Push, SimulationOptions, TurningRate
 from template_control.run.simulation import STEPS
 
 _PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions, IdealOptions)}
 _DEFAULT = SimulationOptions()
-_RANGES = {
-    "steps": (1, 1_000_000),
-    "friction": (0.05, 5.0),
-    "mass_scale": (0.5, 2.0),
-    "torque_scale": (0.01, 10.0),
-    "noise": (0.0, 1.0),
-    "delay": (0.0, 1.0),
-    "record_every": (1, 1_000_000),
-    "seed": (0, 2**63),
-}
+_AROUND = Range(-360.0, 360.0)  # [deg]
 _LONG = 200  # steps beyond which samples are thinned
 
 
@@ -42,7 +35,7 @@ def add_world_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--friction",
-        type=float,
+        type=number(Range(0.05, 5.0)),
         help="Coulomb friction between feet and ground, 0.7 if not given",
     )
     parser.add_argument(
@@ -54,13 +47,13 @@ def add_world_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--mass-scale",
-        type=float,
+        type=number(Range(0.5, 2.0)),
         metavar="FACTOR",
         help="masses of the simulated robot over those the controller knows",
     )
     parser.add_argument(
         "--torque-scale",
-        type=float,
+        type=number(Range(0.01, 10.0)),
         metavar="SHARE",
         help="share of the URDF's torque limits to use",
     )
@@ -78,7 +71,7 @@ def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--noise",
-        type=float,
+        type=number(Range(0.0, 1.0)),
         metavar="RAD",
         help="standard deviation of the noise on measured angles; on positions it is this times"
         " l0, on velocities 20 times as many per second",
@@ -91,13 +84,13 @@ def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--delay",
-        type=float,
+        type=number(Range(0.0, 1.0)),
         metavar="S",
         help="from a measurement to the torques computed from it, a multiple of 0.001 s",
     )
     parser.add_argument(
         "--seed",
-        type=int,
+        type=whole(SEED),
         help="perturb the initial state by up to 5 %% in speed and 2 %% of l0 in height, drawn"
         " with this seed; without it the walk starts on the gait",
     )
@@ -114,7 +107,7 @@ def add_course_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--step-width",
-        type=float,
+        type=number(Range(0.0, 10.0, above=True)),
         metavar="M",
         help="distance aside between a free robot's left and right footholds; 0.22 l0 if not given",
     )
@@ -136,12 +129,12 @@ def add_length_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--steps`` and ``--record-every``."""
     parser.add_argument(
         "--steps",
-        type=int,
+        type=whole(MANY),
         help=f"steps to walk, VLO to VLO; {STEPS} where no scenario says when to stop",
     )
     parser.add_argument(
         "--record-every",
-        type=int,
+        type=whole(MANY),
         metavar="N",
         help=f"keep every n-th sample in run.npz; by default 1 up to {_LONG} steps, then 5",
     )
@@ -160,7 +153,6 @@ def simulation_choice(
     Raises:
         ParameterError: if a number is out of its range.
     """
-    check_ranges(options, _RANGES)
     given: dict[str, Any] = {"plant": _plant(options, base)}
     embedding = {n: getattr(options, n, None) for n in ("friction", "torque_scale", "catches")}
     tuning = base.embedding
@@ -198,17 +190,24 @@ def _course(options: argparse.Namespace, base: Course) -> Course:
     wanted: dict[str, Any] = {"step_width": getattr(options, "step_width", None)}
     turns = [_turn(text) for text in getattr(options, "turn", None) or ()]
     if turns:
-        wanted["turning_rate"] = next((rate for time, rate in turns if time is None), 0.0)
-        wanted["turns"] = tuple((time, rate) for time, rate in turns if time is not None)
+        times = [time for time, _ in turns]
+        twice = next((time for time in times if times.count(time) > 1), None)
+        if twice is not None:
+            raise ParameterError(f"--turn has two rates from {twice:g} s on: give one")
+        first, *later = sorted({0.0: 0.0, **dict(turns)}.items())
+        wanted["turning_rate"], wanted["turns"] = first[1], tuple(later)
     return replace(base, **_without_none(wanted))
 
 
-def _turn(text: str) -> tuple[float | None, float]:
+def _turn(text: str) -> tuple[float, float]:
+    """Time from which a rate holds, and the rate."""
     rate, at, time = text.partition("@")
-    try:
-        return (float(time) if at else None), float(rate)
-    except ValueError:
-        raise ParameterError(f"--turn {text}: give RATE or RATE@TIME, such as -0.2@10") from None
+    where = f"--turn {text}"
+    if not (rate and (time or not at)):
+        raise ParameterError(f"{where}: give RATE or RATE@TIME, such as -0.2@10")
+    return typed.number(f"{where}: time", time or "0", NotNegative), typed.number(
+        f"{where}: rate", rate, TurningRate
+    )
 
 
 def _without_none(values: dict[str, Any]) -> dict[str, Any]:
@@ -219,11 +218,16 @@ def _push(text: str) -> Push:
     impulse, _, when = text.partition("@")
     step, _, rest = when.partition(":")
     phase, _, degrees = rest.partition(":")
-    try:
-        direction = math.radians(float(degrees or 0.0))
-        return Push(float(impulse), int(step), float(phase or 0.0), direction=direction)
-    except ValueError:
+    where = f"--push {text}"
+    if not (impulse and step):
         raise ParameterError(
-            f"--push {text}: give IMPULSE@STEP or IMPULSE@STEP:PHASE, such as 10@4:0.5; or of a"
+            f"{where}: give IMPULSE@STEP or IMPULSE@STEP:PHASE, such as 10@4:0.5; or of a"
             " free robot IMPULSE@STEP:PHASE:DIRECTION, such as 10@4:0.5:90"
-        ) from None
+        )
+    direction = typed.number(f"{where}: direction", degrees or "0", Annotated[float, _AROUND])
+    return Push(
+        typed.number(f"{where}: impulse", impulse, float),
+        typed.number(f"{where}: step", step, Index),
+        typed.number(f"{where}: phase", phase or "0", Phase),
+        direction=math.radians(direction),
+    )

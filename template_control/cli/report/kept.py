@@ -65,9 +65,8 @@ def run_and_keep(
         doing: what the progress bar says.
         more: writes further files of the record into the folder; not after Ctrl-C.
     """
-    folder = output_folder(options.output)
     files = Files()
-    with stdout_to_stderr():
+    with output_folder(options.output) as folder, stdout_to_stderr():
         try:
             with progress_bar(
                 plain_console(stderr=True), doing, config.simulation.steps

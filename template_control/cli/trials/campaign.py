@@ -10,7 +10,8 @@ from typing import Any
 from rich.table import Table
 
 from template_control import settings
-from template_control.cli.options.ranges import check_ranges
+from template_control.checks import option_types as values
+from template_control.checks.ranges import Range
 from template_control.cli.options.robot import add_robot_options, robot_choice
 from template_control.cli.trials.common import (
     add_engine,
@@ -19,7 +20,6 @@ from template_control.cli.trials.common import (
     add_workers,
     draw,
     kept,
-    worker_count,
 )
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.robustness.campaigns.campaign import (
@@ -33,12 +33,11 @@ from template_control.robustness.campaigns.campaign import (
 from template_control.robustness.campaigns.mix import FREE_MIX, Mix
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
-from template_control.storage import Files, writable, write_text
+from template_control.storage import Files, write_text, writing
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
 from template_control.view.trials.campaign_figure import campaign_figure
 
-_RANGES = {"trials": (1, 1_000_000), "severity": (0.0, 100.0), "seed": (0, 2**63 - 1)}
 _LISTED = 20  # trials that went wrong, at most, in the printed table
 
 
@@ -56,26 +55,28 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_robot_options(parser)
     add_gait(parser, "of the gait, as walk or run take it")
     add_engine(parser)
-    parser.add_argument("--trials", type=int, default=100, metavar="N", help="how many")
+    parser.add_argument(
+        "--trials", type=values.whole(values.MANY), default=100, metavar="N", help="how many"
+    )
     parser.add_argument(
         "--mix",
-        type=Path,
+        type=values.path,
         metavar="TOML",
         help="ranges that the trials are drawn from; a mix.toml of an earlier campaign is one to"
         " begin with",
     )
     parser.add_argument(
         "--severity",
-        type=float,
+        type=values.number(Range(0.0, 100.0)),
         default=1.0,
         metavar="FACTOR",
         help="all ranges so many times as wide about where nothing disturbs",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of all draws")
+    parser.add_argument("--seed", type=values.whole(values.SEED), default=0, help="of all draws")
     add_workers(parser)
     parser.add_argument(
         "--output",
-        type=Path,
+        type=values.path,
         help="folder for results, figure and falls; by default runs/campaign/ROBOT, with free"
         " if nothing holds it, the gait's name if it is a run, and the engine's if it is not"
         " PyBullet",
@@ -89,8 +90,6 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         TemplateControlError: naming the option that is wrong.
     """
-    check_ranges(options, _RANGES)
-    count = worker_count(options)
     chosen = robot_choice(options, RobotChoice())
     default = FREE_MIX if chosen.free else Mix()
     mix = default if options.mix is None else settings.read(Mix, options.mix)
@@ -102,9 +101,14 @@ def run(options: argparse.Namespace) -> int:
         options.seed,
     )
     robot = conditions.trial(0)[1].robot  # before a folder is made for it
-    folder = writable(options.output or Path("runs/campaign") / _name(robot.name, conditions))
+    with writing(options.output or Path("runs/campaign") / _name(robot.name, conditions)) as folder:
+        return _try(options, conditions, folder)
+
+
+def _try(options: argparse.Namespace, conditions: Conditions, folder: Path) -> int:
+    """Run the trials, with all files in ``folder``."""
     try:
-        with workers(count) as pool, stdout_to_stderr():
+        with workers(options.workers) as pool, stdout_to_stderr():
             found = run_campaign(conditions, options.trials, folder, pool)
     except KeyboardInterrupt:
         return kept(folder)

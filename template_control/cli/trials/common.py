@@ -11,8 +11,9 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from template_control.checks.option_types import SPEED, number, whole
+from template_control.checks.ranges import Range
 from template_control.cli.report.output import INTERRUPTED
-from template_control.errors import ParameterError
 from template_control.robustness.subject import ENGINES, Subject
 from template_control.view.figure_file import save_figure
 
@@ -27,7 +28,7 @@ def add_gait(parser: argparse.ArgumentParser, speed: str) -> None:
         speed: what the speed is of.
     """
     parser.add_argument("--gait", choices=("walk", "run"), default="walk", help="what it keeps")
-    parser.add_argument("--speed", type=float, metavar="M/S", help=speed)
+    parser.add_argument("--speed", type=number(SPEED), metavar="M/S", help=speed)
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:
@@ -56,25 +57,11 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     """Add ``--workers``."""
     parser.add_argument(
         "--workers",
-        type=int,
+        type=whole(Range(1, _MOST)),
         default=os.cpu_count() or 1,
         metavar="N",
         help="processes that run trials",
     )
-
-
-def worker_count(options: argparse.Namespace) -> int:
-    """How many processes were asked for.
-
-    Args:
-        options: as parsed.
-
-    Raises:
-        ParameterError: if the number is out of its range.
-    """
-    if not 1 <= options.workers <= _MOST:
-        raise ParameterError(f"--workers is {options.workers}: give a number from 1 to {_MOST}")
-    return int(options.workers)
 
 
 def kept(folder: Path) -> int:

@@ -9,8 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
-from template_control.cli.options.gait import SPEEDS
-from template_control.cli.options.ranges import check_ranges
+from template_control.checks import option_types as values
 from template_control.cli.options.robot import add_robot
 from template_control.cli.trials.common import (
     add_engine,
@@ -19,7 +18,6 @@ from template_control.cli.trials.common import (
     add_workers,
     draw,
     kept,
-    worker_count,
 )
 from template_control.errors import ParameterError
 from template_control.plant.quiet import stdout_to_stderr
@@ -31,7 +29,7 @@ from template_control.robustness.subject import Subject
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
 from template_control.slip.gaits.running_gait import RunningGait
-from template_control.storage import Files, writable
+from template_control.storage import Files, writing
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
 from template_control.view.trials.robustness_figure import robustness_figure
@@ -80,7 +78,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_workers(parser)
     parser.add_argument(
         "--output",
-        type=Path,
+        type=values.path,
         help="folder for the trials and the figure; by default runs/robustness/ROBOT, with -run of"
         " a run, -free of a free robot, and the engine's name if it is not PyBullet",
     )
@@ -91,18 +89,22 @@ def run(options: argparse.Namespace) -> int:
     """Measure as told; returns 0, or 130 after Ctrl-C.
 
     Raises:
-        ParameterError: if the number of workers is out of its range, or a walk is given a speed.
+        ParameterError: if a walk is given a speed.
     """
-    count = worker_count(options)
     # Before a folder is made for it.
     choice = RobotChoice(options.robot, free=options.free)
     speed, name = _speed(options, choice), Path(options.robot).stem
     name += "-free" * choice.free + "-run" * (options.gait == "run")
     name += f"-{options.plant}" * (options.plant != Subject.plant)
     subject = Subject(choice, speed, options.plant)
-    folder = writable(options.output or Path("runs/robustness") / name)
+    with writing(options.output or Path("runs/robustness") / name) as folder:
+        return _measure(options, subject, folder)
+
+
+def _measure(options: argparse.Namespace, subject: Subject, folder: Path) -> int:
+    """Measure, with trials and figure in ``folder``."""
     try:
-        with workers(count) as pool, stdout_to_stderr():
+        with workers(options.workers) as pool, stdout_to_stderr():
             found = measure(subject, options.disturbance, folder, pool, options.quick)
     except KeyboardInterrupt:
         return kept(folder)
@@ -121,7 +123,6 @@ def run(options: argparse.Namespace) -> int:
 def _speed(options: argparse.Namespace, choice: RobotChoice) -> float | None:
     """Of a run, dx/dt at apex; of a free walk, its mean; None: the robot walks its own gait."""
     robot = choice.load()
-    check_ranges(options, {"speed": SPEEDS})
     if choice.free:
         if options.gait == "run":
             raise ParameterError(f"{choice.model} walks free, and does not run: leave --gait out")

@@ -5,24 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import radians
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from template_control import settings
 from template_control.checks.checked import checked
+from template_control.checks.ranges import Count, Index, NotNegative, Positive, Range
+from template_control.checks.typed import entries, number
 from template_control.errors import ParameterError
-from template_control.plant.terrain.terrain import Terrain
+from template_control.plant.terrain.terrain import Height, Start, Terrain
 
-KINDS: dict[str, dict[str, Callable[[str], float]]] = {
+KINDS: dict[str, dict[str, Any]] = {
     "flat": {},
-    "step": {"height": float, "x": float},
-    "stairs": {"rise": float, "run": float, "count": int, "start": float},
-    "slope": {"angle": float, "start": float, "length": float},
+    "step": {"height": Height, "x": Start},
+    "stairs": {"rise": Height, "run": Positive, "count": Count, "start": Start},
+    "slope": {"angle": Annotated[float, Range(-45.0, 45.0)], "start": Start, "length": Positive},
     "random": {
-        "height": float, "shortest": float, "longest": float, "seed": int, "start": float,
-        "end": float,
+        "height": NotNegative, "shortest": Positive, "longest": Positive, "seed": Index,
+        "start": Start, "end": Start,
     },
 }  # fmt: skip
-"""What each kind of terrain is told by, on the command line; angles are in degrees."""
+"""Numbers of each kind of terrain on the command line; angles are in degrees."""
 
 _MAKERS: dict[str, Callable[..., Terrain]] = {
     "flat": Terrain.flat,
@@ -54,22 +56,17 @@ def terrain_from(text: str) -> Terrain:
             f"there is no terrain {text!r}: give {', '.join(KINDS)} with its numbers, such as"
             " step:height=0.03,x=2.5, or a file .toml, .csv or .txt"
         )
+    where = f"terrain {text!r}"
+    known = ", ".join(KINDS[kind]) or "no number"
     given: dict[str, Any] = {}
-    for entry in filter(None, rest.split(",")):
-        key, _, value = entry.partition("=")
+    for key, value in entries(where, filter(None, rest.split(",")), "NAME=NUMBER").items():
         if key not in KINDS[kind]:
-            known = ", ".join(KINDS[kind]) or "no number"
-            raise ParameterError(f"terrain {text!r}: {kind} takes {known}, and not {key!r}")
-        try:
-            given[key] = KINDS[kind][key](value)
-        except ValueError:
-            raise ParameterError(
-                f"terrain {text!r}: {key} is {value!r}: give a number, such as {key}=1"
-            ) from None
-    return _made(text, kind, given)
+            raise ParameterError(f"{where}: {kind} takes {known}, and not {key!r}")
+        given[key] = number(f"{where}: {key}", value, KINDS[kind][key])
+    return _made(where, kind, given)
 
 
-def _made(text: str, kind: str, given: dict[str, Any]) -> Terrain:
+def _made(where: str, kind: str, given: dict[str, Any]) -> Terrain:
     if "angle" in given:
         given["angle"] = radians(given["angle"])
     if "shortest" in given or "longest" in given:
@@ -79,10 +76,10 @@ def _made(text: str, kind: str, given: dict[str, Any]) -> Terrain:
     except TypeError:
         known = ", ".join(KINDS[kind])
         raise ParameterError(
-            f"terrain {text!r} lacks a number: {kind} takes {known}, such as step:height=0.03,x=2.5"
+            f"{where} lacks a number: {kind} takes {known}, such as step:height=0.03,x=2.5"
         ) from None
     except ParameterError as error:
-        raise ParameterError(f"terrain {text!r}: {error}") from None
+        raise ParameterError(f"{where}: {error}") from None
 
 
 @checked
@@ -100,7 +97,7 @@ def read_terrain(path: str | Path) -> Terrain:
     if path.suffix == ".toml":
         return settings.read(Terrain, path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise ParameterError(f"cannot read {path}: {error.strerror}; give a terrain") from None
     except UnicodeDecodeError:

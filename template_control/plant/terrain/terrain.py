@@ -20,6 +20,7 @@ _HIGHEST = 1000.0  # [m]
 _FARTHEST = 1000.0  # [m]
 _STEEPEST = float(np.radians(45.0))
 _LEVEL = 1e-9  # [m] the ground is at height 0 where a run begins
+_MOST_POINTS = 100_000
 
 Height = Annotated[float, Range(-_HIGHEST, _HIGHEST)]
 Place = Annotated[float, Range(-_FARTHEST, _FARTHEST)]
@@ -66,6 +67,7 @@ class Terrain(Checked):
         super().__post_init__()
         if not self.points:
             raise ParameterError("Terrain.points is empty: give at least one")
+        _check_count(len(self.points))
         xs = self._xs
         for i, x in enumerate(xs[1:], 1):
             if x < xs[i - 1]:
@@ -181,6 +183,7 @@ class Terrain(Checked):
             count: of the walls.
             start: x of the first wall [m].
         """
+        _check_count(2 * count)
         walls = [(start + i * run, i * rise) for i in range(count)]
         return cls(tuple(point for x, y in walls for point in ((x, y), (x, y + rise))))
 
@@ -222,6 +225,7 @@ class Terrain(Checked):
         """
         if end <= start:
             raise ParameterError(f"end is {end:g} m: give more than the start, {start:g} m")
+        _check_count(4.0 * (end - start) / (length[0] + length[1]))
         draw = np.random.default_rng(seed)
         points, x, before = [], start, 0.0
         while x < end:
@@ -243,5 +247,19 @@ class Terrain(Checked):
             end: the last place; the ground beyond it is level [m].
             spacing: from one place to the next [m].
         """
+        _check_count(end / spacing)
         places = np.linspace(0.0, end, max(int(np.ceil(end / spacing)), 1) + 1)
         return cls(tuple((float(x), float(height(float(x)))) for x in places))
+
+
+def _check_count(points: float) -> None:
+    """Refuse ground of more points than an engine takes; before they are made.
+
+    Args:
+        points: how many, about.
+    """
+    if points > _MOST_POINTS:
+        raise ParameterError(
+            f"the ground has about {points:.3g} points: give fewer or longer pieces, of at most"
+            f" {_MOST_POINTS} points"
+        )

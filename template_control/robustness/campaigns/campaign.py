@@ -62,8 +62,8 @@ class Conditions(Checked):
         super().__post_init__()
         if not self.robot.free and self.mix.direction != Mix().direction:
             raise ParameterError(
-                f"Mix.direction is {list(self.mix.direction)}, and {self.robot.model} is held in"
-                " its plane: leave it out, or take a free robot"
+                f"the mix has the direction {list(self.mix.direction)}, and {self.robot.model} is"
+                " held in its plane: leave it out, or take a free robot"
             )
 
     def draw(self, number: Index) -> Draw:

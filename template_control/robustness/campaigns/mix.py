@@ -125,7 +125,11 @@ class Mix(Checked):
         for name in _DRAWN:
             still = getattr(_STILL, name)
             ends[name] = tuple(still + factor * (end - still) for end in getattr(self, name))
-        return Mix(**ends, direction=self.direction, within=self.within, after=self.after)
+        try:
+            return Mix(**ends, direction=self.direction, within=self.within, after=self.after)
+        except ParameterError as error:
+            text = str(error).replace("Mix.", "")
+            raise ParameterError(f"the mix {factor:g} times as severe: {text}") from None
 
     def severity(self, draw: Draw) -> float:
         """How severe a draw is for this mix: root mean square of its shares of the ranges.

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from template_control.checks.checked import Checked
+from template_control.checks.ranges import Degrees, Positive, Speed
 from template_control.embedding.robot_template import (
     default_gait,
     paper_gait,
@@ -45,9 +46,9 @@ class GaitChoice(Checked):
     """
 
     name: Literal["walk", "paper", "run"] = "walk"
-    speed: float | None = None
-    touchdown_angle: float | None = None
-    apex_height: float | None = None
+    speed: Speed | None = None
+    touchdown_angle: Degrees | None = None
+    apex_height: Positive | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 from template_control.checks.checked import Checked, checked
+from template_control.checks.fitting import check
+from template_control.checks.ranges import Count, Degrees, Positive, Range, Speed
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.parameters import SlipParameters
@@ -25,13 +26,16 @@ MOST_STRIDES = 10_000
 """How many strides a scenario may have."""
 _OF_MOTION = ("speed", "acceleration", "until_speed", "steps")
 _LONGEST = 3600.0  # [s] of a scenario
-_FASTEST = 100.0  # [m/s]
 _HARDEST = 100.0  # [m/s^2]
+_ENDS = ("until_speed", "duration", "steps")
+
+Vertical = Annotated[float, Range(-100.0, 100.0)]
+"""Vertical speed [m/s]."""
 
 
 @dataclass(frozen=True)
 class Segment(Checked):
-    """A stretch of the profile; it ends with whichever of its ends comes first.
+    """A stretch of the profile. It ends with ``until_speed``, ``duration`` or ``steps``.
 
     Attributes:
         gait: "walk", "run" or "stand". Where it differs from the segment before, the first
@@ -44,17 +48,17 @@ class Segment(Checked):
         steps: number of strides after the transition.
 
     Raises:
-        ScenarioError: if a value is of a wrong type.
+        ScenarioError: if a value is of a wrong type or out of its range.
     """
 
     _error = ScenarioError
 
     gait: Gait
-    speed: float | None = None
-    acceleration: float = 0.0
-    until_speed: float | None = None
-    duration: float | None = None
-    steps: int | None = None
+    speed: Speed | None = None
+    acceleration: Annotated[float, Range(-_HARDEST, _HARDEST)] = 0.0
+    until_speed: Speed | None = None
+    duration: Positive | None = None
+    steps: Count | None = None
 
 
 @dataclass(frozen=True)
@@ -82,11 +86,11 @@ class Scenario(Checked):
     segments: tuple[Segment, ...]
     parameters: SlipParameters = field(default_factory=SlipParameters)
     map_kind: MapKind = MapKind.PAPER
-    start: tuple[float, float, float] = (1.1, 0.98, 0.0)
-    touchdown_angle: float = 70.0
-    vlo: tuple[float, float] = (0.98, 0.0)
-    apex_height: float = 0.98
-    stand_height: float = STAND_HEIGHT
+    start: tuple[Speed, Positive, Vertical] = (1.1, 0.98, 0.0)
+    touchdown_angle: Degrees = 70.0
+    vlo: tuple[Positive, Vertical] = (0.98, 0.0)
+    apex_height: Positive = 0.98
+    stand_height: Positive = STAND_HEIGHT
     walking: Walking = "modified"
     name: str = "scenario"
 
@@ -145,23 +149,17 @@ class Scenario(Checked):
         return replace(self, segments=moving, start=start)
 
 
-def _number(where: str, value: float, low: float, high: float) -> None:
-    if not low < value < high:
-        between = f"over {low:g}" if math.isinf(high) else f"between {low:g} and {high:g}"
-        raise ScenarioError(f"{where} is {value:g}: give a finite number {between}")
-
-
 def _check(scenario: Scenario) -> None:
     s = scenario
     length = s.parameters.rest_length
-    _number("touchdown_angle", s.touchdown_angle, 0.0, 90.0)
-    _number("start speed", s.start[0], 0.0, _FASTEST)
-    for name, speed in (("start", s.start[2]), ("vlo", s.vlo[1])):
-        _number(f"{name} dy/dt", speed, -_FASTEST, _FASTEST)
-    for name, height in (("start height", s.start[1]), ("vlo height", s.vlo[0])):
-        _number(name, height, 0.0, length)
-    _number("stand_height", s.stand_height, 0.0, length)
-    _number("apex_height", s.apex_height, 0.0, 100.0 * length)
+    for name, height, most in (
+        ("start height", s.start[1], length),
+        ("vlo height", s.vlo[0], length),
+        ("stand_height", s.stand_height, length),
+        ("apex_height", s.apex_height, 100.0 * length),
+    ):
+        below = Annotated[float, Range(0.0, most, above=True, below=True)]
+        check(name, height, below, ScenarioError)
     if not s.segments:
         raise ScenarioError("the scenario has no segments: give at least one [[segment]]")
     for i, segment in enumerate(s.segments, 1):
@@ -224,15 +222,11 @@ def _check_segment(where: str, segment: Segment) -> None:
         moves = [name for name in _OF_MOTION if getattr(segment, name)]
         if moves:
             raise ScenarioError(f"{where} stands and has {moves[0]}: give it a duration only")
-    _number(f"{where} acceleration", segment.acceleration, -_HARDEST, _HARDEST)
-    for name, most in (("speed", _FASTEST), ("until_speed", _FASTEST), ("duration", math.inf)):
-        value = getattr(segment, name)
-        if value is not None:
-            _number(f"{where} {name}", value, 0.0, most)
-    if segment.steps is not None and segment.steps < 1:
-        raise ScenarioError(f"{where} steps is {segment.steps!r}: give a whole number from 1")
-    if segment.until_speed is None and segment.duration is None and segment.steps is None:
+    ends = [name for name in _ENDS if getattr(segment, name) is not None]
+    if not ends:
         raise ScenarioError(f"{where} never ends: give it until_speed, duration or steps")
+    if len(ends) > 1:
+        raise ScenarioError(f"{where} has {' and '.join(ends)}: give it one of them")
     if segment.until_speed is not None and segment.acceleration == 0.0:
         raise ScenarioError(f"{where} has until_speed but no acceleration: give one")
 

@@ -26,7 +26,7 @@ def load_scenario(path: str | Path) -> Scenario:
     """
     path = Path(path)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ScenarioError(f"cannot read {path}: {error.strerror}; give a TOML file") from None
     except (ValueError, RecursionError) as error:  # of the parser, of UTF-8, of dates, of numbers
@@ -34,7 +34,8 @@ def load_scenario(path: str | Path) -> Scenario:
     try:
         return _scenario(data)
     except TemplateControlError as error:
-        raise ScenarioError(f"{path}: {error}".replace("Scenario.", "")) from None
+        text = str(error).replace("Scenario.", "").replace("SlipParameters.", "parameters.")
+        raise ScenarioError(f"{path}: {text}") from None
 
 
 def _scenario(data: dict[str, Any]) -> Scenario:

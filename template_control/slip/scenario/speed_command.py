@@ -9,7 +9,7 @@ import numpy as np
 
 from template_control.checks.checked import Checked
 from template_control.checks.fitting import check
-from template_control.checks.ranges import Positive
+from template_control.checks.ranges import Speed
 from template_control.errors import ScenarioError
 
 
@@ -30,7 +30,7 @@ class SpeedProfile(Checked):
     _error = ScenarioError
 
     times: tuple[float, ...]
-    speeds: tuple[Positive, ...]
+    speeds: tuple[Speed, ...]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -67,14 +67,14 @@ class SpeedCommand:
         """Mean forward speed that is wanted [m/s].
 
         Raises:
-            ScenarioError: where it is set to no positive number.
+            ScenarioError: where it is set to no speed of a walk or a run.
         """
         return self._speed
 
     @speed.setter
     def speed(self, value: float) -> None:
         """Want ``value`` [m/s] from now on."""
-        self._speed = float(check("the commanded speed", value, Positive, ScenarioError))
+        self._speed = float(check("the commanded speed", value, Speed, ScenarioError))
 
     def __call__(self, time: float) -> float:
         """The present speed, whatever the ``time`` [s]."""

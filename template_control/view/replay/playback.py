@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Range
 from template_control.errors import ParameterError, RecordError
 from template_control.run.record import Record
 
@@ -16,8 +19,12 @@ Array = NDArray[np.float64]
 _ZIGZAGS = 12
 _CARRYING = 0.005  # of the weight: what the plant counts as a contact
 _STANCE = 0.03  # [s] a shorter contact is a scuff, no foothold
-_BOUNDS = {"speed": (0.01, 100.0), "fps": (1.0, 120.0)}
 _MOST_FRAMES = 100_000
+
+SPEEDS = Range(0.01, 100.0)
+"""Seconds of the run per second of its replay."""
+FRAME_RATES = Range(1.0, 120.0)
+"""Frames per second of a replay."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +57,12 @@ class Foothold:
     time: float
 
 
+@checked
 def playback(
     record: Record,
     *,
-    fps: float,
-    speed: float = 1.0,
+    fps: Annotated[float, FRAME_RATES],
+    speed: Annotated[float, SPEEDS] = 1.0,
     start: float | None = None,
     end: float | None = None,
 ) -> Playback:
@@ -71,10 +79,6 @@ def playback(
         ParameterError: if a number is out of its range.
         RecordError: if the run has fewer than two samples.
     """
-    for name, value in (("speed", speed), ("fps", fps)):
-        low, high = _BOUNDS[name]
-        if not (math.isfinite(value) and low <= value <= high):
-            raise ParameterError(f"{name} is {value:g}: give a number from {low:g} to {high:g}")
     if len(record.time) < 2:
         raise RecordError("the run has fewer than two samples: there is nothing to replay")
     first, last = float(record.time[0]), float(record.time[-1])

@@ -1,0 +1,50 @@
+"""Types of the values that a user types: numbers in a range, and paths, for ``add_argument``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from template_control.checks.fitting import Refused
+from template_control.checks.ranges import Range
+from template_control.checks.typed import parsed
+
+SPEED = Range(0.01, 10.0)
+"""Of a gait that is asked for [m/s]; whether there is one is decided later."""
+SEED = Range(0, 2**63 - 1)
+MANY = Range(1, 1_000_000)
+"""Of things that are simulated or drawn one by one."""
+
+
+def number(within: Range) -> Callable[[str], float]:
+    """Reader of a number.
+
+    Args:
+        within: range of the number, in the unit that the user types.
+
+    Returns:
+        The ``type`` of an option; it refuses other texts in words that follow the option's name.
+    """
+    return partial(_read, hint=Annotated[float, within])
+
+
+def whole(within: Range) -> Callable[[str], int]:
+    """Reader of a whole number; see :func:`number`."""
+    return partial(_read, hint=Annotated[int, within])
+
+
+def path(text: str) -> Path:
+    """Path that a user typed; the empty one, which would be the current folder, is refused."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("is empty: give a path, such as . for this folder")
+    return Path(text)
+
+
+def _read(text: str, hint: Any) -> Any:
+    try:
+        return parsed(text, hint)
+    except Refused as refused:
+        raise argparse.ArgumentTypeError(str(refused)) from None
