@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
 from template_control.errors import RobotError
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.mujoco import MujocoOptions
 from template_control.robot import (
     FreeBiped,
     FreeFiveLink,
@@ -20,6 +23,7 @@ from template_control.robot import (
     load_free_robot,
     robot_path,
 )
+from template_control.run.options import SimulationOptions
 from template_control.run.summary import summarise
 
 
@@ -242,3 +246,55 @@ def test_it_walks_within_all_its_limits():
         assert angle["lower"] < angle["least"] < angle["most"] < angle["upper"]
     for speed in figures["joint_speed"].values():
         assert speed["peak"] < speed["limit"]
+
+
+YAW = """<link name="{side}_yaw_link"><inertial><mass value="0.5"/><inertia ixx="0.001"
+iyy="0.001" izz="0.001"/></inertial></link><joint name="{side}_yaw" type="revolute">
+<parent link="{parent}"/><child link="{side}_yaw_link"/>{origin}<axis xyz="0 0 1"/>
+<limit lower="-0.5" upper="0.5" effort="200" velocity="20"/></joint></robot>"""
+
+
+def with_yaw(text, above):
+    """Legs of four hinges: the one about the vertical is above the ab-/adduction, or below it."""
+    for side, y in (("left", "0.1"), ("right", "-0.1")):
+        joint = "abduction" if above else "hip"
+        start = text.index(f'<joint name="{side}_{joint}"')
+        end = text.index("</joint>", start)
+        old = text[start:end]
+        parent = re.search('<parent link="(.*?)"', old)[1]
+        origin = f'<origin xyz="0 {y} 0"/>' if above else ""
+        new = old.replace(f'<parent link="{parent}"', f'<parent link="{side}_yaw_link"')
+        text = text.replace(old, new.replace(f'xyz="0 {y} 0"', 'xyz="0 0 0"'))
+        yaw = YAW.format(side=side, parent=parent, origin=origin)
+        text = changed(text, "</robot>", yaw)
+    return text
+
+
+@pytest.mark.slow(seconds=8)
+@pytest.mark.parametrize("above", [True, False])
+@pytest.mark.parametrize("plant", [PlantOptions(), MujocoOptions()])
+def test_legs_of_four_hinges_walk(load, text, above, plant):
+    robot = load(with_yaw(text, above))
+    assert [len(leg) for leg in robot.legs] == [4, 4]
+    options = SimulationOptions(steps=8, embedding=FreeOptions(), plant=plant)
+    record = tc.simulate(robot, tc.LqrPlanner(tc.default_gait(robot), FREE_PLANNER), options)
+    assert not record.fell, record.metadata["fall_reason"]
+    yaw = [i for i, name in enumerate(robot.joint_names) if name.endswith("yaw")]
+    assert [joint for joint, _ in robot.spare] == yaw
+    assert np.abs(record.q[:, [7 + i for i in yaw]]).max() < 0.01
+    assert record.metadata["summary"]["qp_failures"] == 0
+
+
+def test_the_start_of_a_leg_of_four_hinges_moves_its_feet_as_wanted(load, text):
+    robot = load(with_yaw(text, above=True))
+    velocity = np.array([[0.0, 0.0, 0.0], [2.0, 0.1, -0.2]])
+    pose = FreePose(
+        com=np.array([0.0, 0.02, 0.96]),
+        com_velocity=np.array([1.1, 0.1, 0.0]),
+        feet=np.array([[0.0, 0.1, 0.0], [0.1, -0.12, 0.05]]),
+        feet_velocity=velocity,
+    )
+    q, v = free_state_in(robot, pose)
+    robot.update(q, v)
+    np.testing.assert_allclose(robot.space.foot, pose.feet, atol=1e-9)
+    np.testing.assert_allclose(robot.contact_velocity, velocity, atol=1e-9)

@@ -10,12 +10,14 @@ from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.foot_task import FootTask
 from template_control.whole_body.free.orientation_task import OrientationTask
 from template_control.whole_body.free.side_foot_task import SideFootTask
+from template_control.whole_body.free.spare_joint_task import SpareJointTask
 
 # Two point feet bear no torque about the line between them: with the height and the trunk held
 # there is one freedom left for x and y, and with the weights of the plane the robot loses speed in
 # every double stance.
 _DOUBLE = PhaseControl(
-    tasks=(ComTask((30.0, 30.0)), OrientationTask((4.0, 4.0, 0.4))), unloads=(Leg.REAR,)
+    tasks=(ComTask((30.0, 30.0)), OrientationTask((4.0, 4.0, 0.4)), SpareJointTask()),
+    unloads=(Leg.REAR,),
 )
 
 FREE_PHASES: Phases = {
@@ -26,6 +28,7 @@ FREE_PHASES: Phases = {
             SideFootTask(Leg.REAR),
             FootTask(Leg.FRONT),
             SideFootTask(Leg.FRONT),
+            SpareJointTask(),
         ),
         swings=(Leg.REAR, Leg.FRONT),
         clock=Clock.TIME,
@@ -34,7 +37,13 @@ FREE_PHASES: Phases = {
     ),
     Phase.SS: PhaseControl(
         # As in the plane; and the CoM's y is left to the place of the feet.
-        tasks=(ComTask((0.01, 10.0)), OrientationTask(), FootTask(), SideFootTask()),
+        tasks=(
+            ComTask((0.01, 10.0)),
+            OrientationTask(),
+            FootTask(),
+            SideFootTask(),
+            SpareJointTask(),
+        ),
         swings=(Leg.FRONT,),
     ),
     Phase.DS: replace(_DOUBLE, trims=True),

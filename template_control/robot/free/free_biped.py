@@ -44,6 +44,7 @@ from template_control.robot.urdf import (
 Array = NDArray[np.float64]
 
 _ROOT = 1  # Pinocchio's index of the free flyer
+_PLACING = 3  # hinges that place a foot
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ class FreeBiped(Biped):
         heading: angle from the world's x to the heading frame's, to the left positive [rad].
         origin: (2,) x and y of the heading frame's origin in the world [m].
         space: all terms with three directions, in the heading frame.
+        spare: of each leg with four hinges, the joint above the hip whose axis is nearest to the
+            vertical: its index into ``joint_names``, and its angle in :meth:`neutral` [rad].
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
     """
 
@@ -107,6 +110,13 @@ class FreeBiped(Biped):
             point[:] = hip.rotation.T @ (0.0, away, 0.0)
         lever = model.inertias[_ROOT].lever[2]
         self.trunk_com = float(lever - self.hip_height(self._neutral))
+        axes = pin.computeJointJacobians(model, model.createData(), self._neutral)[5]
+        self.spare = tuple(
+            (joint, float(self._neutral[model.nq - len(self.joint_names) + joint]))
+            for leg in self.legs
+            if len(leg) > _PLACING
+            for joint in [max(leg[:-HINGES], key=lambda j: abs(axes[BASE_DOF + j]))]
+        )
         self._aside = float(self._middle()[1])  # of the trunk's origin
 
     def _look(self) -> None:

@@ -66,7 +66,7 @@ def free_state_in(robot: FreeBiped, pose: FreePose) -> tuple[Array, Array]:
     weight = robot.mass * pose.com[2]
     rows[0] += robot.space.momentum_jacobian[1] / weight
     rows[1] -= robot.space.momentum_jacobian[0] / weight
-    wanted = np.zeros(robot.nv)
+    wanted = np.zeros(len(rows))
     wanted[:3] = pose.com_velocity
     for foot, velocity in zip(feet, pose.feet_velocity, strict=True):
         wanted[6 + 3 * foot : 9 + 3 * foot] = velocity
