@@ -1,8 +1,10 @@
 """``template-control run`` as a user meets it, and what is told of a run."""
 
 import json
+import re
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ KEYS = {
     "control_tick_seconds", "qp_solve_seconds", "real_time_factor", "record",
 }  # fmt: skip
 STEPS = 3
+SPEEDS = str(Path(__file__).parents[1] / "examples" / "walk_speeds.toml")
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +62,26 @@ def test_the_table_tells_of_flight_and_joint_speeds(tmp_path, capfd):
     out = capfd.readouterr().out
     for text in ("flight", "duty factor", "cost of transport", "rad/s", "apex, last"):
         assert text in out
+
+
+@pytest.mark.parametrize("gait", ["walk", "run", "go"])
+def test_a_joint_speed_past_its_limit_is_marked(tmp_path, capfd, gait, monkeypatch):
+    """Limits that only the record knows: the torques of the run are as they were."""
+
+    def narrowed(record, path):
+        figures = summarise(record, path)
+        fast = next(iter(figures["joint_speed"].values()))
+        fast["limit"] = 0.9 * fast["peak"]
+        return figures
+
+    command = "go" if gait == "go" else "walk"
+    monkeypatch.setattr(f"template_control.cli.{command}.summarise", narrowed)
+    words = [gait, *([SPEEDS] if gait == "go" else [])]
+    steps = ["--steps", "1", "--no-figures", "--output", str(tmp_path)]
+    assert main([*words, *steps]) == 0
+    out = " ".join(capfd.readouterr().out.replace("│", " ").split())
+    assert out.count("rad/s, past its limit") == 1
+    assert len(re.findall(r"of [\d.]+ rad/s", out)) == 4
 
 
 def test_apex_and_speed_are_those_asked_for(tmp_path):

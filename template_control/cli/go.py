@@ -24,7 +24,7 @@ from template_control.cli.options.world import (
 )
 from template_control.cli.report.kept import run_and_keep
 from template_control.cli.report.output import INTERRUPTED
-from template_control.cli.report.run_table import nearest_text
+from template_control.cli.report.run_table import nearest_text, speed_text
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.run.summary import OTHERS, STRIDES, summarise
@@ -144,12 +144,8 @@ def _print(figures: dict[str, Any]) -> None:
     for name, count in figures["strides"].items():
         table.add_row(f"strides, {name}", f"{count}")
     for joint, torque in figures["joint_torque"].items():
-        speed = figures["joint_speed"][joint]
-        table.add_row(
-            f"{joint}, peak",
-            f"{torque['peak']:.0f} of {torque['limit']:g} N m,"
-            f" {speed['peak']:.1f} of {speed['limit']:g} rad/s",
-        )
+        speed = speed_text(figures["joint_speed"][joint])
+        table.add_row(f"{joint}, peak", f"{torque['peak']:.0f} of {torque['limit']:g} N m, {speed}")
     table.add_row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
     table.add_row("QP failures", f"{figures['qp_failures']}")
     table.add_row("record", figures["record"] or "not saved")

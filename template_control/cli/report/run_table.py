@@ -63,7 +63,7 @@ def print_table(figures: dict[str, Any]) -> None:
             f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g} N m",
         )
     for joint, speed in figures["joint_speed"].items():
-        row(f"{joint} speed, peak", f"{speed['peak']:.3g} of {speed['limit']:g} rad/s")
+        row(f"{joint} speed, peak", speed_text(speed))
     share = figures["flight_share"]
     if share["template"]:
         flight = figures["com_error_flight_rms"]
@@ -117,8 +117,27 @@ def in_space(figures: dict[str, Any], row: Callable[[str, str], None]) -> None:
         row(
             f"{joint} angle",
             f"{angle['least']:+.2f} to {angle['most']:+.2f} of {angle['lower']:g} to"
-            f" {angle['upper']:g} rad" + (", past its limit" if past else ""),
+            f" {angle['upper']:g} rad" + past_limit(past),
         )
+
+
+def speed_text(speed: dict[str, float]) -> str:
+    """Peak speed of a joint and its limit, marked where it was exceeded.
+
+    Args:
+        speed: an entry of ``joint_speed`` of a summary.
+    """
+    peak, limit = speed["peak"], speed["limit"]
+    return f"{peak:.3g} of {limit:g} rad/s" + past_limit(peak > limit)
+
+
+def past_limit(past: bool) -> str:
+    """The mark of a figure that is past its limit.
+
+    Args:
+        past: whether it is.
+    """
+    return ", past its limit" if past else ""
 
 
 def nearest_text(nearest: dict[str, float]) -> str:
