@@ -7,7 +7,7 @@ import pinocchio as pin
 import pybullet
 import pytest
 
-from template_control.errors import RobotError
+from template_control.errors import ParameterError, RobotError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.plant.free.mujoco import FreeMujocoPlant
@@ -233,3 +233,26 @@ def test_a_planar_robot_is_not_free():
         load_free_robot("five-link")
     with pytest.raises(RobotError, match="the same leg"):
         FreeBiped.from_urdf(robot_path("five-link"))
+
+
+@pytest.mark.parametrize("length", [1.0 + 5e-4, 1.0 - 5e-4])
+def test_a_quaternion_with_few_digits_is_made_as_long_as_1(bolt, length):
+    rng = np.random.default_rng(3)
+    q = bolt.moved(bolt.neutral(), rng.uniform(-0.3, 0.3, bolt.nv))
+    v = rng.uniform(-1.0, 1.0, bolt.nv)
+    bolt.update(q, v)
+    names = ("mass_matrix", "nonlinear_effects", "com", "contact_jacobian", "foot_position")
+    own = {name: np.array(getattr(bolt, name)) for name in names}
+    longer = q.copy()
+    longer[3:7] *= length
+    bolt.update(longer, v)
+    for name, value in own.items():
+        np.testing.assert_allclose(getattr(bolt, name), value, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("length", [0.0, 0.5, 0.998, 1.002, 3.0])
+def test_another_length_of_a_quaternion_is_refused(bolt, length):
+    q = bolt.neutral()
+    q[3:7] *= length
+    with pytest.raises(ParameterError, match="give x, y, z, w of length 1"):
+        bolt.update(q, np.zeros(bolt.nv))

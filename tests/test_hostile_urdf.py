@@ -413,3 +413,24 @@ def test_moments_that_are_not_written_are_zero(load, five_link):
     short = re.sub(r' (ixy|ixz|iyz)="0"', "", five_link)
     assert short != five_link
     same_body(load(five_link), load(short))
+
+
+IMPOSSIBLE = ('ixx="1e-3" iyy="1e-3" izz="1e-3"', 'ixx="1e-3" iyy="1e-3" izz="5e-3"')
+
+
+def test_an_impossible_inertia_on_the_trunk_is_a_point_and_told_once(load, bolt, caplog):
+    text = armed(bolt, "revolute", "")
+    with caplog.at_level(logging.WARNING, "template_control"):
+        robots = [load(text.replace(*IMPOSSIBLE), **BOLT) for _ in range(2)]
+    (told,) = (r.getMessage() for r in caplog.records if "inertia" in r.getMessage())
+    assert "leader, follower" in told or "follower, leader" in told
+    own = load(text.replace(IMPOSSIBLE[0], 'ixx="0" iyy="0" izz="0"'), **BOLT)
+    same_body(robots[0], own)
+
+
+def test_an_impossible_inertia_in_a_leg_is_refused(load, bolt):
+    shank = re.search('<link name="FL_LOWER_LEG">.*?</link>', bolt, flags=re.S)[0]
+    odd = re.sub('izz="[^"]*"', 'izz="5"', shank)
+    assert odd != shank
+    with pytest.raises(RobotError, match="link 'FL_LOWER_LEG': its inertia is no body's"):
+        load(bolt.replace(shank, odd), **BOLT)

@@ -36,6 +36,7 @@ from template_control.robot.requirements import (
 from template_control.robot.urdf import (
     build_model,
     check_bodies,
+    check_inertias,
     check_motion,
     check_shapes,
     read_urdf,
@@ -140,6 +141,7 @@ class PlanarBiped(Biped):
         if sagittal_joints:
             planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
         check_motion(path, tree)
+        check_inertias(path, tree)
         find_meshes(path, tree)
         check_shapes(path, tree)
         gather_inertias(tree)

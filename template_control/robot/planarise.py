@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import RobotError
-from template_control.robot.urdf import build_model, strip_motion
+from template_control.robot.urdf import build_model, root_link, strip_motion, take_points
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,8 @@ def planarise(
         if joints[name].get("type") == "continuous":
             _bound(path, joints[name])
     hips = _check_axes(path, robot, sagittal_joints)
-    root = _root_link(robot)
+    root = root_link(robot)
+    take_points(path, robot)
     _shift(robot, root, hips)
     spheres(robot, feet, foot_radius)
     links = _free(_WORLD, {str(link.get("name")) for link in robot.findall("link")})
@@ -103,13 +104,6 @@ def _free(names: Sequence[str], taken: Collection[str]) -> list[str]:
 def _parent(joint: ET.Element) -> str:
     parent = joint.find("parent")
     return str(parent.get("link")) if parent is not None else ""
-
-
-def _root_link(robot: ET.Element) -> str:
-    """The link that is no joint's child."""
-    children = {child.get("link") for child in robot.findall("joint/child")}
-    roots = [str(link.get("name")) for link in robot.findall("link")]
-    return next((name for name in roots if name not in children), "")
 
 
 def _vector(text: str | None, default: str = "0 0 0") -> Array:

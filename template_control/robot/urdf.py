@@ -6,8 +6,10 @@ what is not checked here is a robot that falls for no reason.
 
 from __future__ import annotations
 
+import logging
 import xml.etree.ElementTree as ET
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,8 @@ from numpy.typing import NDArray
 from template_control.errors import RobotError
 
 Array = NDArray[np.float64]
+
+_LOG = logging.getLogger("template_control")
 
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """Of an ``<inertia>``: the upper triangle, row by row."""
@@ -47,7 +51,7 @@ def read_urdf(path: Path) -> ET.Element:
         path: the file.
 
     Raises:
-        RobotError: naming what is missing, named twice, no number, or no rigid body's inertia.
+        RobotError: naming what is missing, named twice or no number.
     """
     if not path.is_file():
         raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
@@ -263,18 +267,92 @@ def _check_inertial(path: Path, link: ET.Element) -> None:
         raise RobotError(f"{where}: mass has value {mass.get('value')!r}: give none below zero")
     for name in MOMENTS:  # Pinocchio passes over an <inertial> that lacks one
         inertia.set(name, inertia.get(name, "0"))
-    xx, xy, xz, yy, yz, zz = (
-        _numbers(f"{where}: inertia", inertia, name, 1)[0] for name in MOMENTS
-    )
+        _numbers(f"{where}: inertia", inertia, name, 1)
+
+
+def _impossible(link: ET.Element) -> str:
+    """Why a link's inertia is no body's; "" if it may be."""
+    inertia = link.find("inertial/inertia")
+    if inertia is None:
+        return ""
+    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in MOMENTS)
     moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     slack = _ROUNDING * np.abs(moments).max()
     if moments[0] < -slack:
-        raise RobotError(f"{where}: its inertia has a negative principal moment: give none")
+        return "its inertia has a negative principal moment: give none"
     if moments[2] > moments[0] + moments[1] + slack:
-        raise RobotError(
-            f"{where}: its inertia is no body's: the principal moment {moments[2]:.4g} kg m^2 is"
+        return (
+            f"its inertia is no body's: the principal moment {moments[2]:.4g} kg m^2 is"
             f" larger than the sum of the others, {moments[0] + moments[1]:.4g}; give all three"
         )
+    return ""
+
+
+def check_inertias(path: Path, robot: ET.Element) -> None:
+    """Check that inertias are those of bodies.
+
+    Args:
+        path: of the file, for the message.
+        robot: its root element.
+
+    Raises:
+        RobotError: naming the link whose is not.
+    """
+    for link in robot.findall("link"):
+        reason = _impossible(link)
+        if reason:
+            raise RobotError(f"{path}: link {link.get('name')!r}: {reason}")
+
+
+def root_link(robot: ET.Element) -> str:
+    """The link that is no joint's child.
+
+    Args:
+        robot: the root element of a URDF.
+    """
+    children = {child.get("link") for child in robot.findall("joint/child")}
+    names = [str(link.get("name")) for link in robot.findall("link")]
+    return next((name for name in names if name not in children), "")
+
+
+def take_points(path: Path, robot: ET.Element) -> None:
+    """Take links on the trunk whose inertia is no body's for points with their mass; and log it.
+
+    Heads and arms often have such an inertia, and little of the trunk's. That of a root link, of a
+    leg, or of what is fixed to a leg counts, and is left for :func:`check_inertias`.
+
+    Args:
+        path: of the file, for the log.
+        robot: its root element, in which all joints but the legs' are fixed; changed.
+    """
+    links = {link.get("name"): link for link in robot.findall("link")}
+    waiting, points = [root_link(robot)], []
+    while waiting:
+        name = waiting.pop()
+        for joint in robot.findall("joint"):
+            parent, child = joint.find("parent"), joint.find("child")
+            if parent is None or child is None or parent.get("link") != name:
+                continue
+            if joint.get("type") != "fixed":
+                continue
+            link = links[child.get("link")]
+            waiting.append(str(child.get("link")))
+            inertia = link.find("inertial/inertia")
+            if inertia is not None and _impossible(link):
+                inertia.attrib.update(dict.fromkeys(MOMENTS, "0"))
+                points.append(str(child.get("link")))
+    if points:
+        _tell_points(path, tuple(points))
+
+
+@cache
+def _tell_points(path: Path, links: tuple[str, ...]) -> None:
+    _LOG.warning(
+        "%s: the inertia of %d links on the trunk is no body's (%s): they are taken for points",
+        path,
+        len(links),
+        ", ".join(links),
+    )
 
 
 def _check_joint(path: Path, joint: ET.Element) -> None:

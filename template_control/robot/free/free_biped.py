@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, sin
+from math import atan2, cos, isfinite, sin, sqrt
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
+from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.fixed_links import drop_world, gather_inertias
 from template_control.robot.free.free_terms import BASE_DOF, FreeTerms, gather, sources
@@ -35,6 +36,7 @@ from template_control.robot.requirements import add_feet
 from template_control.robot.urdf import (
     build_model,
     check_bodies,
+    check_inertias,
     check_motion,
     check_shapes,
     read_urdf,
@@ -43,6 +45,8 @@ from template_control.robot.urdf import (
 
 Array = NDArray[np.float64]
 
+_UNIT = 1e-12  # of a quaternion's square: what integrating it leaves
+_ROUNDED = 1e-3  # of its length: written with few digits
 _ROOT = 1  # Pinocchio's index of the free flyer
 _PLACING = 3  # hinges that place a foot
 
@@ -174,6 +178,7 @@ class FreeBiped(Biped):
                 set_ranges(path, tree, feet, limits.ranges)
         spheres(tree, feet, foot_radius)
         check_motion(path, tree)
+        check_inertias(path, tree)
         find_meshes(path, tree)
         check_shapes(path, tree)
         gather_inertias(tree)
@@ -187,7 +192,20 @@ class FreeBiped(Biped):
         return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
 
     def update(self, q: Array, v: Array) -> None:
-        """See :meth:`~template_control.robot.biped.Biped.update`."""
+        """See :meth:`~template_control.robot.biped.Biped.update`.
+
+        Args:
+            q: (nq,) configuration; its quaternion (x, y, z, w) is made as long as 1 if its length
+                is so to 1e-3. ``q`` itself stays as it is.
+            v: (nv,) velocity.
+
+        Raises:
+            ParameterError: if a value is NaN or infinite, or the quaternion has another length.
+        """
+        x, y, z, w = q[3:7].tolist()
+        square = x * x + y * y + z * z + w * w
+        if abs(square - 1.0) > _UNIT:  # NaN and infinity are told below
+            q = self._with_unit(q, sqrt(square))
         finite, self.fastest, self.soonest_stop = gather(
             self._sources, q, v, self._compute(q, v), self._frame, self._terms
         )
@@ -195,6 +213,21 @@ class FreeBiped(Biped):
         s = self.space
         self.angular_momentum, self.angular_momentum_bias = s.momentum[1], s.momentum_bias[1]
         np.matmul(s.foot_jacobian, v, out=self.contact_velocity)
+
+    def _with_unit(self, q: Array, length: float) -> Array:
+        """A configuration whose quaternion is as long as 1.
+
+        Raises:
+            ParameterError: if it was longer or shorter by more than rounding.
+        """
+        if isfinite(length) and abs(length - 1.0) > _ROUNDED:
+            raise ParameterError(
+                f"{self.name}: the quaternion q[3:7] = {q[3:7].tolist()} has length {length:.6g}:"
+                " give x, y, z, w of length 1"
+            )
+        q = q.copy()
+        q[3:7] /= length
+        return q
 
     def faced(self, vector: Array) -> Array:
         """(..., 3) vectors in the heading frame, from the world's axes."""
