@@ -13,6 +13,7 @@ from template_control.cli.main import main
 from template_control.cli.report import kept
 from template_control.errors import RecordError
 from template_control.robot.library import robot_path
+from template_control.run.config import RunConfig
 from template_control.run.record import Record
 from template_control.view.figures import FIGURES, save_figures
 
@@ -218,3 +219,15 @@ def test_help_explains_every_option(capfd):
     )
     for option in options.split(" "):
         assert option in out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "kind"), [(("--noise", "1e-4"), "state"), (("--estimate",), "imu")]
+)
+def test_the_command_takes_wrong_flags_with_every_kind_of_sensors(tmp_path, capfd, words, kind):
+    walk = ["walk", "--steps", "3", "--contact-errors", "1e-6", "--no-figures", "--json", *words]
+    assert main([*walk, "--output", str(tmp_path)]) == 0
+    sensors = RunConfig.load(tmp_path / "run.toml").simulation.sensors
+    assert (sensors.kind, sensors.contact_errors) == (kind, 1e-6)
+    assert '"fell": false' in capfd.readouterr().out

@@ -9,13 +9,14 @@ import pytest
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.errors import ParameterError
+from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
-from template_control.run.sensing import SensorOptions, Sensors
+from template_control.run.sensing import ContactSensors, SensorOptions, Sensors
 from template_control.run.simulation import simulate
 from template_control.view.figures import stick_diagram
 
@@ -183,6 +184,38 @@ def test_noise_is_seeded_and_scales_with_the_template(robot):
     assert not v.any()
 
 
+@pytest.mark.parametrize("options", [SensorOptions, ImuOptions])
+def test_wrong_flags_are_seeded_and_come_with_their_forces(options):
+    share, ticks, threshold = 0.02, 20_000, 4.0
+    true = np.array([[30.0, 0.0, 500.0], [0.0, 0.0, 0.0]])
+    flags = []
+    for seed in (3, 3, 4):
+        sensors = ContactSensors(options(contact_errors=share, seed=seed), threshold)
+        felt = [sensors.measure(true) for _ in range(ticks)]
+        flags.append(np.array([flag for flag, _ in felt]))
+    forces = np.array([force for _, force in felt])
+    np.testing.assert_array_equal(flags[0], flags[1])
+    assert np.any(flags[0] != flags[2])
+    wrong = flags[2] != [True, False]
+    five = 5.0 * np.sqrt(share * (1.0 - share) / ticks)
+    assert wrong.mean(axis=0) == pytest.approx(share, abs=five)
+    both = share**2
+    assert wrong.all(axis=1).mean() == pytest.approx(both, abs=5.0 * np.sqrt(both / ticks))
+    np.testing.assert_array_equal(
+        forces[~wrong[:, 0], 0], np.broadcast_to(true[0], (sum(~wrong[:, 0]), 3))
+    )
+    assert not forces[wrong[:, 0], 0].any(), "in the air, it seems"
+    assert np.all(forces[wrong[:, 1], 1] == [0.0, 0.0, threshold])
+    np.testing.assert_array_equal(true[0], [30.0, 0.0, 500.0])
+
+
+def test_without_errors_flags_and_forces_are_the_true_ones():
+    forces = np.array([[1.0, 5.0], [0.0, 4.0]])
+    flags, felt = ContactSensors(SensorOptions(), 4.0).measure(forces)
+    assert felt is forces
+    np.testing.assert_array_equal(flags, [True, False])
+
+
 @pytest.mark.parametrize("ticks", [0, pytest.param(1, marks=pytest.mark.slow), 4])
 def test_torques_act_that_many_ticks_later(robot, gait, monkeypatch, ticks):
     spy = Spy(monkeypatch)
@@ -204,6 +237,7 @@ def test_torques_act_that_many_ticks_later(robot, gait, monkeypatch, ticks):
         (lambda: SensorOptions(position_noise=-1.0), "position_noise"),
         (lambda: SensorOptions(velocity_noise=np.inf), "velocity_noise"),
         (lambda: SensorOptions(seed=-1), "seed"),
+        (lambda: SensorOptions(contact_errors=1.01), "contact_errors"),
         (lambda: SimulationOptions(delay=-1e-3), "delay"),
         (lambda: SimulationOptions(delay=1.5e-3), "delay.*multiple.*0.001 s"),
         (lambda: SimulationOptions(delay=np.nan), "delay"),

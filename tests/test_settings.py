@@ -120,7 +120,7 @@ ROUND_TRIPS = {
         embedding=tc.EmbeddingOptions(friction=0.123456789012345),
         start=(1.1, 0.97, -0.0),
         pushes=(tc.Push(10.0), tc.Push(-3.0, 4, 0.5)),
-        sensors=tc.SensorOptions(1e-3, 2e-2, 5),
+        sensors=tc.SensorOptions(1e-3, 2e-2, 5, 0.02),
         delay=0.003,
     ),
     "ground": tc.SimulationOptions(plant=tc.PlantOptions(ground_step=tc.GroundStep(0.01, 2.0))),

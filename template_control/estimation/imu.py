@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import Index, NotNegative
+from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.estimation.estimator import EstimatorOptions, StateEstimator
 from template_control.estimation.readings import Readings
 from template_control.robot.planar_biped import PlanarBiped
@@ -31,6 +31,8 @@ class ImuOptions(Checked):
         gyro_noise: of the pitch rate [rad/s].
         accelerometer_noise: of either component of the specific force [m/s^2].
         seed: of the draws.
+        contact_errors: share of contact flags that are wrong
+            (:class:`~template_control.run.sensing.ContactSensors`).
         estimator: what makes the state of it; scaled to the robot.
 
     Raises:
@@ -43,6 +45,7 @@ class ImuOptions(Checked):
     gyro_noise: NotNegative = 5e-3
     accelerometer_noise: NotNegative = 0.1
     seed: Index = 0
+    contact_errors: Share = 0.0
     estimator: EstimatorOptions = field(default_factory=EstimatorOptions)
 
 

@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import Index, NotNegative
+from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.estimation.delay import DelayCompensation
+from template_control.estimation.imu import ImuOptions
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
 
 _VELOCITY_NOISE = 20.0  # [1/s] noise of velocities over that of positions
+_CONTACT_DRAWS = 1  # added to the seed: flags are drawn apart from the noise of the state
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class SensorOptions(Checked):
             the base's x and y it is this times the template's rest length [m].
         velocity_noise: the same of the velocities [rad/s], [m/s].
         seed: of the draws.
+        contact_errors: share of contact flags that are wrong (:class:`ContactSensors`).
 
     Raises:
         ParameterError: if a number is negative or not finite.
@@ -39,6 +42,7 @@ class SensorOptions(Checked):
     position_noise: NotNegative = 0.0
     velocity_noise: NotNegative = 0.0
     seed: Index = 0
+    contact_errors: Share = 0.0
 
     @classmethod
     def of_size(cls, noise: float, scale: Scale, seed: int = 0) -> SensorOptions:
@@ -134,6 +138,40 @@ class ForeseeingSensors:
     def expect(self, acceleration: Array) -> None:
         """See :meth:`Senses.expect`."""
         self._delay.expect(acceleration)
+
+
+class ContactSensors:
+    """Contact flags and forces of the feet; a share of them is wrong, drawn anew at every tick.
+
+    A wrong flag comes with the force that it stands for: a foot that seems to be in the air with
+    none, one that seems to touch with the least that counts, straight up.
+
+    Args:
+        options: share of wrong flags, and the seed.
+        threshold: a foot touches the ground if it carries more than this [N].
+    """
+
+    def __init__(self, options: SensorOptions | ImuOptions, threshold: float) -> None:
+        self._errors, self._threshold = options.contact_errors, threshold
+        self._draws = np.random.default_rng((options.seed, _CONTACT_DRAWS))
+
+    def measure(self, forces: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Contact flags and forces as the controller gets them.
+
+        Args:
+            forces: (2, d) the ground's force on each foot, up last [N]; left alone.
+
+        Returns:
+            (2,) flags and (2, d) forces; without errors the true forces themselves.
+        """
+        touching = forces[:, -1] > self._threshold
+        if self._errors == 0.0:
+            return touching, forces
+        wrong = self._draws.random(len(touching)) < self._errors
+        touching, forces = touching ^ wrong, forces.copy()
+        forces[wrong] = 0.0
+        forces[wrong & touching, -1] = self._threshold
+        return touching, forces
 
 
 class TorqueDelay:

@@ -30,7 +30,7 @@ from template_control.run.metadata import about, outcome
 from template_control.run.options import Push, SimulationOptions, check_pushes
 from template_control.run.record import Record, RunInterrupted
 from template_control.run.recorder import Recorder, Truth
-from template_control.run.sensing import Senses, TorqueDelay
+from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
@@ -200,7 +200,7 @@ def _loop(
     dt = o.plant.time_step
     delay = TorqueDelay(o.delay_ticks)
     q, v, forces = robot.neutral(), np.zeros(robot.nv), np.zeros((2, robot.directions))
-    threshold = o.falls.contact_force * robot.mass * robot.gravity
+    contacts = ContactSensors(o.sensors, o.falls.contact_force * robot.mass * robot.gravity)
     thrown = o.falls.thrown * controller.parameters.speed_unit
     done, tick = 0, 0
     begun: list[tuple[float, float]] = []
@@ -210,12 +210,12 @@ def _loop(
         plant.contact_forces(forces)
         start = time.perf_counter()
         try:
-            touching = forces[:, -1] > threshold
+            touching, felt = contacts.measure(forces)
             sensed = senses.measure(q, v, touching)
             speed = hypot(*sensed[1][: robot.directions].tolist())
             if speed > thrown and recorder.ticks:
                 return f"the simulation diverged at {now:.3f} s: the base moves at {speed:.3g} m/s"
-            solution = controller.tick(*sensed, touching, dt, forces)
+            solution = controller.tick(*sensed, touching, dt, felt)
         except ParameterError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start

@@ -80,12 +80,14 @@ def prepared(
         raise ParameterError(
             "--noise does not go with --estimate, which has its own: leave one out"
         )
+    sensors = simulation.sensors
+    errors = sensors.contact_errors if options.contact_errors is None else options.contact_errors
     if estimate:
-        simulation = replace(simulation, sensors=ImuOptions(seed=options.seed or 0))
+        sensors = ImuOptions(seed=options.seed or 0)
     if options.noise is not None:
         scale = Scale.of(ready.gait.parameters)
-        sensors = SensorOptions.of_size(options.noise, scale, simulation.sensors.seed)
-        simulation = replace(simulation, sensors=sensors)
+        sensors = SensorOptions.of_size(options.noise, scale, sensors.seed)
+    simulation = replace(simulation, sensors=replace(sensors, contact_errors=errors))
     return replace(config, simulation=simulation), ready
 
 

@@ -60,7 +60,7 @@ def add_world_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
-    """Add ``--push``, ``--noise``, ``--estimate``, ``--delay`` and ``--seed``."""
+    """Add pushes, noise, wrong contact flags, ``--estimate``, ``--delay`` and ``--seed``."""
     parser.add_argument(
         "--push",
         action="append",
@@ -75,6 +75,12 @@ def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
         metavar="RAD",
         help="standard deviation of the noise on measured angles; on positions it is this times"
         " l0, on velocities 20 times as many per second",
+    )
+    parser.add_argument(
+        "--contact-errors",
+        type=number(Range(0.0, 1.0)),
+        metavar="SHARE",
+        help="share of the contact flags of the feet that are wrong, drawn at every tick",
     )
     parser.add_argument(
         "--estimate",
