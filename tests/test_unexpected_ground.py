@@ -1,4 +1,4 @@
-"""A foot that meets something: what it feels, what counts as a touchdown, which legs then push."""
+"""A foot that meets something: what counts as a touchdown, which legs then push."""
 
 from dataclasses import replace
 
@@ -6,69 +6,19 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding import HIGH_SWING, GuardOptions, StumbleOptions, SwingOptions
+from template_control.embedding import HIGH_SWING, GuardOptions, SwingOptions
 from template_control.embedding.guards import RobotGuards
 from template_control.embedding.planners.planner import Decision
 from template_control.embedding.planning.unexpected_ground import (
     UnexpectedGroundOptions,
     choose_legs,
 )
-from template_control.embedding.references.stumble import Stumble
 from template_control.embedding.sensing import Sensed
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import StrideGoal
-
-WEIGHT = 785.0
-
-
-STILL, LANDING = np.zeros(2), (np.inf, np.inf)
-
-
-def test_a_wall_is_told_from_ground_by_the_direction_of_its_force():
-    stumble = Stumble(StumbleOptions(), WEIGHT)
-    stumble.feel(np.array([[-60.0, 100.0], [-100.0, 60.0]]), STILL, LANDING, 1e-3)
-    np.testing.assert_array_equal(stumble.slipping, [False, True])
-    np.testing.assert_array_equal([stumble.blocked(foot) for foot in (0, 1)], [False, True])
-    stumble.feel(np.array([[100.0, 0.0], [-10.0, 0.0]]), STILL, LANDING, 1e-3)
-    np.testing.assert_array_equal(stumble.slipping, [True, False])
-    assert not stumble.blocked(0), "a wall behind the foot is not in its way"
-
-
-def test_a_wall_counts_for_a_while_after_its_last_force():
-    stumble = Stumble(StumbleOptions(linger=0.01), WEIGHT)
-    stumble.feel(np.array([[-100.0, 0.0], [0.0, 0.0]]), STILL, LANDING, 1e-3)
-    after = 0
-    while stumble.blocked(0):
-        stumble.feel(np.zeros((2, 2)), STILL, LANDING, 1e-3)
-        after += 1
-    assert after == pytest.approx(10, abs=1)
-
-
-def test_a_foot_that_goes_on_sinking_has_grazed_an_edge():
-    stumble = Stumble(StumbleOptions(graze=0.004), WEIGHT)
-    carried, sinking = np.full((2, 2), (0.0, 100.0)), np.array([-0.5, -0.05])
-    stumble.feel(carried, sinking, LANDING, 1e-3)
-    np.testing.assert_array_equal(stumble.slipping, [True, False])
-    for _ in range(4):  # on soft ground
-        stumble.feel(carried, sinking, LANDING, 1e-3)
-    np.testing.assert_array_equal(stumble.slipping, [False, False])
-
-
-@pytest.mark.parametrize(("landing", "slips"), [(0.2, True), (0.6, False), (np.inf, False)])
-def test_an_overdue_foot_that_bounces_off_an_edge_has_not_landed(landing, slips):
-    """As it touches it has stopped; how it came tells that it found no ground where it was due."""
-    stumble = Stumble(StumbleOptions(graze=0.004), WEIGHT)
-    air, carried = np.zeros((2, 2)), np.full((2, 2), (0.0, 500.0))
-    stumble.feel(air, np.array([-0.4, -0.2]), [landing] * 2, 1e-3)
-    for _ in range(3):
-        stumble.feel(carried, STILL, [landing] * 2, 1e-3)
-        np.testing.assert_array_equal(stumble.slipping, [slips, False])
-    for _ in range(2):
-        stumble.feel(carried, STILL, [landing] * 2, 1e-3)
-    assert not any(stumble.slipping), "it stands"
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@ from .ahead.options import AheadOptions as AheadOptions
 from .ahead.planner import AheadPlanner as AheadPlanner
 from .ahead.rehearsal import RehearsalOptions as RehearsalOptions
 from .ahead.rehearsal import rehearse as rehearse
+from .contacts import ContactOptions as ContactOptions
 from .controller import EmbeddingController as EmbeddingController
 from .free.controller import FreeController as FreeController
 from .free.hurry import HurryOptions as HurryOptions
@@ -42,7 +43,6 @@ from .planning.replan_options import ReplanOptions as ReplanOptions
 from .references.apex_pose import ApexStart as ApexStart
 from .references.apex_pose import apex_pose as apex_pose
 from .references.leg_forces import UnloadOptions as UnloadOptions
-from .references.stumble import StumbleOptions as StumbleOptions
 from .references.swing_choice import HIGH_SWING as HIGH_SWING
 from .references.swing_choice import SwingChoice as SwingChoice
 from .references.swing_choice import Swings as Swings

@@ -18,7 +18,6 @@ from template_control.embedding.following.feet_in_air import FeetInAir
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.walking.walk_kernels import CONTROL
-from template_control.embedding.references.stumble import Stumble
 from template_control.errors import ParameterError
 from template_control.parts import ready
 from template_control.robot.biped import Biped
@@ -68,8 +67,7 @@ class EmbeddingController(AutomatonFollower):
         o = scaled(options or EmbeddingOptions(), Scale.of(route.parameters))
         super().__init__(robot, planners, o, route, automaton)
         self.qp = WholeBodyQp(robot, o)
-        self._stumble = Stumble(o.stumble, robot.mass * robot.gravity)
-        self._in_air = FeetInAir(robot, self.feet, self._stumble, self.wanted)
+        self._in_air = FeetInAir(robot, self.feet, self.contacts, self.wanted)
 
     def tick(
         self,
@@ -84,7 +82,7 @@ class EmbeddingController(AutomatonFollower):
         Args:
             q: (nq,) measured configuration.
             v: (nv,) measured velocity.
-            contact: (2,) whether each foot touches the ground.
+            contact: (2,) whether each foot touches the ground, as its sensor says.
             dt: control period [s].
             force: (2, d) the ground's force on each foot, forward first and up last [N], by which
                 a foot in the air tells a wall, and one that slides how slippery the ground is;
@@ -93,17 +91,14 @@ class EmbeddingController(AutomatonFollower):
         Raises:
             ParameterError: if the state is not finite.
         """
-        self._contact = contact
         self.robot.update(*self.ground.enter(q, v))
         if force is not None:
             force = self.frame.inward(force)
-            landing = self._in_air.overdue_speeds(self.station, self.planning)
-            self._stumble.feel(force, self.robot.foot_velocity[:, 1], landing, dt)
-            if any(self._stumble.slipping):
-                contact = contact & np.logical_not(self._stumble.slipping)
-            self._feel_friction(contact, force, dt)
+        self.contacts.update(contact, force, self._expected(), dt)
+        if force is not None:
+            self._feel_friction(force, dt)
         self.feet.swing_time += dt
-        self._sense(contact)
+        self._sense()
         self._advance()
         q, v = self.frame.enter(q, v)
         self._plan_again()
@@ -119,10 +114,10 @@ class EmbeddingController(AutomatonFollower):
             solution = solution._replace(acceleration=outward)
         return solution
 
-    def _feel_friction(self, contact: NDArray[np.bool_], force: Array, dt: float) -> None:
+    def _feel_friction(self, force: Array, dt: float) -> None:
         """Let the cones be as narrow as the friction that sliding feet have felt."""
         friction = self.learners.friction
-        if friction.feel(contact, force, self.robot.contact_velocity, dt):
+        if friction.feel(self.contacts.standing, force, self.robot.contact_velocity, dt):
             self.qp.friction = replace(self.options, friction=friction.coefficient).cone
 
     def _swing(self, q: Array, v: Array, dt: float) -> None:

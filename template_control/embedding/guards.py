@@ -32,7 +32,7 @@ PLACED = {Reset.PLACE_REAR: Leg.REAR, Reset.PLACE_FRONT: Leg.FRONT}
 
 @dataclass(frozen=True)
 class GuardOptions(Checked):
-    """When a touchdown or a liftoff is believed.
+    """When a touchdown or a liftoff has happened, by contacts that are believed.
 
     Attributes:
         shortest_swing: shortest time in the air, over sqrt(l0 / g). An earlier contact is the

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from template_control.checks.ranges import Range
+from template_control.embedding.contacts import ContactOptions
 from template_control.embedding.guards import GuardOptions
 from template_control.embedding.learners.friction import FrictionOptions
 from template_control.embedding.learners.lean import LeanOptions
@@ -16,7 +17,6 @@ from template_control.embedding.learners.slope import SlopeOptions
 from template_control.embedding.phases import PHASES, PhaseControl
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.references.leg_forces import UnloadOptions
-from template_control.embedding.references.stumble import StumbleOptions
 from template_control.embedding.references.swing_choice import SwingChoice, Swings
 from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.estimation.delay import DelayOptions
@@ -36,10 +36,10 @@ class EmbeddingOptions(QpOptions):
     Attributes:
         trunk_pitch: where the trunk is held [rad].
         phases: tasks, clock, feet and learners of each phase.
-        guards: when a touchdown or a liftoff is believed.
+        guards: when a touchdown or a liftoff has happened.
         swing: shape of the swings; None: as ``swing_choice`` has it for the robot.
         swing_choice: which robots lift their feet high, and when.
-        stumble: when a foot in the air has met a wall.
+        contacts: when a contact flag is believed, and when a foot has met a wall.
         unload: how a foot is unloaded before it lifts off.
         replan: when a stride is planned anew.
         load: tuning of the load estimate.
@@ -60,7 +60,7 @@ class EmbeddingOptions(QpOptions):
     guards: GuardOptions = field(default_factory=GuardOptions)
     swing: SwingOptions | None = None
     swing_choice: SwingChoice = field(default_factory=SwingChoice)
-    stumble: StumbleOptions = field(default_factory=StumbleOptions)
+    contacts: ContactOptions = field(default_factory=ContactOptions)
     unload: UnloadOptions = field(default_factory=UnloadOptions)
     replan: ReplanOptions = field(default_factory=ReplanOptions)
     load: LoadOptions = field(default_factory=LoadOptions)

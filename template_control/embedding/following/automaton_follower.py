@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.contacts import ContactMonitor
 from template_control.embedding.following.place import Place
 from template_control.embedding.following.sloping_ground import SlopingGround
 from template_control.embedding.guards import PLACED, RobotGuards
@@ -25,7 +26,7 @@ from template_control.embedding.stride_planning import StridePlanning
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Leg
+from template_control.slip.automaton.vocabulary import Event, Leg
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.scenario.route import Route
 from template_control.whole_body.wanted import Wanted
@@ -50,6 +51,7 @@ class AutomatonFollower:
         feet: roles and swings of the feet.
         place: the robot's place on that path, and the template there.
         learners: what is learnt from stride to stride.
+        contacts: which feet stand.
         ground: its slope, as the feet tell it.
         frame: axes that lean with the ground.
         sensing: the robot's state in the template's terms.
@@ -76,7 +78,7 @@ class AutomatonFollower:
         self.place = Place(self.parameters, self.wanted.com)
         self.time = 0.0
         self.sensing = Sensing(robot, self.feet, self.wanted.com[4:])
-        self._contact = np.zeros(2, dtype=bool)
+        self.contacts = ContactMonitor(o.contacts, robot.mass * robot.gravity)
         self._guards = RobotGuards(self.parameters, o.guards)
         self._stations = stations(automaton, robot.nv, o.phases)
         curved = {name for name, station in self._stations.items() if station.control.curved}
@@ -147,13 +149,29 @@ class AutomatonFollower:
             self.feet.landed = self.feet.of[self.station.stance[-1]]
         self.sensing.begin(bool(node.stance))
         self.ground.begin(self.feet.landed)
-        self._sense(np.zeros(2, dtype=bool))
+        self.contacts.begin()
+        self._sense()
         self._decide(section)
 
-    def _sense(self, contact: NDArray[np.bool_]) -> None:
-        control = self.station.control
+    def _expected(self) -> list[bool | None]:
+        """Whether each foot is to touch the ground now; None: it is due to land.
+
+        An overdue foot is no longer due: where it meets the ground then, nothing has foretold.
+        """
+        expected: list[bool | None] = [False, False]
+        for leg in self.station.stance:
+            expected[self.feet.of[leg]] = True
+        o, planning, awaited = self.options.contacts, self.planning, self.station.awaited
+        if awaited is not None and not planning.reaching:
+            foot, due = self.feet.of[awaited], planning.due(Event.TOUCHDOWN) - self.place.time
+            if due <= o.early and self.robot.foot_velocity[foot, 1] >= -o.sinking:
+                expected[foot] = None
+        return expected
+
+    def _sense(self) -> None:
+        control, standing = self.station.control, self.contacts.standing
         stands = bool(self.station.stance)
-        self.sensing.read(contact, stands, control.momentum_speed, control.rolls)
+        self.sensing.read(standing, stands, control.momentum_speed, control.rolls)
 
     def _advance(self) -> None:
         """Take the first edge of the present node that the robot fires."""
@@ -236,7 +254,7 @@ class AutomatonFollower:
         """Turn the axes about a foot, as far as the planner knows slopes; whether they turned."""
         leans = self.ground.lean(slope, foot, self.planning, self.sensing)
         if leans:
-            self._sense(self._contact)
+            self._sense()
         return leans
 
     def _decide(self, section: Section) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import inf, isfinite
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.contacts import ContactMonitor
 from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.rolling import rolled
-from template_control.embedding.references.stumble import Stumble
 from template_control.embedding.sensing import Sensing
 from template_control.embedding.station import Station
 from template_control.embedding.stride_planning import StridePlanning
@@ -20,8 +19,6 @@ from template_control.whole_body.wanted import Wanted
 
 Array = NDArray[np.float64]
 
-_IN_TIME = (inf, inf)  # landing speeds where no foot is overdue
-
 
 class FeetInAir:
     """Moves the swings' references from tick to tick.
@@ -29,13 +26,13 @@ class FeetInAir:
     Args:
         robot: the model; every tick updates it.
         feet: their roles and swings.
-        stumble: what they have met.
+        contacts: which walls they have met.
         wanted: where it is kept how far each foot may be moved.
     """
 
-    def __init__(self, robot: Biped, feet: Feet, stumble: Stumble, wanted: Wanted) -> None:
+    def __init__(self, robot: Biped, feet: Feet, contacts: ContactMonitor, wanted: Wanted) -> None:
         self._robot, self._feet = robot, feet
-        self._stumble, self._wanted = stumble, wanted
+        self._contacts, self._wanted = contacts, wanted
 
     def advance(
         self,
@@ -64,7 +61,7 @@ class FeetInAir:
             landing = planning.landing(foot)
             foothold, due = landing.x, landing.time - time
             overdue = foot == late
-            if self._stumble.blocked(foot):
+            if self._contacts.blocked(foot):
                 # The path goes on as if an overdue foot had time; it has none to go up again.
                 swing.meet_wall(robot.foot_position[foot], foothold, 0.0 if overdue else due, dt)
             elif overdue:
@@ -81,19 +78,6 @@ class FeetInAir:
                     foothold = rolled(foothold, angle, robot.foot_radius)
                 swing.advance(foothold, due, dt, sensing.ground)
             self._wanted.furthest[foot] = swing.furthest(hip, robot.leg_length)
-
-    def overdue_speeds(self, station: Station, planning: StridePlanning) -> Sequence[float]:
-        """Landing speed of the foot that is overdue, inf of the others [m/s].
-
-        Args:
-            station: of the robot.
-            planning: which knows where the feet land.
-        """
-        speeds = list(_IN_TIME)
-        late = self._overdue(station, planning)
-        if late is not None:
-            speeds[late] = self._feet.swing[late].options.landing_speed
-        return speeds
 
     def _overdue(self, station: Station, planning: StridePlanning) -> int | None:
         """The foot that should have found the ground by now."""

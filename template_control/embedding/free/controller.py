@@ -96,7 +96,7 @@ class FreeController(EmbeddingController):
         """
         solution = super().tick(q, v, contact, dt)
         if force is not None:
-            self._feel_friction(contact, self.robot.faced(force), dt)
+            self._feel_friction(self.robot.faced(force), dt)
         return solution
 
     # -- sections, touchdowns, liftoffs --------------------------------------------------
@@ -164,7 +164,7 @@ class FreeController(EmbeddingController):
             ahead[0] += about[0]
             side[0] += about[1]
         self.robot.update(*self.ground.told)
-        self._sense(self._contact)
+        self._sense()
 
     def _foot_side(self, foot: int) -> float:
         return float(self.robot.space.foot[foot, _SIDE])

@@ -24,8 +24,6 @@ class FrictionOptions(Checked):
             stands are noise; 0.5 mrad of it is about 0.02 m/s there, which never stays this
             large, and against the force, for ``duration``.
         duration: a foot has to slide for so long to tell anything [s].
-        pause: a foot that is off the ground for no longer has not lifted off [s]. A light foot that
-            slides chatters: every other millisecond it does not touch.
         settling: for so long after a touchdown nothing is learnt [s]. The force is the impact's.
         load: share of the weight that a foot carries at least. Of a small force the direction is
             not known well.
@@ -36,7 +34,6 @@ class FrictionOptions(Checked):
 
     speed: Positive = tuned(0.05, SPEED)
     duration: NotNegative = tuned(0.008, TIME)
-    pause: NotNegative = tuned(0.004, TIME)
     settling: NotNegative = tuned(0.005, TIME)
     load: Positive = tuned(0.05)
     doubt: Share = tuned(0.03)
@@ -49,23 +46,19 @@ class _Slide:
 
     Attributes:
         standing: time since touchdown [s].
-        lifted: time since it touched the ground last [s].
         time: that it has slid for [s].
         along, normal: sums of the ground's forces [N].
     """
 
     standing: float = 0.0
-    lifted: float = 0.0
     time: float = 0.0
     along: float = 0.0
     normal: float = 0.0
 
-    def lift(self, dt: float, pause: float) -> None:
-        """The foot does not touch the ground; after ``pause`` [s] it has lifted off."""
-        self.lifted += dt
-        if self.lifted > pause:
-            self.standing = 0.0
-            self.end()
+    def lift(self) -> None:
+        """The foot has lifted off."""
+        self.standing = 0.0
+        self.end()
 
     def end(self) -> None:
         """The foot slides no longer."""
@@ -94,11 +87,12 @@ class FrictionEstimate:
         self._least = options.load * weight
         self._slides = (_Slide(), _Slide())
 
-    def feel(self, contact: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
+    def feel(self, standing: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
         """Look at how the feet move, and what acts on them.
 
         Args:
-            contact: (2,) whether each foot touches ground to stand on.
+            standing: (2,) whether each foot is on ground to stand on; one that chatters is, though
+                it carries nothing every other millisecond.
             force: (2, d) the ground's force on each foot, along the ground first and up last [N].
             speed: (2, d) of the feet's material points on the ground [m/s].
             dt: since the last look [s].
@@ -108,12 +102,14 @@ class FrictionEstimate:
         """
         before = self.coefficient
         # Number by number: arrays of two would take five times as long, at every tick.
-        feet = zip(self._slides, contact.tolist(), force.tolist(), speed.tolist(), strict=True)
-        for slide, touches, one, moves in feet:
-            if not touches:
-                slide.lift(dt, self.options.pause)
+        feet = zip(self._slides, standing.tolist(), force.tolist(), speed.tolist(), strict=True)
+        for slide, stands, one, moves in feet:
+            if not stands:
+                slide.lift()
                 continue
-            slide.standing, slide.lifted = slide.standing + dt, 0.0
+            slide.standing += dt
+            if one[-1] < self._least:
+                continue
             if self._slides_on(slide, one, moves):
                 slide.time += dt
                 slide.along += hypot(*one[:-1])
@@ -124,9 +120,9 @@ class FrictionEstimate:
         return self.coefficient != before
 
     def _slides_on(self, slide: _Slide, force: list[float], speed: list[float]) -> bool:
-        """Whether a foot that touches the ground slides, so that friction holds it back."""
+        """Whether a foot that stands slides, so that friction holds it back."""
         o = self.options
-        if slide.standing < o.settling or force[-1] < self._least or hypot(*speed[:-1]) <= o.speed:
+        if slide.standing < o.settling or hypot(*speed[:-1]) <= o.speed:
             return False
         return sum(f * v for f, v in zip(force[:-1], speed[:-1], strict=True)) < 0.0
 

@@ -1,0 +1,122 @@
+"""Contact flags: which are believed at once and which are not, walls, and wrong flags at random."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import template_control as tc
+from template_control.embedding import ContactOptions, EmbeddingOptions
+from template_control.embedding.contacts import ContactMonitor
+from template_control.robot.start import state_at_vlo
+
+WEIGHT, DT = 785.0, 1e-3
+DOUBT = 4  # ticks of DT
+OPTIONS = ContactOptions(doubt=DOUBT * DT)
+STANDS, IN_THE_AIR, DUE = True, False, None
+
+
+def monitor(standing=(False, False), options=OPTIONS):
+    found = ContactMonitor(options, WEIGHT)
+    for _ in range(DOUBT):
+        found.update(np.array(standing), None, standing, DT)
+    return found
+
+
+@pytest.mark.parametrize("expected", [STANDS, IN_THE_AIR, DUE])
+@pytest.mark.parametrize("stood", [False, True])
+def test_what_the_path_expects_is_believed_at_once_and_nothing_else(expected, stood):
+    """The other foot, of which nothing is said, keeps its state."""
+    contacts = monitor((stood, stood))
+    for tick in range(1, DOUBT + 1):
+        contacts.update(np.array([not stood, stood]), None, (expected, stood), DT)
+        at_once = expected in (DUE, not stood)
+        assert contacts.standing[0] == (not stood if at_once or tick == DOUBT else stood)
+        assert contacts.standing[1] == stood
+
+
+@given(
+    flags=st.lists(st.booleans(), min_size=1, max_size=60),
+    expected=st.sampled_from([STANDS, IN_THE_AIR]),
+)
+@settings(max_examples=200, deadline=None)
+def test_only_a_flag_that_lasts_moves_a_foot_against_the_path(flags, expected):
+    contacts = monitor((expected, False))
+    for tick in range(len(flags)):
+        contacts.update(np.array([flags[tick], False]), None, (expected, False), DT)
+        last = flags[max(tick + 1 - DOUBT, 0) : tick + 1]
+        against = len(last) == DOUBT and expected not in last
+        assert contacts.standing[0] == (expected is not against)
+
+
+def test_a_false_flag_becomes_no_touchdown_by_coming_due():
+    """A foot that is due is asked anew: what was said of it before does not count."""
+    contacts = monitor()
+    contacts.update(np.array([True, False]), None, (IN_THE_AIR, STANDS), DT)
+    contacts.update(np.array([False, False]), None, (DUE, STANDS), DT)
+    assert not contacts.standing[0]
+    contacts.update(np.array([True, False]), None, (DUE, STANDS), DT)
+    assert contacts.standing[0]
+
+
+def test_a_wall_is_told_from_ground_by_the_direction_of_its_force():
+    contacts, both = monitor(), np.ones(2, dtype=bool)
+    contacts.update(both, np.array([[-60.0, 100.0], [-100.0, 60.0]]), (DUE, DUE), DT)
+    np.testing.assert_array_equal(contacts.standing, [True, False])
+    assert [contacts.blocked(foot) for foot in (0, 1)] == [False, True]
+    contacts.update(both, np.array([[100.0, 0.0], [-10.0, 0.0]]), (DUE, DUE), DT)
+    np.testing.assert_array_equal(contacts.standing, [False, True])
+    assert not contacts.blocked(0), "a wall behind the foot is not in its way"
+
+
+def test_a_wall_counts_for_a_while_after_its_last_force():
+    contacts, none = monitor(options=replace(OPTIONS, linger=0.01)), np.zeros(2, dtype=bool)
+    contacts.update(none, np.array([[-100.0, 0.0], [0.0, 0.0]]), (DUE, DUE), DT)
+    after = 0
+    while contacts.blocked(0):
+        contacts.update(none, np.zeros((2, 2)), (DUE, DUE), DT)
+        after += 1
+    assert after == pytest.approx(10, abs=1)
+
+
+def test_axes_that_turn_do_not_forget_a_wall(robot, default_gait):
+    """State and contacts are read again as the axes lean with the ground."""
+    controller = tc.EmbeddingController(robot, tc.LqrPlanner(default_gait))
+    z, swing = default_gait.vlo, np.array([0.0, controller.swings.other.clearance])
+    q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]))
+    controller.start()
+    wall = np.array([[0.0, WEIGHT], [-0.5 * WEIGHT, 0.1 * WEIGHT]])
+    for _ in range(2 * DOUBT):
+        controller.tick(q, v, np.ones(2, dtype=bool), DT, wall)
+    np.testing.assert_array_equal(controller.sensing.now.contact, [True, False])
+    assert controller._lean(0.05, 0), "the axes turn"
+    np.testing.assert_array_equal(controller.sensing.now.contact, [True, False])
+
+
+def flawed(steps, seed, embedding=None, share=0.02):
+    """Options of a run in which flags are wrong."""
+    sensors = tc.SensorOptions(contact_errors=share, seed=seed)
+    return tc.SimulationOptions(
+        steps=steps, sensors=sensors, embedding=embedding or EmbeddingOptions(), record_every=10
+    )
+
+
+@pytest.mark.slow(seconds=15)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_walk_bears_wrong_flags_by_doubting_them(robot, default_gait, seed):
+    """Believed at once, one of them puts a foot down 6 cm over the ground."""
+    planner = tc.LqrPlanner(default_gait)
+    rash = EmbeddingOptions(contacts=ContactOptions(doubt=0.0))
+    assert tc.simulate(robot, planner, flawed(20, seed, rash)).fell
+    record = tc.simulate(robot, planner, flawed(20, seed))
+    assert not record.fell
+    assert record.section_state[-5:, 0] == pytest.approx(default_gait.vlo[0], rel=0.01)
+
+
+@pytest.mark.slow(seconds=60)
+def test_two_hundred_steps_with_two_flags_in_a_hundred_wrong(robot, default_gait):
+    record = tc.simulate(robot, tc.LqrPlanner(default_gait), flawed(200, 0))
+    assert not record.fell
+    assert record.steps == 200
