@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,11 +13,14 @@ import pytest
 import template_control as tc
 from template_control import slip
 from template_control.checks.typed import entries, number
+from template_control.checks.words import inward
 from template_control.cli.main import _COMMANDS, build_parser
-from template_control.errors import ParameterError, RecordError
+from template_control.errors import GaitError, ParameterError, RecordError, RobotError
 from template_control.file_lock import LOCKS, FileLock
 from template_control.plant.terrain.spec import KINDS, terrain_from
 from template_control.plant.terrain.terrain import Terrain
+from template_control.robot.five_link import SolidLink
+from template_control.robot.free.free_biped import FreeBiped
 from template_control.robustness.campaigns.mix import Mix
 from template_control.run.config import RunConfig
 from template_control.storage import writing
@@ -196,7 +200,7 @@ def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path):
     for name in ("ground.csv", "ground.toml"):
         assert terrain_from(str(tmp_path / name)).height_at(2.0) == 0.1
     assert tc.load_robot(tmp_path / "five.urdf").name == "five-link"
-    loaded = tc.robot.PlanarBiped.from_urdf(
+    loaded = tc.PlanarBiped.from_urdf(
         tmp_path / "bolt.urdf",
         ("FL_FOOT", "FR_FOOT"),
         ("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE"),
@@ -269,6 +273,102 @@ def test_a_folder_is_let_go_whatever_ends_the_block(tmp_path):
         with pytest.raises(RecordError, match="another command writes"), writing(tmp_path / "new"):
             pass
     assert not list((tmp_path / "new").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(1.2345, 1.4567), (0.29999, 1.45001), (3.0, 4.0), (2e-7, 3e-3)]
+)
+def test_a_window_is_rounded_inward(low, high):
+    ends = [float(x) for x in inward(low, high).split(" to ")]
+    assert low - 1e-12 <= ends[0] <= ends[1] <= high + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("angle", "speed"), [(65.0, 0.8), (66.0, 1.3), (89.0, 1.1), (72.0, 0.9), (60.0, 1.1)]
+)
+def test_an_advised_gait_exists_and_is_not_what_was_refused(angle, speed):
+    """Both numbers may lie within the ranges that gaits have, and yet have no gait together."""
+    p = tc.SlipParameters()
+    with pytest.raises(GaitError) as caught:
+        tc.gait_at(p, np.radians(angle), speed)
+    kind, value = re.search(r"the nearest (angle|speed) is ([\d.]+)", str(caught.value)).groups()
+    if kind == "angle":
+        angle = float(value)
+    else:
+        speed = float(value)
+    assert tc.gait_at(p, np.radians(angle), speed).vlo[0] == speed
+
+
+def test_advised_speeds_are_had():
+    robot, p = tc.load_robot("five-link"), tc.embedding.template_for(tc.load_robot("rabbit"))
+    for ask in (
+        lambda v: tc.robot_gait_for_speed(robot, v),
+        lambda v: tc.running_gait(p, v),
+        lambda v: tc.gait_for_speed(p, v),
+        lambda v: tc.gait_for_speed(p, v, touchdown_angle=np.radians(67.0)),
+    ):
+        with pytest.raises(GaitError) as caught:
+            ask(19.0)
+        low, high = map(float, re.search(r"from ([\d.]+) to ([\d.]+)", str(caught.value)).groups())
+        for speed in (low, high):
+            ask(speed)
+
+
+def test_a_centre_of_mass_outside_its_link_is_refused():
+    for made in (tc.Link, SolidLink):
+        more = () if made is tc.Link else ((0.1, 0.1),)
+        made(1.0, 2.0, 1.0, 0.1, *more)
+        with pytest.raises(RobotError, match=r"com is 5 m, outside a link of 1 m"):
+            made(1.0, 2.0, 5.0, 0.1, *more)
+
+
+def test_feet_larger_than_the_legs_are_refused(tmp_path):
+    path = tmp_path / "mine.urdf"
+    text = tc.robot.robot_path("five-link").read_text()
+    path.write_text(re.sub(r'sphere radius="[^"]+"', 'sphere radius="5.0"', text))
+    legs = ("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE")
+    bolt, feet = tc.robot.robot_path("bolt"), ("FL_FOOT", "FR_FOOT")
+    for load in (
+        lambda: tc.load_robot(path),
+        lambda: tc.PlanarBiped.from_urdf(bolt, feet, legs, foot_radius=5.0),
+        lambda: FreeBiped.from_urdf(bolt, feet, 5.0),
+    ):
+        with pytest.raises(RobotError, match=r"larger than the legs.*: give a smaller radius"):
+            load()
+
+
+def sampled(record):
+    return [
+        name
+        for name, axes in record.layout.fields.items()
+        if axes.split()[0] == "T"
+        and getattr(record, name).dtype.kind == "f"
+        and not name.endswith("reference")
+    ]
+
+
+def test_a_run_with_values_that_are_not_finite_is_not_shown(short_walk, tmp_path, refused):
+    path = tmp_path / "run.npz"
+    names = sampled(short_walk)
+    assert len(names) > 12
+    for name in names:
+        values = getattr(short_walk, name).copy()
+        values[len(values) // 2] = np.nan
+        bad = replace(short_walk, **{name: values})
+        for show in (
+            lambda bad=bad: tc.save_figures(bad, tmp_path),
+            lambda bad=bad: tc.plot(bad, "com"),
+            lambda bad=bad: tc.save_html(bad, tmp_path / "walk.html"),
+            lambda bad=bad: tc.save_film(bad, tmp_path / "walk.gif"),
+            lambda bad=bad: tc.replay(bad),
+        ):
+            with pytest.raises(RecordError, match=f"no finite {name} in 1 of .* samples"):
+                show()
+    bad.save(path)
+    for words in (["plots"], ["replay", "--gif", "x.gif"], ["replay", "--html", "x.html"]):
+        words = [*words[:1], str(path), *words[1:-1], *(str(tmp_path / w) for w in words[1:][1:])]
+        assert "it cannot be shown" in refused(words)
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["run.npz"]
 
 
 def test_what_numpy_says_of_a_file_is_kept_from_the_user(tmp_path, refused):

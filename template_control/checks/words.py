@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -19,6 +20,21 @@ def shown(value: Any) -> str:
         text = f"a {type(value).__name__}"
     text = " ".join(text.split())
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+def inward(low: float, high: float, digits: int = 3) -> str:
+    """A range for a message, rounded so that both ends that are printed lie in it.
+
+    Args:
+        low, high: ends of the range.
+        digits: of the larger one.
+    """
+    size = max(abs(low), abs(high))
+    step = 10.0 ** (math.floor(math.log10(size)) + 1 - digits) if size > 0.0 else 1.0
+    first, last = math.ceil(low / step - 1e-9) * step, math.floor(high / step + 1e-9) * step
+    if first > last:
+        return f"{low!r} to {high!r}"
+    return f"{first:.{digits + 2}g} to {last:.{digits + 2}g}"
 
 
 def words_for(hint: Any) -> str:

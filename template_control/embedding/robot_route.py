@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from template_control.checks.checked import checked
+from template_control.checks.words import inward
 from template_control.embedding.ahead.gait_row import STATE
 from template_control.embedding.ahead.gait_table import gait_table, row_at
 from template_control.embedding.ahead.options import AheadOptions
@@ -59,8 +60,8 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
     moves = own.segments[0].gait in _RANGES
     if moves and not slowest <= own.start[0] <= fastest:
         raise ScenarioError(
-            f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from {slowest:.3g} to"
-            f" {fastest:.3g} m/s"
+            f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from"
+            f" {inward(slowest, fastest)} m/s"
         )
     return ScenarioRoute(
         own,
@@ -85,7 +86,7 @@ def _check_speeds(robot: Biped, own: Scenario) -> None:
             if not slowest <= speed <= fastest:
                 raise ScenarioError(
                     f"segment {number} wants to {segment.gait} at {speed:g} m/s:"
-                    f" {robot.name} can {segment.gait} from {slowest:.3g} to {fastest:.3g} m/s"
+                    f" {robot.name} can {segment.gait} from {inward(slowest, fastest)} m/s"
                     f" {_WHERE[segment.gait]}"
                 )
 

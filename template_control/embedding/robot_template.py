@@ -6,6 +6,7 @@ import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Angle, Positive
+from template_control.checks.words import inward
 from template_control.errors import GaitError
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import STRIDE_START
@@ -236,7 +237,7 @@ def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Posit
     what = f"{robot.name} cannot run at {speed:g} m/s with its apex at {height:g} m"
     if not good:
         raise GaitError(f"{what}, nor at any other height: its motors are too weak; run slower")
-    raise GaitError(f"{what}: give a height from {min(good):.3g} to {max(good):.3g} m")
+    raise GaitError(f"{what}: give a height from {inward(min(good), max(good))} m")
 
 
 def _bears(robot: Biped, speed: float, height: float, torque_scale: float) -> bool:

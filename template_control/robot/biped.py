@@ -155,7 +155,7 @@ class Biped(ABC):
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
         straight = straight_legs(model, self._leg_joints, self._foot_ids)
         self.leg_length, self._neutral = straight.length, straight.q
-        check_size(path, self.mass, self.leg_length)
+        check_size(path, self.mass, self.leg_length, foot_radius)
         self.joint_sign = np.sign(straight.axes[1, self.base_dof :])
         self.leg_mass = max(
             float(sum(model.inertias[j].mass for j in leg)) for leg in self._leg_joints
@@ -324,17 +324,23 @@ def carrying(model: pin.Model, frames: Sequence[int]) -> Array:
     return carries
 
 
-def check_size(path: Path, mass: float, leg_length: float) -> None:
-    """Check that mass and size could be those of one robot.
+def check_size(path: Path, mass: float, leg_length: float, foot_radius: float) -> None:
+    """Check that mass, legs and feet could be those of one robot.
 
     Args:
         path: of the URDF, for the message.
         mass: of the robot [kg].
         leg_length: [m].
+        foot_radius: of the foot spheres [m].
 
     Raises:
         RobotError: if not.
     """
+    if 2.0 * foot_radius > leg_length:
+        raise RobotError(
+            f"{path}: feet of {foot_radius:.4g} m radius are larger than the legs, of"
+            f" {leg_length:.4g} m: give a smaller radius"
+        )
     low, high = _DENSITY
     if not low <= mass / leg_length**3 <= high:
         raise RobotError(

@@ -40,6 +40,14 @@ class Link(Checked):
     com: Positive
     inertia: Positive
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.com > self.length:
+            raise RobotError(
+                f"{type(self).__name__}.com is {self.com:g} m, outside a link of {self.length:g} m:"
+                " give at most its length"
+            )
+
     @property
     def moments(self) -> tuple[float, float, float]:
         """About x, y and z through its centre of mass [kg m^2].

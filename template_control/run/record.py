@@ -8,13 +8,14 @@ from __future__ import annotations
 import importlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control import settings, storage
 from template_control.checks.checked import checked
+from template_control.errors import RecordError
 from template_control.plant.ground import GroundStep
 from template_control.plant.terrain.terrain import Terrain
 from template_control.run.data_frame import to_dataframe
@@ -154,6 +155,29 @@ class Record:
     plan_seconds: Array
     metadata: dict[str, Any]
 
+    layout: ClassVar[storage.Layout] = LAYOUT
+
+    def check_shown(self) -> None:
+        """Check that the run can be drawn.
+
+        Raises:
+            RecordError: if it has fewer than two samples, or values of the robot that are not
+                finite.
+        """
+        if len(self.time) < 2:
+            raise RecordError("the run has fewer than two samples: there is nothing to show")
+        for name, axes in self.layout.fields.items():
+            values = getattr(self, name)
+            # A foot without a reference has NaN there.
+            if axes.split()[0] != "T" or name.endswith("reference"):
+                continue
+            good = np.isfinite(values).reshape(len(values), -1).all(axis=1)
+            if not good.all():
+                raise RecordError(
+                    f"the run has no finite {name} in {np.sum(~good)} of {len(good)} samples, from"
+                    f" sample {np.argmin(good)} on: it cannot be shown, record it anew"
+                )
+
     @property
     def steps(self) -> int:
         """Completed steps: strides from one section to the next."""
@@ -235,7 +259,7 @@ class Record:
             cls,
             path,
             FORMAT,
-            LAYOUT,
+            cls.layout,
             {_WALKS: from_walk, _FIVE_SLOTS: from_five_slots, _TAKEN: from_taken},
         )
 

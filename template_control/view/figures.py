@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.errors import ParameterError, RecordError
+from template_control.errors import ParameterError
 from template_control.run.kinds.free_record import FreeRecord
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
@@ -222,9 +222,9 @@ def plot(record: Record, figure: str = "stick_diagram") -> Figure:
 
     Raises:
         ParameterError: if there is no such figure of this run.
-        RecordError: if the run has no samples.
+        RecordError: if the run cannot be shown.
     """
-    _check_samples(record)
+    record.check_shown()
     known = figures_of(record)
     if figure not in known:
         raise ParameterError(
@@ -236,11 +236,6 @@ def plot(record: Record, figure: str = "stick_diagram") -> Figure:
 
 def _style() -> AbstractContextManager[None]:
     return mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
-
-
-def _check_samples(record: Record) -> None:
-    if len(record.time) < 2:
-        raise RecordError("the run has fewer than two samples: there is nothing to draw")
 
 
 @checked
@@ -256,9 +251,9 @@ def save_figures(record: Record, folder: str | Path, dpi: int = 110) -> list[Pat
         The paths of the files.
 
     Raises:
-        RecordError: if the folder cannot be written or the run has no samples.
+        RecordError: if the folder cannot be written or the run cannot be shown.
     """
-    _check_samples(record)
+    record.check_shown()
     paths = []
     with _style():
         for name, draw in figures_of(record).items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,8 @@ class FreeRecord(Record):
             none [m].
     """
 
+    layout: ClassVar[storage.Layout] = _LAYOUT
+
     space_com: Array
     space_foot: Array
     space_force: Array
@@ -68,4 +71,4 @@ class FreeRecord(Record):
     @checked
     def load(cls, path: str | Path) -> FreeRecord:
         """See :meth:`template_control.run.record.Record.load`."""
-        return storage.load(cls, path, FORMAT, _LAYOUT)
+        return storage.load(cls, path, FORMAT, cls.layout)

@@ -30,6 +30,8 @@ WALKING_SLOTS = {
 }
 """Controls of each kind of walking step: alpha, kappa_1, kappa_2 and, with push-off, kappa_p."""
 
+_ANGLES = np.arange(60.0, 77.5, 0.5).tolist()  # [deg] where gaits are looked for
+_SPEEDS = np.linspace(0.2, 0.45, 26).tolist()  # at VLO, over sqrt(g l0)
 _SCAN = 120
 _LEVEL, _HEIGHT = 0, 1  # places in what a stride misses
 
@@ -239,18 +241,50 @@ def gait_at(
     Raises:
         GaitError: if there is none.
     """
+    gait = find_gait_at(parameters, touchdown_angle, vlo_speed, name)
+    if gait is None:
+        raise GaitError(
+            f"no walking gait with touchdown angle {np.degrees(touchdown_angle):.2f} deg"
+            f" and {vlo_speed:g} m/s at VLO: {_nearest(parameters, touchdown_angle, vlo_speed)}"
+        )
+    return gait
+
+
+def find_gait_at(
+    parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
+) -> WalkingGait | None:
+    """Gait of :func:`gait_at`, if there is one.
+
+    Args:
+        parameters: the template; both legs have its stiffness k0.
+        touchdown_angle: alpha, from the ground to the leg [rad].
+        vlo_speed: dx/dt at VLO [m/s].
+        name: of the gait.
+
+    Returns:
+        The gait, or None.
+    """
     k0, l0 = parameters.leg_stiffness, parameters.rest_length
     u = controls(touchdown_angle, k0, k0)
     heights = np.linspace(l0 * np.sin(touchdown_angle) + 1e-5 * l0, l0 * (1 - 1e-5), _SCAN)
     roots = _symmetric_roots(parameters, lambda y: (np.array([vlo_speed, y, 0.0]), u), heights)
-    if not roots:
-        unit = np.sqrt(parameters.gravity * l0)
-        raise GaitError(
-            f"no walking gait with touchdown angle {np.degrees(touchdown_angle):.2f} deg"
-            f" and {vlo_speed:g} m/s at VLO: try an angle of 64 to 72 deg and"
-            f" {0.25 * unit:.2g} to {0.38 * unit:.2g} m/s"
-        )
-    return _gait(name, parameters, *roots[0])
+    return _gait(name, parameters, *roots[0]) if roots else None
+
+
+def _nearest(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float) -> str:
+    """Advice where :func:`gait_at` finds no gait, itself tried.
+
+    Angles and speeds that have gaits fill no rectangle, so no two windows tell them.
+    """
+    wanted = np.degrees(touchdown_angle)
+    for angle in sorted(_ANGLES, key=lambda angle: abs(angle - wanted)):
+        if find_gait_at(parameters, np.radians(angle), vlo_speed):
+            return f"at this speed the nearest angle is {angle:g} deg"
+    speeds = (float(f"{parameters.speed_unit * speed:.3g}") for speed in _SPEEDS)
+    for speed in sorted(speeds, key=lambda speed: abs(speed - vlo_speed)):
+        if find_gait_at(parameters, touchdown_angle, speed):
+            return f"at this angle the nearest speed is {speed:g} m/s"
+    return "give another angle and another speed"
 
 
 @checked

@@ -10,7 +10,7 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Angle
 from template_control.errors import GaitError
 from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
-from template_control.slip.gaits.gait import WalkingGait, gait_at, root
+from template_control.slip.gaits.gait import WalkingGait, find_gait_at, gait_at, root
 from template_control.slip.parameters import SlipParameters
 
 _VLO_SPEEDS = np.linspace(0.2, 0.45, 26)  # over sqrt(g l0): where gaits are looked for
@@ -44,11 +44,9 @@ def mean_speed_range(
 
 
 def _mean_speed(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float) -> float:
-    """Of the gait that :func:`gait_at` finds [m/s]; NaN if it finds none."""
-    try:
-        return gait_at(parameters, touchdown_angle, vlo_speed).mean_speed
-    except GaitError:
-        return np.nan
+    """Of the gait that :func:`find_gait_at` finds [m/s]; NaN if it finds none."""
+    gait = find_gait_at(parameters, touchdown_angle, vlo_speed)
+    return np.nan if gait is None else gait.mean_speed
 
 
 @checked

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
+from template_control.checks.words import inward
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot
@@ -130,8 +131,8 @@ def running_gait(
     low, high = running_speeds(p)
     if not low - _SAME * unit <= speed <= high + _SAME * unit:
         raise GaitError(
-            f"no running gait has {speed:g} m/s at its apex: give a speed from {low:.3g} to"
-            f" {high:.3g} m/s"
+            f"no running gait has {speed:g} m/s at its apex: give a speed from"
+            f" {inward(low, high)} m/s"
         )
     relative = float(speed / unit)
     if apex_height is None:

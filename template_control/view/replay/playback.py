@@ -9,9 +9,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.checked import checked
+from template_control.checks.fitting import check
 from template_control.checks.ranges import Range
-from template_control.errors import ParameterError, RecordError
+from template_control.errors import ParameterError
 from template_control.run.record import Record
 
 Array = NDArray[np.float64]
@@ -57,12 +57,11 @@ class Foothold:
     time: float
 
 
-@checked
 def playback(
     record: Record,
     *,
-    fps: Annotated[float, FRAME_RATES],
-    speed: Annotated[float, SPEEDS] = 1.0,
+    fps: float,
+    speed: float = 1.0,
     start: float | None = None,
     end: float | None = None,
 ) -> Playback:
@@ -77,10 +76,11 @@ def playback(
 
     Raises:
         ParameterError: if a number is out of its range.
-        RecordError: if the run has fewer than two samples.
+        RecordError: if the run cannot be shown.
     """
-    if len(record.time) < 2:
-        raise RecordError("the run has fewer than two samples: there is nothing to replay")
+    check("speed", speed, Annotated[float, SPEEDS])
+    check("fps", fps, Annotated[float, FRAME_RATES])
+    record.check_shown()
     first, last = float(record.time[0]), float(record.time[-1])
     begin, stop = _moment(start, first, last), _moment(end, last, last)
     if not (first <= begin < stop):

@@ -112,7 +112,8 @@ def save_film(
     is_gif = path.suffix == ".gif"
     if fps is None:
         fps = GIF_FPS if is_gif else FPS
-    if is_gif and start is None and len(record.time):
+    record.check_shown()
+    if is_gif and start is None:
         last = float(record.time[-1])
         stop = last if end is None else (last + end if end < 0.0 else min(end, last))
         start = max(float(record.time[0]), stop - GIF_SECONDS * speed)
