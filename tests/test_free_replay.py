@@ -1,9 +1,13 @@
 """Replays of free runs: what is where in space."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 import template_control as tc
 from template_control.cli.main import main
@@ -117,3 +121,26 @@ def test_the_command_replays_a_free_run(record, tmp_path, capfd):
     pictures = Image.open(film)
     assert pictures.n_frames == 6
     assert "five_link_3d" in page.read_text()
+
+
+@pytest.mark.slow(seconds=1)
+def test_a_robot_without_shapes_is_shown_with_sticks_down_to_its_feet(record):
+    text = re.sub(r"<visual.*?</visual>", "", record.metadata["urdf"], flags=re.DOTALL)
+    bare = replace(record, metadata={**record.metadata, "urdf": text})
+    model, shapes, visuals = load_visuals(bare)
+    rows = np.arange(0, len(record.time), 97)
+    position, quaternion = placements(model, shapes, record.q[rows])
+    names = [visual.name for visual in visuals]
+    assert all(name.startswith("stick_") for name in names)
+    for foot, leg in enumerate(record.metadata["legs"]):
+        i = names.index(f"stick_{record.metadata['joints'][leg[-1]]}")
+        half = 0.5 * visuals[i].geometry.height
+        turned = Rotation.from_quat(quaternion[:, i]).apply([0.0, 0.0, half])
+        away = np.minimum(
+            *(
+                np.linalg.norm(position[:, i] + side * turned - sole, axis=1)
+                for side in (1.0, -1.0)
+                for sole in [record.space_foot[rows, foot] + [0.0, 0.0, RADIUS]]
+            )
+        )
+        np.testing.assert_allclose(away, 0.0, atol=1e-9)

@@ -3,6 +3,7 @@
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import urllib.request
@@ -195,3 +196,43 @@ def test_page_shows_a_walking_robot_in_a_browser_without_network(record, tmp_pat
     # The camera keeps the trunk in the middle while the legs move below it.
     upper, lower = np.array_split(moved, 2)
     assert lower.sum() > upper.sum()
+
+
+def test_the_server_takes_the_port_it_is_given(record, tmp_path, refused):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        taken.listen()
+        record.save(tmp_path / "run.npz")
+        words = ["replay", str(tmp_path / "run.npz"), "--no-browser", "--port"]
+        line = refused([*words, str(port)])
+        assert f"does not start on port {port} (Address already in use): give another" in line
+    with tc.replay(record, end=0.3, port=port) as server:
+        assert f":{port}/" in server.url
+        with urllib.request.urlopen(server.url, timeout=10) as answer:
+            assert answer.status == 200
+    assert "--port is 0: give a whole number from 1 to 65535" in refused([*words, "0"])
+
+
+def test_a_walk_without_its_meshes_names_the_first_and_every_view_shows_it(tmp_path, capfd):
+    text = tc.robot.robot_path("five-link").read_text()
+    names = iter(f"meshes/part_{i}.stl" for i in range(99))
+    text = re.sub(
+        r"<visual>(.*?)<geometry>.*?</geometry>",
+        lambda m: f'<visual>{m[1]}<geometry><mesh filename="{next(names)}"/></geometry>',
+        text,
+        flags=re.DOTALL,
+    )
+    path = tmp_path / "mine.urdf"
+    path.write_text(text)
+    words = ["walk", "--robot", str(path), "--steps", "1", "--output", str(tmp_path / "run")]
+    assert main([*words, "--no-figures"]) == 0
+    told = [line for line in capfd.readouterr().err.splitlines() if "meshes are missing" in line]
+    assert len(told) == 1
+    assert told[0].startswith(f"template-control: {path}: ")
+    assert "the first is meshes/part_0.stl" in told[0]
+    run, page = str(tmp_path / "run" / "run.npz"), tmp_path / "walk.html"
+    assert main(["replay", run, "--html", str(page), "--gif", str(tmp_path / "walk.gif")]) == 0
+    assert main(["plots", run]) == 0
+    assert "walk again" not in capfd.readouterr().err
+    assert page.stat().st_size > 1e5

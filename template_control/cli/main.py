@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import importlib
 import io
+import logging
 import os
 import re
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple, NoReturn
 
 from template_control.cli.interrupts import (
@@ -199,7 +200,7 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
 
         if output is not None:
             on_signals(interrupt)
-        with compiling(plain_console(stderr=True)):
+        with compiling(plain_console(stderr=True)), _robot_notices():
             status = int(options.run(options))
         sys.stdout.flush()
         return status
@@ -221,6 +222,25 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
         if isinstance(output.failure, BrokenPipeError):
             return _PIPE_CLOSED
         return _told(f"cannot write to standard output: {output.failure.strerror}", _USER_ERROR)
+
+
+class _Notices(logging.Handler):
+    """Prints a warning of the library as a line of the command."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(OSError):
+            print(f"template-control: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _robot_notices() -> Iterator[None]:
+    """Print what is said of a robot's file, such as meshes that are missing."""
+    handler, log = _Notices(logging.WARNING), logging.getLogger("template_control.robot")
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
 
 
 def _told(line: str, status: int) -> int:

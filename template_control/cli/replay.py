@@ -15,7 +15,14 @@ from template_control.run.kinds.any_record import load_record
 from template_control.run.record import Record
 from template_control.terminal import plain_console
 from template_control.view.replay.playback import FRAME_RATES, SPEEDS
-from template_control.view.replay.replay import GIF_FPS, GIF_SECONDS, replay, save_film, save_html
+from template_control.view.replay.replay import (
+    GIF_FPS,
+    GIF_SECONDS,
+    PORTS,
+    replay,
+    save_film,
+    save_html,
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +65,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--video", type=values.path, metavar="FILE", help="write an .mp4; needs ffmpeg installed"
     )
     parser.add_argument(
+        "--port",
+        type=values.whole(PORTS),
+        help="of the server; the first free one from 7000 up if not given",
+    )
+    parser.add_argument(
         "--no-browser", action="store_true", help="print the server's address, open no browser"
     )
 
@@ -85,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
     for path in written:
         print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
     if not written:
-        _serve(record, part, options.no_browser)
+        _serve(record, {**part, "port": options.port}, options.no_browser)
     return 0
 
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 from template_control.errors import RobotError
 from template_control.robot.requirements import BASE_DOF
 
-_LOG = logging.getLogger("template_control")
+_LOG = logging.getLogger(__name__)
 _LOSSES = ("damping", "friction")
 # Not URDF's own; written by some tools, and PyBullet has nothing that would do the same.
 _ROTORS = ("armature", "rotor_inertia", "rotorInertia")

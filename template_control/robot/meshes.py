@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 from template_control.errors import RobotError
 
-_LOG = logging.getLogger("template_control")
+_LOG = logging.getLogger(__name__)
 _PACKAGE = ("package://", "model://")
 
 
@@ -78,7 +78,7 @@ def _package_folders(inside: str) -> list[str]:
 @cache
 def _tell(path: Path, count: int, name: str) -> None:
     _LOG.warning(
-        "%s: %d meshes are missing, the first is %s: the robot walks, but is shown without them",
+        "%s: %d meshes are missing, the first is %s: the robot walks, and is shown with sticks",
         path,
         count,
         name,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from template_control.checks.checked import checked
+from template_control.checks.ranges import Range
 from template_control.run.record import Record
 from template_control.view.replay.film import write_film
 from template_control.view.replay.playback import playback
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 FPS = 30.0
 GIF_FPS, GIF_SECONDS = 20.0, 4.0
+PORTS = Range(1, 65535)
+"""Of the server."""
 
 
 @checked
@@ -29,6 +32,7 @@ def replay(
     speed: float = 1.0,
     start: float | None = None,
     end: float | None = None,
+    port: Annotated[int, PORTS] | None = None,
 ) -> ReplayServer:
     """Serve a run to the browser, with meshcat's controls for pause, time and speed.
 
@@ -37,19 +41,20 @@ def replay(
         fps: keyframes per second; the browser interpolates between them.
         speed: seconds of the run per second of the replay.
         start, end: part of the run [s]; negative values count from its end.
+        port: of the server; None for the first free one from 7000 up.
 
     Returns:
         The server: ``url``, ``open_browser()``, ``wait()``, ``close()``.
 
     Raises:
         ParameterError: if a number is out of its range.
-        RecordError: if the run is too short or its robot cannot be shown.
+        RecordError: if the run or its robot cannot be shown, or the server does not start.
     """
     from template_control.view.replay.replay_scene import scene_commands
     from template_control.view.replay.replay_server import ReplayServer
 
     frames = playback(record, fps=fps, speed=speed, start=start, end=end)
-    return ReplayServer(scene_commands(frames))
+    return ReplayServer(scene_commands(frames), port)
 
 
 @checked

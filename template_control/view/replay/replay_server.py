@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
-import io
 import os
+import sys
 import time
 import webbrowser
+from subprocess import PIPE, Popen
 from typing import Any
 
 import umsgpack
-from meshcat.visualizer import ViewerWindow
+import zmq
 
 from template_control.errors import RecordError
+
+# meshcat's own main program has no option for the port.
+_SERVER = """
+import sys
+from meshcat.servers.zmqserver import ZMQWebSocketBridge
+try:
+    bridge = ZMQWebSocketBridge(port=int(sys.argv[1]) if sys.argv[1:] else None)
+except OSError as error:
+    sys.exit(error.strerror)
+print(bridge.zmq_url, bridge.web_url, flush=True)
+bridge.run()
+"""
 
 
 class ReplayServer:
@@ -20,6 +34,7 @@ class ReplayServer:
 
     Args:
         commands: as :func:`~template_control.view.replay.replay_scene.scene_commands` makes them.
+        port: of the server; None for the first free one from 7000 up.
 
     Attributes:
         url: where a browser finds the replay.
@@ -28,19 +43,29 @@ class ReplayServer:
         RecordError: if the server does not start.
     """
 
-    def __init__(self, commands: list[Any]) -> None:
-        try:
-            # meshcat prints the address itself, in its own words.
-            with contextlib.redirect_stdout(io.StringIO()) as said:
-                self._window = ViewerWindow(zmq_url=None, start_server=True, server_args=[])
-        except RuntimeError as error:
-            raise RecordError(f"{error}: {said.getvalue().strip()[-200:]}") from None
-        self.url: str = self._window.web_url
-        for command in commands:
-            lowered = command.lower()
-            head = [lowered["type"].encode(), lowered["path"].encode()]
-            self._window.zmq_socket.send_multipart([*head, umsgpack.packb(lowered)])
-            self._window.zmq_socket.recv()
+    def __init__(self, commands: list[Any], port: int | None = None) -> None:
+        words = [sys.executable, "-c", _SERVER, *([] if port is None else [str(port)])]
+        # In a session of its own: Ctrl-C in the terminal is for us alone.
+        self._process = Popen(words, stdout=PIPE, stderr=PIPE, text=True, start_new_session=True)
+        atexit.register(self.close)
+        assert self._process.stdout is not None
+        queue, _, self.url = self._process.stdout.readline().strip().partition(" ")
+        if not self.url:
+            _, why = self._process.communicate()
+            self.close()
+            where = "" if port is None else f" on port {port}"
+            reason = (why.strip().splitlines() or ["no reason given"])[-1]
+            raise RecordError(
+                f"the replay's server does not start{where} ({reason}): give another --port, or"
+                " write a page with --html"
+            )
+        with zmq.Context() as context, context.socket(zmq.REQ) as socket:
+            socket.connect(queue)
+            for command in commands:
+                lowered = command.lower()
+                head = [lowered["type"].encode(), lowered["path"].encode()]
+                socket.send_multipart([*head, umsgpack.packb(lowered)])
+                socket.recv()
 
     def open_browser(self) -> bool:
         """Show the replay in the user's browser; False where there is no display."""
@@ -56,8 +81,9 @@ class ReplayServer:
 
     def close(self) -> None:
         """End the server."""
-        self._window.server_proc.terminate()
-        self._window.server_proc.wait()
+        atexit.unregister(self.close)
+        self._process.kill()
+        self._process.communicate()
 
     def __enter__(self) -> ReplayServer:
         return self

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from matplotlib.colors import to_rgba
 from meshcat import geometry as mg
 from numpy.typing import NDArray
 
@@ -16,8 +16,11 @@ from template_control.errors import RecordError
 from template_control.robot.biped import foot_frame
 from template_control.run.kinds.free_record import FreeRecord
 from template_control.run.record import Record
+from template_control.view.style import LEFT, RIGHT, TRUNK
 
 Array = NDArray[np.float64]
+
+_STICK = 0.02  # radius of a stick over the template's rest length
 
 # meshcat's cylinders lie along y, the URDF's along z.
 _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -47,26 +50,88 @@ Robot = tuple[pin.Model, pin.GeometryModel, list[Visual]]
 def load_visuals(record: Record) -> Robot:
     """The robot of a run, and its shapes in the geometry model's order.
 
+    A mesh that is missing or cannot be read is left out. Legs and trunk that have no shape then
+    are drawn as sticks.
+
+    Args:
+        record: the run.
+
     Raises:
-        RecordError: if the run carries no URDF, a mesh file is missing or cannot be read, or
-            the robot has nothing to see.
+        RecordError: if the run carries no URDF.
     """
     text = record.metadata.get("urdf")
     if not text:
-        raise RecordError("the run carries no URDF, so its robot cannot be shown: walk it again")
-    _check_meshes(text)
-    model = model_of(record)
-    try:
-        shapes = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL)
-    except ValueError as error:
-        lines = [line for line in str(error).splitlines() if "resource" in line or "Mesh" in line]
         raise RecordError(
-            f"a mesh of {model.name} cannot be read ({lines[0] if lines else error}):"
-            " put it back, or walk again with a URDF whose meshes are there"
-        ) from None
-    if not len(shapes.geometryObjects):
-        raise RecordError(f"the URDF of {model.name} has no visuals: add some and walk again")
-    return model, shapes, [_visual(shape) for shape in shapes.geometryObjects]
+            "the run carries no URDF, so its robot cannot be shown in space: draw it with plots"
+        )
+    model = model_of(record)
+    shapes = pin.buildGeomFromUrdfString(model, _with_meshes(text), pin.GeometryType.VISUAL)
+    visuals = [_visual(shape) for shape in shapes.geometryObjects]
+    for shape, visual in zip(list(shapes.geometryObjects), visuals, strict=True):
+        if visual is None:
+            shapes.removeGeometryObject(shape.name)
+    seen = {shape.parentJoint for shape in shapes.geometryObjects}
+    for stick in sticks(record, model):
+        if stick.parentJoint not in seen:
+            shapes.addGeometryObject(stick)
+            visuals.append(_visual(stick))
+    return model, shapes, [visual for visual in visuals if visual is not None]
+
+
+def _with_meshes(text: str) -> str:
+    """The URDF with those visual meshes only that can be read."""
+    robot, loader = ET.fromstring(text), pin.hppfcl.MeshLoader()
+    for link in robot.findall("link"):
+        for shape in link.findall("visual"):
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            try:
+                loader.load(str(mesh.get("filename")).removeprefix("file://"))
+            except (ValueError, RuntimeError):
+                link.remove(shape)
+    return ET.tostring(robot, encoding="unicode")
+
+
+def sticks(record: Record, model: pin.Model) -> list[pin.GeometryObject]:
+    """Cylinders from joint to joint, to the feet, and up from the hips to twice the trunk's CoM.
+
+    Args:
+        record: the run.
+        model: of its robot.
+    """
+    m = record.metadata
+    radius = _STICK * float(m["template"]["rest_length"])
+    joints = [[model.getJointId(m["joints"][i]) for i in leg] for leg in m["legs"]]
+    made = []
+    for leg, foot, color in zip(joints, m["feet"], (LEFT, RIGHT), strict=True):
+        ends = [model.jointPlacements[joint].translation for joint in leg[1:]]
+        ends.append(model.frames[model.getFrameId(foot)].placement.translation)
+        made += [
+            _stick(model, joint, np.zeros(3), end, radius, color)
+            for joint, end in zip(leg, ends, strict=True)
+        ]
+    hips = [model.jointPlacements[leg[0]].translation for leg in joints]
+    middle = 0.5 * (hips[0] + hips[1])
+    top = middle + np.array([0.0, 0.0, 2.0 * float(m["trunk_com"])])
+    made.append(_stick(model, model.parents[joints[0][0]], middle, top, 2.0 * radius, TRUNK))
+    return [stick for stick in made if stick is not None]
+
+
+def _stick(
+    model: pin.Model, joint: int, begin: Array, end: Array, radius: float, color: str
+) -> pin.GeometryObject | None:
+    """A cylinder between two points of a joint's frame; None where they are one."""
+    length = float(np.linalg.norm(end - begin))
+    if length < radius:
+        return None
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (end - begin) / length)
+    place = pin.SE3(turn.matrix(), 0.5 * (begin + end))
+    stick = pin.GeometryObject(
+        f"stick_{model.names[joint]}", joint, place, pin.hppfcl.Cylinder(radius, length)
+    )
+    stick.meshColor = np.array(to_rgba(color))
+    return stick
 
 
 def model_of(record: Record) -> pin.Model:
@@ -119,17 +184,8 @@ def foot_sides(model: pin.Model, feet: list[str]) -> Array:
     return np.array([data.oMf[foot_frame(model, foot)].translation[1] for foot in feet])
 
 
-def _check_meshes(text: str) -> None:
-    for name in re.findall(r'<mesh[^>]*filename="([^"]+)"', text):
-        path = Path(name.removeprefix("file://"))
-        if "://" not in str(name.removeprefix("file://")) and not path.is_file():
-            raise RecordError(
-                f"the robot's mesh {path} is missing: put it back, or walk again with a URDF"
-                " whose meshes are there"
-            )
-
-
-def _visual(shape: pin.GeometryObject) -> Visual:
+def _visual(shape: pin.GeometryObject) -> Visual | None:
+    """The shape for meshcat; None of a kind that it does not draw."""
     geometry: Any = shape.geometry
     offset = np.eye(4)
     kind = type(geometry).__name__
@@ -145,8 +201,6 @@ def _visual(shape: pin.GeometryObject) -> Visual:
         faces = [(t[0], t[1], t[2]) for t in triangles]
         drawn = mg.TriangularMeshGeometry(np.array(geometry.vertices()), np.array(faces))
     else:
-        raise RecordError(
-            f"visual {shape.name!r} is a {kind}: use a box, cylinder, sphere or mesh in the URDF"
-        )
+        return None
     red, green, blue, opacity = (float(c) for c in shape.meshColor)
     return Visual(shape.name, drawn, offset, (red, green, blue, opacity))
