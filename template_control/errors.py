@@ -9,6 +9,10 @@ class ParameterError(TemplateControlError):
     """A number out of its range, or not finite."""
 
 
+class DivergedError(ParameterError):
+    """A robot's state, or what is sensed of it, that is not finite; it ends a run as a fall."""
+
+
 class GaitError(TemplateControlError):
     """A gait that does not exist: no step of the template returns to the wanted state."""
 

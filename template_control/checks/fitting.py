@@ -96,7 +96,10 @@ def _annotated(inner: Any, extras: tuple[Any, ...]) -> Callable[[Any], Any]:
 
 def _shaped(value: Any, fit: Callable[[Any], Any], shape: Shape) -> Any:
     array = fit(value)
-    if not shape.holds(array.shape) or (shape.finite and not np.isfinite(array).all()):
+    if not shape.holds(array.shape):
+        had = f"; it has {len(array)}" if array.ndim == 1 and len(shape.sizes) == 1 else ""
+        raise Refused(shape.words + had)
+    if shape.finite and not np.isfinite(array).all():
         raise Refused(shape.words)
     return array
 
@@ -278,8 +281,10 @@ _COMPOUND: dict[Any, Callable[..., Any]] = {
 def _instance(value: Any, kind: type) -> Any:
     if getattr(kind, "_is_protocol", False):
         missing = [name for name in _members(kind) if not _has(value, name)]
-        if missing or isinstance(value, type):
+        if isinstance(value, type) or 2 * len(missing) > len(_members(kind)):
             raise Refused(words_for(kind))
+        if missing:  # meant as one, as it seems
+            raise Refused(f"{words_for(kind)} (this one lacks {', '.join(missing)})")
         return value
     if not isinstance(value, kind):
         raise Refused(words_for(kind))

@@ -89,7 +89,8 @@ class EmbeddingController(AutomatonFollower):
                 None: they tell neither.
 
         Raises:
-            ParameterError: if the state is not finite.
+            DivergedError: if the state is not finite.
+            ParameterError: if a planner, the route or a task answers with nonsense.
         """
         self.robot.update(*self.ground.enter(q, v))
         if force is not None:

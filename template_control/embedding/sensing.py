@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.references.feet import Feet
 from template_control.embedding.references.rolling import unrolled
+from template_control.errors import DivergedError
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Leg
 
@@ -92,11 +94,16 @@ class Sensing:
 
         Args:
             momentum: whether the speed includes the angular momentum about the CoM.
+
+        Raises:
+            DivergedError: if the speed is not finite.
         """
         r, s = self._robot, self.now
         s.state[2] = r.com_velocity[0]
         if momentum:
             s.state[2] += r.angular_momentum / (r.mass * s.state[1])
+        if not isfinite(s.state[2]):  # the robot's own state is, but for its height over the foot
+            raise DivergedError(f"the forward speed of {r.name} is not finite")
 
     def foresee(self, dt: float) -> None:
         """Reckon with the speed that the next tick has in ``dt`` if nothing hits the robot."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.asking import asked
 from template_control.embedding.planners.planner import (
     BreakingPlanner,
     CurvePlanner,
@@ -81,7 +82,7 @@ class StridePlanning(StridePath):
             return None
         self.reports[-1] = found.report
         self._broken = True
-        self.route.take(found.goal)
+        asked(self.route.take, found.goal)
         return self.follow(found.node, sensed, now)
 
     def overdue(self, node: Node, phase_time: float) -> bool:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
-from template_control.errors import ParameterError
+from template_control.errors import DivergedError
 from template_control.plant.agreement import check_damping
 from template_control.plant.rigid_contact import pressing, solve
 from template_control.plant.terrain.rolling_feet import RollingFeet
@@ -163,7 +163,7 @@ class IdealPlant:
             push: horizontal disturbance on the trunk's centre of mass [N].
 
         Raises:
-            ParameterError: if the state is not finite any more, or the legs lie so that the
+            DivergedError: if the state is not finite any more, or the legs lie so that the
                 contacts' forces are not determined.
         """
         self._drive[BASE_DOF:] = torque
@@ -174,7 +174,7 @@ class IdealPlant:
                 self._rub()
             self._advance(self.options.time_step)
         except np.linalg.LinAlgError:
-            raise ParameterError(
+            raise DivergedError(
                 f"{self.robot.name}: the contacts' forces are not determined at q ="
                 f" {self._q.tolist()}"
             ) from None

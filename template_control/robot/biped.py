@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.errors import ParameterError, RobotError
+from template_control.errors import DivergedError, RobotError
 from template_control.robot.legs import HINGES, middle, straight_legs
 
 Array = NDArray[np.float64]
@@ -197,7 +197,7 @@ class Biped(ABC):
 
     def _check_finite(self, finite: bool, q: Array, v: Array) -> None:
         if not finite:
-            raise ParameterError(
+            raise DivergedError(
                 f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
             )
 
@@ -210,7 +210,7 @@ class Biped(ABC):
             v: (nv,) velocity.
 
         Raises:
-            ParameterError: if a value is NaN or infinite.
+            DivergedError: if a value is NaN or infinite.
         """
 
     def neutral(self) -> Array:

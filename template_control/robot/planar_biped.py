@@ -180,7 +180,7 @@ class PlanarBiped(Biped):
             v: (nv,) velocity [m/s, rad/s].
 
         Raises:
-            ParameterError: if a value is NaN or infinite.
+            DivergedError: if a value is NaN or infinite.
         """
         found = gather(self._sources, q, v, self._compute(q, v), self._terms)
         finite, self.angular_momentum, self.angular_momentum_bias = found[:3]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from template_control import settings, storage
 from template_control.checks.checked import checked
-from template_control.errors import RecordError
+from template_control.errors import RecordError, TemplateControlError
 from template_control.plant.ground import GroundStep
 from template_control.plant.terrain.terrain import Terrain
 from template_control.run.data_frame import to_dataframe
@@ -205,6 +205,7 @@ class Record:
         m = self.metadata
         end = f"; fell: {m['fall_reason']}" if self.fell else ""
         end += "; interrupted" if m.get("interrupted") else ""
+        end += f"; ended by an error: {m['error']}" if m.get("error") else ""
         return (
             f"<Record of {m['robot']}, gait {m['gait']}: {self.steps} steps in"
             f" {m['duration']:.2f} s, {len(self.time)} samples{end}>"
@@ -276,3 +277,36 @@ class RunInterrupted(KeyboardInterrupt):
     def __init__(self, record: Record) -> None:
         super().__init__("the run was interrupted")
         self.record = record
+
+
+def one_line(error: BaseException) -> str:
+    """An error on one line: its class, unless its text names the culprit, its text and its notes.
+
+    Args:
+        error: of this library, or of the user's own code.
+    """
+    text = str(error)
+    if not isinstance(error, TemplateControlError):
+        text = f"{type(error).__name__}: {text}" if text else type(error).__name__
+    return " ".join(". ".join((text, *getattr(error, "__notes__", ()))).split())
+
+
+def keep(error: Exception, record: Record) -> None:
+    """Give an error that ended a run what was recorded until then.
+
+    Args:
+        error: that goes up.
+        record: for :func:`recorded`.
+    """
+    vars(error)["record"] = record
+    error.add_note("What the run had recorded is this error's attribute record.")
+
+
+def recorded(error: BaseException) -> Record | None:
+    """What a run had recorded when an error ended it; None where it had not begun.
+
+    Args:
+        error: that :func:`~.simulation.simulate` has raised; Ctrl-C too.
+    """
+    record = vars(error).get("record")
+    return record if isinstance(record, Record) else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from math import copysign, cos, hypot, sin
 
 import numpy as np
@@ -16,8 +17,9 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.robot_route import robot_route
+from template_control.embedding.robot_template import template_for
 from template_control.embedding.section_report import SectionReport
-from template_control.errors import ParameterError
+from template_control.errors import DivergedError, ParameterError
 from template_control.plant.plant import Plant, plant_name
 from template_control.robot.biped import Biped
 from template_control.robot.free.free_biped import FreeBiped
@@ -28,13 +30,14 @@ from template_control.run.kinds.kind import Kind
 from template_control.run.kinds.planar import Planar
 from template_control.run.metadata import about, outcome
 from template_control.run.options import Push, SimulationOptions, check_pushes
-from template_control.run.record import Record, RunInterrupted
+from template_control.run.record import Record, RunInterrupted, keep, one_line
 from template_control.run.recorder import Recorder, Truth
 from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import VLO
+from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.catching import CATCHING_STRIDES, CatchingRoute
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
@@ -43,6 +46,9 @@ from template_control.slip.scenario.scenario_route import ScenarioRoute
 Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
+
+_OTHER_TEMPLATE = 0.05
+"""Share by which a template may differ from the robot's own: a choice of l0, not another robot."""
 
 STEPS = 50
 """Steps of a run on a route that does not end, where the options do not say."""
@@ -76,7 +82,9 @@ def simulate(
 ) -> Record:
     """Run ``robot`` along a route and record it; a fall ends the run and raises nothing.
 
-    Ctrl-C ends the run, and the loop it stands in; the exception carries what was recorded.
+    Ctrl-C ends the run, and the loop it stands in; so does an error of the route, of a planner or
+    of a task. What was recorded until then is the attribute ``record`` of the exception
+    (:func:`~.record.recorded`).
 
     Args:
         robot: model of the controller, and whose URDF the plant loads.
@@ -92,8 +100,9 @@ def simulate(
 
     Raises:
         RobotError: if the robot's legs do not reach the start.
-        ParameterError: if there is no planner for a stride of the route, no pose to start in, or
-            if another run uses the robot, the route or a planner at this moment.
+        ParameterError: if there is no planner for a stride of the route, or no pose to start in; if
+            the template of the route is another robot's; if another run uses the robot, the route
+            or a planner at this moment; if one of these answers with what makes no stride.
         ScenarioError: if the scenario asks for what the robot cannot do.
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
@@ -106,32 +115,58 @@ def simulate(
     last = _last_step(controller, o)
     parts = (route, controller.planning.route, *controller.planning.planners.values())
     with in_use(robot, *parts):
+        _check_template(robot, controller.parameters)
         q, v = kind.start(controller, o)
         senses = kind.senses(controller, o)
         _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
         # Before the run, which would be lost if this failed after it.
         metadata = about(controller, o)
         begin = time.perf_counter()
-        stop: KeyboardInterrupt | None = None
+
+        def ended(reason: str = "", stop: BaseException | None = None) -> Record:
+            seconds = time.perf_counter() - begin
+            if reason:
+                _LOG.warning("%s fell: %s", robot.name, reason)
+            end = metadata | outcome(recorder, o.plant.time_step, reason, seconds)
+            end["interrupted"] = isinstance(stop, KeyboardInterrupt)
+            end["error"] = "" if stop is None or end["interrupted"] else one_line(stop)
+            record = recorder.record(end)
+            _LOG.info("%r in %.2f s of wall-clock time", record, seconds)
+            return record
+
         with kind.plant(o.plant) as plant:
             plant.reset(q, v)
             try:
                 world = (plant, kind, senses)
-                reason = _loop(world, controller, recorder, o, (last, progress))
-            except KeyboardInterrupt as error:
+                return ended(_loop(world, controller, recorder, o, (last, progress)))
+            except KeyboardInterrupt as stop:
                 if not recorder.ticks:
                     raise
-                reason, stop = "", error
-        seconds = time.perf_counter() - begin
-        if reason:
-            _LOG.warning("%s fell: %s", robot.name, reason)
-        metadata |= outcome(recorder, o.plant.time_step, reason, seconds)
-        metadata["interrupted"] = stop is not None
-        record = recorder.record(metadata)
-    _LOG.info("%r in %.2f s of wall-clock time", record, seconds)
-    if stop is not None:
-        raise RunInterrupted(record) from stop
-    return record
+                raise RunInterrupted(ended(stop=stop)) from stop
+            except Exception as error:
+                if recorder.ticks:
+                    with suppress(Exception):  # what failed may be asked once more for the record
+                        keep(error, ended(stop=error))
+                raise
+
+
+def _check_template(robot: Biped, given: SlipParameters) -> None:
+    """Check that a route's template is one of this robot.
+
+    Raises:
+        ParameterError: naming both templates, if its mass, gravity or rest length is another.
+    """
+    own = template_for(robot)
+    for name in ("mass", "gravity", "rest_length"):
+        if abs(getattr(given, name) / getattr(own, name) - 1.0) > _OTHER_TEMPLATE:
+            raise ParameterError(
+                f"the gait or route is for a template of {_told(given)}, and that of {robot.name}"
+                f" has {_told(own)}: give one for template_for(robot)"
+            )
+
+
+def _told(p: SlipParameters) -> str:
+    return f"{p.mass:.4g} kg, l0 = {p.rest_length:.4g} m and g = {p.gravity:.4g} m/s^2"
 
 
 def _kind(robot: Biped) -> Kind:
@@ -216,7 +251,7 @@ def _loop(
             if speed > thrown and recorder.ticks:
                 return f"the simulation diverged at {now:.3f} s: the base moves at {speed:.3g} m/s"
             solution = controller.tick(*sensed, touching, dt, felt)
-        except ParameterError as error:
+        except DivergedError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start
         senses.expect(solution.acceleration)
@@ -233,18 +268,18 @@ def _loop(
             return f"{reason} at {now:.3f} s, in step {done + 1}"
         if len(controller.reports) - 1 > done:
             done = len(controller.reports) - 1
-            _tell(controller.reports[-1], done)
+            _log_section(controller.reports[-1], done)
             if progress is not None:
                 progress(done)
         try:
             plant.step(delay.pass_on(solution.torque), *kind.force(along, aside))
-        except ParameterError as error:
+        except DivergedError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
     return ""
 
 
-def _tell(report: SectionReport, number: int) -> None:
+def _log_section(report: SectionReport, number: int) -> None:
     """Log what was decided at a section, and where the template cannot do it."""
     decision = report.decision
     _LOG.debug(

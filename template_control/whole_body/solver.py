@@ -230,6 +230,9 @@ class WholeBodyQp:
             stance: the feet on the ground.
             load: ratio of the real to the modelled inertia; the torques are scaled by it
                 and stay within their limits.
+
+        Raises:
+            ParameterError: naming a task that wrote a number which is not finite.
         """
         robot, feet = self.robot, len(stance.feet)
         limit = self._limit(load)
@@ -293,6 +296,7 @@ class WholeBodyQp:
         if found == FREE:
             w.answer = w.matrices.minimum
             return True, True, 0.0
+        tasks.check_finite()  # with such a number no constraint is kept
         start = time.perf_counter()
         regular = found != SINGULAR
         solved = regular and w.solve()

@@ -8,11 +8,14 @@ feedforward and the PD feedback.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.asking import blame, name_of
+from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.whole_body.wanted import Wanted
 
@@ -89,4 +92,21 @@ class TaskStack:
             wanted: references and measurements of this tick.
         """
         for task, rows in self._parts:
-            task.write(robot, wanted, rows)
+            try:
+                task.write(robot, wanted, rows)
+            except Exception as error:  # where nothing is raised this costs no time
+                blame(error, task.write)
+
+    def check_finite(self) -> None:
+        """Check what the tasks have written last.
+
+        Raises:
+            ParameterError: naming the task's class, if a number is not finite.
+        """
+        if isfinite(self.table.sum()):
+            return
+        for task, rows in self._parts:
+            if not np.isfinite(rows.table).all():
+                raise ParameterError(
+                    f"{name_of(task.write)} wrote a number that is not finite: write finite ones"
+                )

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import argparse
 import sys
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from template_control import view
+from template_control.cli.interrupts import stopped
 from template_control.cli.options.output import output_folder
 from template_control.cli.report.output import progress_bar
+from template_control.errors import TemplateControlError
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.run.config import Ready, RunConfig
-from template_control.run.record import Record, RunInterrupted
+from template_control.run.record import Record, RunInterrupted, one_line, recorded
 from template_control.storage import Files
 from template_control.terminal import plain_console
 
@@ -64,6 +67,10 @@ def run_and_keep(
         ready: what it is made of.
         doing: what the progress bar says.
         more: writes further files of the record into the folder; not after Ctrl-C.
+
+    Raises:
+        TemplateControlError: if a part of the user's own fails, or answers with nonsense; what was
+            recorded until then is kept, and its traceback is printed if it is another error.
     """
     files = Files()
     with output_folder(options.output) as folder, stdout_to_stderr():
@@ -74,6 +81,10 @@ def run_and_keep(
                 record = ready.run(config.simulation, advance)
         except RunInterrupted as stop:
             record = stop.record
+        except Exception as error:
+            if stopped():  # what Ctrl-C ends may end with any error
+                raise
+            _give_up(error, config, folder)
         path = files.write(lambda: record.save(folder / "run.npz"))
         files.write(lambda: config.save(folder / "run.toml"))
         if not record.metadata["interrupted"]:
@@ -82,3 +93,25 @@ def run_and_keep(
             if more is not None:
                 files.write(lambda: more(record, folder))
     return Kept(record, None if path is None else str(path), files)
+
+
+def _give_up(error: Exception, config: RunConfig, folder: Path) -> NoReturn:
+    """Keep what a run had recorded when an error ended it, and tell the error.
+
+    Args:
+        error: that is being handled. Of one that is not this library's the traceback is printed:
+            it leads into the user's own code.
+        config: the run.
+        folder: for its files.
+    """
+    record, files = recorded(error), Files()
+    line = one_line(error) if record is None else record.metadata["error"]
+    if record is not None:
+        path = files.write(lambda: record.save(folder / "run.npz"))
+        files.write(lambda: config.save(folder / "run.toml"))
+        if path is not None:
+            line += f"; the run up to here is in {path}"
+    if isinstance(error, TemplateControlError):
+        raise type(error)(line) from None
+    traceback.print_exception(error)
+    raise TemplateControlError(line) from None

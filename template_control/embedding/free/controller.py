@@ -20,7 +20,7 @@ from template_control.embedding.free.hurry import Outlook, hurried
 from template_control.embedding.free.kernels import FREE
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.sideways import SIDES, Sideways
-from template_control.embedding.planners.planner import Decision, Planner, Planners
+from template_control.embedding.planners.planner import Decision, Planner, Planners, decided
 from template_control.embedding.references.swing_foot import quintic_step
 from template_control.parts import ready
 from template_control.robot.free.free_biped import FreeBiped
@@ -123,7 +123,7 @@ class FreeController(EmbeddingController):
         report, z, planner = planning.reports[-1], section.of(sensed.state), self.planner
 
         def decide(least: float) -> Decision:
-            return planner.decide(z, report.goal.target, (least, inf))
+            return decided(planner.decide, z, report.goal.target, (least, inf))
 
         def look(decision: Decision) -> Outlook:
             if decision is not planning.reports[-1].decision:
@@ -189,7 +189,8 @@ class FreeController(EmbeddingController):
             due = planning.landing(foot).time - self.place.time
             feet = np.array([self._foot_side(foot) for foot in planning.feet])
             target = self.sideways.foothold(planning.path, self.place.time, self.sway(), feet)
-            if due <= shape.horizon or not isfinite(target):
+            # Without a touchdown on the path there is no time in which to get there.
+            if not shape.horizon < due < inf or not isfinite(target):
                 side[1:] = 0.0
             else:
                 time = max(due - shape.early, shape.horizon)

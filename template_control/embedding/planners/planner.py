@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Protocol, TypeGuard, runtime_checkable
+from math import isfinite
+from typing import Annotated, ParamSpec, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.asking import answered, name_of
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Shape
+from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
+P = ParamSpec("P")
 
 
 ANY_ANGLE = (-np.inf, np.inf)
@@ -191,10 +195,58 @@ class BreakingPlanner(Planner, Protocol):
 
         Args:
             ahead: where it leads.
-            controls: (5,) u of the stride that is left.
+            controls: (NUM_SLOTS,) u of the stride that is left.
             target: (m,) state wanted at the section where the stride ends.
             free: what of u can still be chosen.
         """
+
+
+def decided(method: Callable[P, Decision], *args: P.args, **kwargs: P.kwargs) -> Decision:
+    """A planner's decision, which a stride can be made with.
+
+    Args:
+        method: of the planner.
+        args, kwargs: its arguments.
+
+    Raises:
+        ParameterError: naming the planner's class, if it is no decision or its controls are not
+            finite.
+    """
+    decision = answered(Decision, method, *args, **kwargs)
+    _check_controls(method, decision)
+    return decision
+
+
+def curved(
+    method: Callable[P, tuple[Decision, Stride]], *args: P.args, **kwargs: P.kwargs
+) -> tuple[Decision, Stride]:
+    """A planner's decision along a curve, and the stride from there.
+
+    Args:
+        method: :meth:`CurvePlanner.curve` of the planner.
+        args, kwargs: its arguments.
+
+    Raises:
+        ParameterError: naming the planner's class, if it returns something else.
+    """
+    pair = answered(tuple, method, *args, **kwargs)
+    kinds = tuple(type(part) for part in pair)
+    if len(kinds) != 2 or not (issubclass(kinds[0], Decision) and issubclass(kinds[1], Stride)):
+        names = ", ".join(kind.__name__ for kind in kinds)
+        raise ParameterError(
+            f"{name_of(method)} returned a tuple of {names or 'nothing'}: return a Decision and a"
+            " Stride"
+        )
+    _check_controls(method, pair[0])
+    return pair
+
+
+def _check_controls(method: Callable[..., object], decision: Decision) -> None:
+    controls = decision.controls.tolist()
+    if not isfinite(sum(controls)):
+        raise ParameterError(
+            f"{name_of(method)} returned the controls {controls}: return finite numbers"
+        )
 
 
 Planners = Mapping[str, Planner]

@@ -21,6 +21,7 @@ from template_control.embedding.planners.planner import (
     Decision,
     Free,
     Planner,
+    decided,
 )
 from template_control.embedding.planners.regularised import (
     FromHere,
@@ -202,7 +203,7 @@ class TransitionPlanner:
         low, high = np.array(o.bounds).T
         lower = np.where(turns, base + low, base * low)
         upper = np.where(turns, base + high, base * high)
-        controls = self._before.decide(z).controls.copy()
+        controls = decided(self._before.decide, z).controls.copy()
         if angles[0] == angles[1]:
             controls[Slot.TOUCHDOWN_ANGLE] = angles[0]
             lower[turns] = upper[turns] = angles[0]

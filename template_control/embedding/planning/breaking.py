@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from template_control.embedding.planners.planner import BreakingPlanner, Decision, Free
+from template_control.checks.asking import asked
+from template_control.embedding.planners.planner import BreakingPlanner, Decision, Free, decided
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.section_report import SectionReport
 from template_control.embedding.sensing import Sensed
@@ -54,7 +55,7 @@ def find_break(
     excess, turn = gap
     if not isinstance(route, BreakingRoute):
         return None
-    for goal in route.instead(report.goal, float(sensed.state[2]), excess):
+    for goal in asked(route.instead, report.goal, float(sensed.state[2]), excess):
         name = node.name
         if goal.stride != report.goal.stride:
             name = BREAKS.get(goal.stride, {}).get(name, "")
@@ -100,7 +101,8 @@ def _decision(
     if node.edge(Event.TOUCHDOWN) is not None:
         slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
     ahead = rest.ahead(node, sensed)
-    return planner.break_into(ahead, present.controls, goal.target, Free(slots, turn))
+    free = Free(slots, turn)
+    return decided(planner.break_into, ahead, present.controls, goal.target, free)
 
 
 def _along_curve(

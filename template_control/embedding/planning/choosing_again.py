@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.planner import Decision, PricingPlanner, lands
+from template_control.embedding.planners.planner import Decision, PricingPlanner, decided, lands
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.planning.unexpected_ground import choose_legs
 from template_control.embedding.section_report import SectionReport
@@ -44,7 +44,7 @@ def all_controls(
 
     def decide(so_far: Array) -> Decision | None:
         z = rest.back_to_section(node, so_far, sensed)
-        return None if z is None else planner.decide(z, report.goal.target, angles)
+        return None if z is None else decided(planner.decide, z, report.goal.target, angles)
 
     decision = decide(report.decision.controls)
     if decision is not None and decision.feasible:
@@ -72,7 +72,8 @@ def stiffnesses(
     if not lands(planner):
         return None
     free = free_controls(rest.automaton, node)
-    return planner.land(rest.ahead(node, sensed), report.decision, report.goal.target, free)
+    ahead = rest.ahead(node, sensed)
+    return decided(planner.land, ahead, report.decision, report.goal.target, free)
 
 
 def landed(

@@ -8,7 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.planner import Ahead, CurvePlanner, Decision, Planner
+from template_control.embedding.planners.planner import (
+    Ahead,
+    CurvePlanner,
+    Decision,
+    Planner,
+    curved,
+    decided,
+)
 from template_control.embedding.planning.route_planners import RoutePlanners
 from template_control.embedding.sensing import Sensed
 from template_control.errors import ParameterError
@@ -91,7 +98,7 @@ class RestOfStride:
                 f"{type(planner).__name__} plans no curve for node {node}: give it a method curve"
             )
         start = np.column_stack((state[:2], state[2:4], sensed.acceleration))
-        return planner.curve(node, start, _toes(sensed), decision)
+        return curved(planner.curve, node, start, _toes(sensed), decision)
 
     def strides(
         self, node: Node, first: Stride, goal: StrideGoal, now: float
@@ -110,15 +117,15 @@ class RestOfStride:
         Returns:
             The strides, and whether the template completes them all and lasts.
         """
-        route, strides, whole, start, at = self.planners.route, [first], True, node.name, now
+        strides, whole, start, at = [first], True, node.name, now
         more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
         while more and strides[-1].completed:
             last = strides[-1]
             at += last.duration
             section = section_of(self.automaton.sections(start)[1])
             z = section.of(last.state)
-            then = route.ahead(section, z, at) or goal
-            ahead = self.planners.of(then).decide(z, then.target)
+            then = self.planners.ahead(section, z, at) or goal
+            ahead = decided(self.planners.of(then).decide, z, then.target)
             whole = whole and ahead.lasting
             start = self.automaton.start(then.stride).name
             if start in self.curved:

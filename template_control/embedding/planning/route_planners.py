@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.asking import asked, name_of
 from template_control.checks.fitting import check
-from template_control.checks.ranges import Triple
+from template_control.checks.ranges import Shape, Triple
+from template_control.checks.words import shown
 from template_control.embedding.planners.planner import (
     Decision,
     ForgettingPlanner,
     Planner,
     Planners,
+    decided,
 )
 from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt, SectionReport
@@ -25,6 +29,8 @@ from template_control.slip.maps.section import Section, section_of
 from template_control.slip.scenario.route import Route, StrideGoal
 
 Array = NDArray[np.float64]
+
+_TARGETS = {size: Annotated[Array, Shape((size,))] for size in (2, 3)}
 
 
 class RoutePlanners:
@@ -47,9 +53,9 @@ class RoutePlanners:
 
     def reset(self) -> None:
         """Forget an earlier run."""
-        self.route.reset()
+        asked(self.route.reset)
         for planner in self.planners.values():
-            planner.reset()
+            asked(planner.reset)
 
     def first_goal(self) -> StrideGoal:
         """The stride that the route begins with.
@@ -57,9 +63,48 @@ class RoutePlanners:
         Raises:
             ParameterError: if the route is empty.
         """
-        goal = self.route.ahead(self.route.section, self.route.start, 0.0)
+        goal = self.ahead(self.route.section, self.route.start, 0.0)
         if goal is None:
             raise ParameterError("the route ends where it begins: give one with a stride")
+        return goal
+
+    def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """As :meth:`~template_control.slip.scenario.route.Route.next`, checked.
+
+        Args:
+            section: where the robot is.
+            z: (n,) its state there.
+            now: time [s].
+
+        Raises:
+            ParameterError: naming the route's class, if it asks for no stride that there is.
+        """
+        return self._goal(self.route.next, section, z, now)
+
+    def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """As :meth:`~template_control.slip.scenario.route.Route.ahead`, checked as :meth:`next`.
+
+        Arguments as for :meth:`next`.
+        """
+        return self._goal(self.route.ahead, section, z, now)
+
+    def _goal(
+        self, method: Callable[[Section, Array, float], StrideGoal | None], *where: Any
+    ) -> StrideGoal | None:
+        goal = asked(method, *where)
+        if goal is None:
+            return None
+        if not isinstance(goal, StrideGoal):
+            raise ParameterError(
+                f"{name_of(method)} returned {shown(goal)}: return a StrideGoal, or None at the end"
+            )
+        if goal.stride not in self.automaton.starts:
+            raise ParameterError(
+                f"{name_of(method)} asks for a stride {goal.stride!r}: give one of"
+                f" {', '.join(self.automaton.starts)}"
+            )
+        end = section_of(self.automaton.sections(self.automaton.starts[goal.stride])[1])
+        check(f"{name_of(method)}: the target", goal.target, _TARGETS[end.dimension])
         return goal
 
     def of(self, goal: StrideGoal) -> Planner:
@@ -99,14 +144,14 @@ class RoutePlanners:
         begin = time.perf_counter()
         if reports:
             last = reports[-1]
-            self.of(last.goal).observe(last.decision, z)
-        wanted = self.route.next(section, z, now)
+            asked(self.of(last.goal).observe, last.decision, z)
+        wanted = self.next(section, z, now)
         # The last stride goes on until whoever drives the robot ends the run.
         goal = reports[-1].goal if wanted is None else wanted
-        if reports and reports[-1].goal.stride != goal.stride:
-            planner = self.of(goal)
-            if isinstance(planner, ForgettingPlanner):
-                planner.forget()
+        planner = self.of(goal)
+        other = reports and reports[-1].goal.stride != goal.stride
+        if other and isinstance(planner, ForgettingPlanner):
+            asked(planner.forget)
         decision, start = self.plan(section, z, goal)
         seconds = time.perf_counter() - begin
         end = section_of(self.automaton.sections(self.automaton.start(goal.stride).name)[1])
@@ -117,7 +162,7 @@ class RoutePlanners:
             goal=goal,
             target=end.padded(goal.target),
             decision=decision,
-            offset=check("the planner's offset", self.of(goal).offset, Triple).copy(),
+            offset=check(f"{type(planner).__name__}.offset", planner.offset, Triple).copy(),
             learnt=learnt,
             plan_seconds=seconds,
         )
@@ -136,12 +181,12 @@ class RoutePlanners:
             goal: the stride that begins.
         """
         o, planner = self.options, self.of(goal)
-        decision = planner.decide(z, goal.target)
+        decision = decided(planner.decide, z, goal.target)
         if decision.lasting:
             return decision, z
         for share in o.calmer:
             start = section.calmer(z, share, o.highest * self.route.parameters.rest_length)
-            calmer = planner.decide(start, goal.target)
+            calmer = decided(planner.decide, start, goal.target)
             if calmer.lasting:  # from there; from here a run may be the better way
                 feasible = decision.feasible
                 return replace(calmer, feasible=feasible, lasting=False, nominal=False), start

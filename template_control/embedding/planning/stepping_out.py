@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.planner import CurvePlanner
+from template_control.embedding.planners.planner import CurvePlanner, decided
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.section_report import SectionReport
 from template_control.embedding.sensing import Sensed
@@ -42,7 +42,7 @@ def follow_curve(
             if not isinstance(other, CurvePlanner):
                 continue
             start = rest.automaton.starts[kind]
-            first = other.decide(REST.of(state))
+            first = decided(other.decide, REST.of(state))
             instead, step = rest.curve(start, sensed, state, other, first)
             if instead.feasible:
                 goal = replace(report.goal, stride=kind)

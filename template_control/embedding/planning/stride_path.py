@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.asking import answered
 from template_control.embedding.planners.planner import Decision, Planner, Planners, SlopePlanner
 from template_control.embedding.planning import choosing_again
 from template_control.embedding.planning.planned_path import PlannedPath
@@ -163,7 +164,7 @@ class StridePath(PlannedPath):
         """
         planner, report, ground = self.planner, self.reports[-1], self.parameters
         if isinstance(planner, SlopePlanner):
-            ground = planner.on_slope(slope)
+            ground = answered(SlipParameters, planner.on_slope, slope)
         if self._rest.stand_on(ground):
             self.hold(replace(report.decision, nominal=False))
         return ground.slope

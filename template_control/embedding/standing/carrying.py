@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.planners.planner import Ahead, Decision, LandingPlanner
+from template_control.embedding.planners.planner import Ahead, Decision, LandingPlanner, decided
 from template_control.embedding.standing.planners import ChangePlanner
 from template_control.embedding.standing.vaults import Vaults
 
@@ -31,4 +31,4 @@ class CarryingPlanner(ChangePlanner):
         self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
     ) -> Decision:
         """See :meth:`~.planner.LandingPlanner.land`."""
-        return self._walk.land(ahead, decision, target, free)
+        return decided(self._walk.land, ahead, decision, target, free)

@@ -33,7 +33,7 @@ class StandingGait:
     Attributes:
         parameters: the template.
         state: (3,) dx/dt, y, dy/dt at rest.
-        controls: (5,) zero: no spring carries.
+        controls: (NUM_SLOTS,) zero: no spring carries.
         step_duration: of a beat [s].
         step_length: 0 [m].
         stride: its kind.

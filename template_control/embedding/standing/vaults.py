@@ -207,7 +207,7 @@ class Vaults:
         Args:
             node: of the automaton.
             state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s].
-            u: (5,) controls.
+            u: (NUM_SLOTS,) controls.
             toes: (2,) x of the rear and the front foot [m].
         """
         return self._simulator.run(node, state, u, toes)

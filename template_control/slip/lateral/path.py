@@ -50,7 +50,8 @@ class LateralPath(NamedTuple):
         gravity: g [m/s^2].
         longest: step of the integration [s].
         touchdown: time of the next touchdown [s], inf if the path has none.
-        section: time of the first section after it [s], inf if the path does not come there.
+        section: time of the first section after it [s], inf if the path does not come there or
+            starts below the ground.
         beside: index, 0 or 1, of the foothold beside which the next foot lands.
     """
 
@@ -82,15 +83,16 @@ def lateral_path(strides: Sequence[Stride], gravity: float) -> LateralPath:
             sections.append(offset)
     meta = np.concatenate(metas)
     footholds, touchdown, beside = _footholds(meta, resets)
-    height = float(strides[0].cy[0, 0])
+    height = float(strides[0].cy[0, 0])  # of a robot that falls it may be below its foot
+    section = next((time for time in sections if time > touchdown), np.inf)
     return LateralPath(
         coefficients=np.concatenate([(s.cx, s.cy) for s in strides], axis=1),
         meta=meta,
         footholds=footholds,
         gravity=float(gravity),
-        longest=_SHARE * float(np.sqrt(height / gravity)),
+        longest=_SHARE * float(np.sqrt(height / gravity)) if height > 0.0 else np.inf,
         touchdown=touchdown,
-        section=next((time for time in sections if time > touchdown), np.inf),
+        section=section if height > 0.0 else np.inf,
         beside=beside,
     )
 
