@@ -111,7 +111,7 @@ def _lasting(
     return SimulationOptions(
         steps=AFTER,
         plant=plant or where.plant,
-        embedding=embedding or EmbeddingOptions(),
+        embedding=embedding,
         start=perturbed_start(where.gait, trial),
         sensors=sensors or SensorOptions(),
         delay=delay,

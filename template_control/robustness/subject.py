@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from template_control.checks.checked import Checked
-from template_control.embedding.planners.running import RunningOptions
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robustness.disturbance import Situation
@@ -42,10 +41,7 @@ class Subject(Checked):
         Raises:
             TemplateControlError: if robot or gait is not to be had.
         """
-        if self.speed is None or self.robot.free:
-            config = RunConfig(self.robot, GaitChoice(speed=self.speed))
-        else:
-            config = RunConfig(self.robot, GaitChoice("run", self.speed), RunningOptions())
-        ready = config.prepare()
+        runs = self.speed is not None and not self.robot.free
+        ready = RunConfig(self.robot, GaitChoice("run" if runs else "walk", self.speed)).prepare()
         planner = ready.planners[ready.gait.stride]
         return Situation(ready.robot, ready.gait, planner, ENGINES[self.plant]())

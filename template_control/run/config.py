@@ -82,8 +82,8 @@ class RunConfig(Checked):
         robot: which one.
         gait: which one, where there is no scenario.
         planner: which one, with its tuning; None: ahead where a planar robot has a scenario that
-            walks only, else lqr.
-        simulation: how the run goes.
+            walks only, running for a run, else lqr, tuned for the kind of robot.
+        simulation: how the run goes; the robot's own tuning where none is given.
         scenario: a speed profile instead of one gait.
 
     Raises:
@@ -98,6 +98,7 @@ class RunConfig(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "simulation", self.simulation.for_robot(self.robot.free))
         if self.scenario is not None:
             for f in fields(GaitChoice):
                 if getattr(self.gait, f.name) != f.default:
@@ -109,9 +110,15 @@ class RunConfig(Checked):
         """The planner, with its tuning."""
         if self.planner is not None:
             return self.planner
-        planar = not self.robot.free
-        walks = planar and self.scenario is not None and self.scenario.only_walks
-        return AheadOptions() if walks else LqrOptions()
+        if self.robot.free:
+            return FREE_PLANNER
+        if self.scenario is not None:
+            return AheadOptions() if self.scenario.only_walks else LqrOptions()
+        return RunningOptions() if self.gait.name == "run" else LqrOptions()
+
+    def resolved(self) -> RunConfig:
+        """The same run with the planner that is used where none was given."""
+        return replace(self, planner=self.chosen)
 
     def prepare(self) -> Ready:
         """Load the robot and make its gait, route and planner.
@@ -131,7 +138,7 @@ class RunConfig(Checked):
         robot = self.robot.load()
         ready(WALK)  # before the gait is looked for, which would compile a part of it alone
         if self.scenario is None:
-            choice, scale = self.gait, self.simulation.embedding.torque_scale
+            choice, scale = self.gait, self.simulation.tuning(self.robot.free).torque_scale
             if choice.apex_height is not None:
                 check_apex(robot, choice.run_speed(robot), choice.apex_height, scale)
             gait = choice.of(robot, scale)
@@ -199,19 +206,18 @@ class RunConfig(Checked):
         if isinstance(chosen, AheadOptions):
             return AheadPlanner(gait.parameters, chosen, float(gait.vlo[0]))
         assert isinstance(chosen, LqrOptions)
-        default = self.robot.free and chosen == LqrOptions()
-        return LqrPlanner(gait, FREE_PLANNER if default else chosen)
+        return LqrPlanner(gait, chosen)
 
     @checked
     def save(self, path: str | Path) -> Path:
-        """Write it as TOML, every number included.
+        """Write it as TOML, :meth:`resolved`, every number included.
 
         Raises:
             RecordError: if the file cannot be written.
             ParameterError: if something in it can be given in Python only.
         """
-        whole = replace(self, planner=self.chosen)
-        return storage.write_text(path, _HEAD + settings.text(settings.to_table(whole)))
+        table = settings.to_table(self.resolved())
+        return storage.write_text(path, _HEAD + settings.text(table))
 
     @classmethod
     @checked

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
@@ -129,7 +129,8 @@ class SimulationOptions(Checked):
             the route, or makes 50 steps where the route has no end.
         plant: the world; the type of its options says which. Or a plant of one's own: the run
             resets it, and leaves it open.
-        embedding: the controller's tuning; of a free robot FreeOptions.
+        embedding: the controller's tuning, of a free robot FreeOptions; None: the robot's own
+            default, :meth:`tuning`.
         start: (3,) dx/dt, y, dy/dt to start in [m/s, m, m/s], dy/dt 0 at apex; None for the
             route's.
         pose: CoM and feet to start with; None: over the stance foot at VLO, and at apex with the
@@ -151,7 +152,7 @@ class SimulationOptions(Checked):
 
     steps: Count | None = None
     plant: PlantOptions | MujocoOptions | IdealOptions | Plant = field(default_factory=PlantOptions)
-    embedding: EmbeddingOptions | FreeOptions = field(default_factory=EmbeddingOptions)
+    embedding: EmbeddingOptions | FreeOptions | None = None
     start: tuple[float, float, float] | None = None
     pose: Pose | None = None
     pushes: tuple[Push, ...] = ()
@@ -173,6 +174,22 @@ class SimulationOptions(Checked):
                 f"delay is {self.delay!r} s: give a multiple of the time step, {step:g} s, from 0"
                 f" to {_LONGEST_DELAY:g} s"
             )
+
+    def tuning(self, free: bool) -> EmbeddingOptions:
+        """The controller's tuning, the given one or the robot's own.
+
+        Args:
+            free: whether nothing holds the robot.
+        """
+        return self.embedding or (FreeOptions() if free else EmbeddingOptions())
+
+    def for_robot(self, free: bool) -> SimulationOptions:
+        """These options with the tuning that is used.
+
+        Args:
+            free: whether nothing holds the robot.
+        """
+        return replace(self, embedding=self.tuning(free))
 
     @property
     def delay_ticks(self) -> int:

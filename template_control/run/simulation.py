@@ -107,10 +107,11 @@ def simulate(
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
     """
-    o, kind = options or SimulationOptions(), _kind(robot)
+    kind, free = _kind(robot), isinstance(robot, FreeBiped)
+    o = (options or SimulationOptions()).for_robot(free)
     if isinstance(route, Scenario):
         route = robot_route(robot, route)
-    controller = _controller(kind, route, planners, o.embedding, automaton)
+    controller = _controller(kind, route, planners, o.tuning(free), automaton)
     recorder = kind.recorder(controller, o.record_every)
     last = _last_step(controller, o)
     parts = (route, controller.planning.route, *controller.planning.planners.values())

@@ -42,10 +42,11 @@ def config_from(options: argparse.Namespace, default: RunConfig) -> RunConfig:
     """
     base = default if options.config is None else RunConfig.load(options.config)
     scenario = scenario_choice(options, base.scenario)
+    robot = robot_choice(options, base.robot)
     return RunConfig(
-        robot=robot_choice(options, base.robot),
+        robot=robot,
         gait=gait_choice(options, base.gait),
-        planner=planner_choice(options, base.planner),
+        planner=planner_choice(options, base.planner, robot.free),
         simulation=simulation_choice(options, base.simulation, scenario is not None),
         scenario=scenario,
     )

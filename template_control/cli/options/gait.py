@@ -8,6 +8,7 @@ from dataclasses import replace
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
 from template_control.embedding.ahead.options import AheadOptions
+from template_control.embedding.free.options import FREE_PLANNER
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.embedding.planners.walking.modified import ModifiedOptions
 from template_control.errors import ParameterError
@@ -141,12 +142,15 @@ def scenario_choice(options: argparse.Namespace, base: Scenario | None) -> Scena
     return base if path is None else load_scenario(path)
 
 
-def planner_choice(options: argparse.Namespace, base: PlannerChoice | None) -> PlannerChoice | None:
+def planner_choice(
+    options: argparse.Namespace, base: PlannerChoice | None, free: bool
+) -> PlannerChoice | None:
     """The planner that was asked for.
 
     Args:
         options: as parsed.
         base: what holds where an option was not given.
+        free: whether nothing holds the robot; its lqr has a tuning of its own.
 
     Returns:
         None where neither says one: the run's own default.
@@ -158,7 +162,8 @@ def planner_choice(options: argparse.Namespace, base: PlannerChoice | None) -> P
     if not hasattr(options, "planner"):
         return chosen
     if options.planner in _PLANNERS and (base is None or options.planner != base.kind):
-        chosen = _PLANNERS[options.planner]()
+        kind = _PLANNERS[options.planner]
+        chosen = FREE_PLANNER if free and kind is LqrOptions else kind()
     elif options.planner is not None and options.planner not in _PLANNERS:
         if ":" not in options.planner:
             raise ParameterError(

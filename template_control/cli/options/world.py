@@ -20,7 +20,7 @@ from template_control.run.options import Course, Phase, Push, SimulationOptions,
 from template_control.run.simulation import STEPS
 
 _PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions, IdealOptions)}
-_DEFAULT = SimulationOptions()
+_DEFAULT = SimulationOptions().for_robot(free=False)
 _AROUND = Range(-360.0, 360.0)  # [deg]
 _LONG = 200  # steps beyond which samples are thinned
 
@@ -161,16 +161,16 @@ def simulation_choice(
     """
     given: dict[str, Any] = {"plant": _plant(options, base)}
     embedding = {n: getattr(options, n, None) for n in ("friction", "torque_scale", "catches")}
-    tuning = base.embedding
+    tuning = base.tuning(free=False)
     if getattr(options, "free", None) and not isinstance(tuning, FreeOptions):
-        tuning = FreeOptions()
+        tuning = FreeOptions()  # the file's is that of the robot held in its plane
     given["embedding"] = replace(tuning, **_without_none(embedding))
     given["course"] = _course(options, base.course)
     if options.push is not None:
         given["pushes"] = tuple(map(_push, options.push))
     given["delay"] = options.delay
     given["steps"] = options.steps or base.steps or (None if ends else STEPS)
-    thinned = base == _DEFAULT and (given["steps"] or 0) > _LONG
+    thinned = base.for_robot(free=False) == _DEFAULT and (given["steps"] or 0) > _LONG
     given["record_every"] = options.record_every or (5 if thinned else None)
     return replace(base, **_without_none(given))
 

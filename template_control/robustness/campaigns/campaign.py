@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 from template_control import settings
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index
-from template_control.embedding.planners.running import RunningOptions
-from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.errors import ParameterError, SweepError
 from template_control.plant.ground import GroundStep
 from template_control.robustness.campaigns.first_wrong import first_wrong
@@ -83,8 +81,7 @@ class Conditions(Checked):
         Raises:
             TemplateControlError: if robot or gait is not to be had.
         """
-        planner = RunningOptions() if self.gait.name == "run" else LqrOptions()
-        config = RunConfig(self.robot, self.gait, planner)
+        config = RunConfig(self.robot, self.gait)
         ready = config.prepare()
         gait, draw = ready.gait, self.draw(number)
         scale = Scale.of(gait.parameters)
@@ -109,7 +106,7 @@ class Conditions(Checked):
             ),
             delay=delay,
         )
-        return replace(config, simulation=simulation), ready
+        return replace(config, simulation=simulation).resolved(), ready
 
 
 _SEED_BITS = 63  # that TOML can say

@@ -59,15 +59,13 @@ class Free(Kind):
         """See :meth:`.kind.Kind.controller`.
 
         Raises:
-            ParameterError: if the options are those of a planar robot, and not the default ones.
+            ParameterError: if the options are those of a planar robot.
         """
         if not isinstance(options, FreeOptions):
-            if options != EmbeddingOptions():
-                raise ParameterError(
-                    f"{self.robot.name} walks free, and its embedding has EmbeddingOptions: give"
-                    " FreeOptions"
-                )
-            options = FreeOptions()
+            raise ParameterError(
+                f"{self.robot.name} walks free, and its embedding has EmbeddingOptions: give"
+                " FreeOptions"
+            )
         return FreeController(self.robot, planners, options, route, automaton)
 
     def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.planner import Planner, Planners
@@ -48,7 +49,16 @@ class Planar(Kind):
         route: Route,
         automaton: Automaton,
     ) -> EmbeddingController:
-        """See :meth:`.kind.Kind.controller`."""
+        """See :meth:`.kind.Kind.controller`.
+
+        Raises:
+            ParameterError: if the options are those of a free robot.
+        """
+        if isinstance(options, FreeOptions):
+            raise ParameterError(
+                f"{self.robot.name} is held in its plane, and its embedding has FreeOptions: give"
+                " EmbeddingOptions"
+            )
         return EmbeddingController(self.robot, planners, options, route, automaton)
 
     def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:

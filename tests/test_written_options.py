@@ -1,0 +1,139 @@
+"""``run.toml`` of every kind of run holds what the run used, and repeats it."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from template_control.cli.main import main
+from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.planners.walking.lqr_options import LqrOptions
+from template_control.errors import ParameterError
+from template_control.plant.plant import Plant
+from template_control.robustness.campaigns.campaign import Conditions
+from template_control.run import simulation
+from template_control.run.choices.gait import GaitChoice
+from template_control.run.choices.robot import RobotChoice
+from template_control.run.config import RunConfig
+from template_control.run.options import SimulationOptions
+from template_control.run.kinds.any_record import load_record
+from template_control.slip.similarity import Scale, scaled
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+LINES = {
+    "walk": "walk --steps 2",
+    "own tuning": "walk --steps 2 --torque-scale 0.9 --friction 0.6 --no-catch",
+    "paper": "walk --gait paper --planner modified --map improved --steps 1",
+    "ahead": "walk --planner ahead --speed 0.9 --steps 2",
+    "run": "run --speed 3 --steps 2",
+    "scenario": f"go {EXAMPLES / 'example_one.toml'} --robot runner --steps 3",
+    "speed profile": f"go {EXAMPLES / 'any_speed.toml'} --steps 2",
+    "walk of a scenario": f"walk --scenario {EXAMPLES / 'walk_speeds.toml'} --steps 2",
+    "stand": "walk --from-stand --steps 1",
+    "free bolt": "walk --robot bolt --free --speed 0.6 --steps 2 --turn 0.2",
+    "free five-link-3d": "walk --robot five-link-3d --free --steps 1",
+    "free, named planner": "walk --robot bolt --free --planner lqr --steps 1 --friction 0.6",
+    "free in MuJoCo": "walk --robot bolt --free --steps 1 --plant mujoco --noise 0.0005",
+    "estimate": "walk --estimate --steps 2",
+    "push": "walk --push 25@1:0.3 --steps 2 --delay 0.002",
+    "mujoco": "walk --plant mujoco --steps 1",
+    "ideal": "walk --plant ideal --steps 1 --mass-scale 1.05",
+    "terrain": "walk --terrain slope:angle=4 --steps 2",
+}
+
+
+@pytest.fixture
+def held(monkeypatch):
+    """What each run holds: plant, controller and options."""
+    found, loop = [], simulation._loop
+
+    def looking(world, controller, recorder, o, until):
+        found.append((world[0], controller, o))
+        return loop(world, controller, recorder, o, until)
+
+    monkeypatch.setattr(simulation, "_loop", looking)
+    return found
+
+
+def _command(line, folder, *more):
+    command, *words = line.split()
+    status = main([command, *words, *more, "--no-figures", "--output", str(folder)])
+    assert status == 0
+    return load_record(folder / "run.npz")
+
+
+@pytest.mark.parametrize("line", LINES.values(), ids=LINES)
+@pytest.mark.slow(4)
+def test_the_file_holds_what_the_run_used_and_repeats_it(line, held, tmp_path):
+    first = _command(line, tmp_path / "first")
+    file = tmp_path / "first" / "run.toml"
+    command = line.split()[0]
+    again = main(
+        [command, "--config", str(file), "--no-figures", "--output", str(tmp_path / "again")]
+    )
+    assert again == 0
+    second = load_record(tmp_path / "again" / "run.npz")
+    for f in fields(first):
+        if f.name != "metadata" and not f.name.endswith("_seconds"):
+            one, other = (getattr(record, f.name) for record in (first, second))
+            np.testing.assert_array_equal(one, other, err_msg=f.name)
+    assert file.read_text() == (tmp_path / "again" / "run.toml").read_text()
+
+    written = RunConfig.load(file)
+    assert len(held) == 2
+    for plant, controller, options in held:
+        assert isinstance(plant, Plant)
+        assert options == written.simulation
+        scale = Scale.of(controller.parameters)
+        assert controller.options == scaled(written.simulation.embedding, scale)
+        kinds = type(written.planner)
+        used = [
+            planner.options
+            for planner in controller.planning.planners.values()
+            if type(getattr(planner, "options", None)) is kinds
+        ]
+        assert scaled(written.planner, scale) in used
+        assert plant.options == written.simulation.plant
+
+
+def test_the_default_is_the_robots_own_and_a_given_one_is_kept():
+    free = RobotChoice("bolt", free=True)
+    assert RunConfig(free).resolved().planner == FREE_PLANNER
+    assert RunConfig(free).resolved().simulation.embedding == FreeOptions()
+    assert RunConfig().resolved().planner == LqrOptions()
+    assert RunConfig().resolved().simulation.embedding == EmbeddingOptions()
+    given = RunConfig(free, planner=LqrOptions())
+    assert given.resolved().planner == LqrOptions()
+    (planner,) = given.prepare().planners.values()
+    assert planner.options == scaled(LqrOptions(), Scale.of(planner.gait.parameters))
+
+
+@pytest.mark.parametrize("gait", [GaitChoice(), GaitChoice("run", 3.0)])
+def test_a_trial_is_written_with_the_planner_that_it_has(gait, tmp_path):
+    config, ready = Conditions(gait=gait).trial(0)
+    written = RunConfig.load(config.save(tmp_path / "trial.toml"))
+    (planner,) = ready.planners.values()
+    assert planner.options == scaled(written.planner, Scale.of(planner.gait.parameters))
+
+
+def test_a_free_trial_is_written_with_the_planner_that_it_has(tmp_path):
+    conditions = Conditions(RobotChoice("bolt", free=True), GaitChoice(speed=0.6))
+    config, ready = conditions.trial(0)
+    written = RunConfig.load(config.save(tmp_path / "trial.toml"))
+    assert written.planner == FREE_PLANNER
+    (planner,) = ready.planners.values()
+    assert planner.options == scaled(FREE_PLANNER, Scale.of(planner.gait.parameters))
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_tuning_of_the_other_kind_of_robot_is_refused(free):
+    tuning = EmbeddingOptions() if free else FreeOptions()
+    name, had = type(tuning).__name__, "walks free" if free else "is held in its plane"
+    config = RunConfig(
+        RobotChoice("bolt", free=free), simulation=SimulationOptions(embedding=tuning)
+    )
+    with pytest.raises(ParameterError, match=f"{had}, and its embedding has {name}: give"):
+        config.prepare().run(config.simulation)
