@@ -17,8 +17,8 @@ from template_control.run import simulation
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
 from template_control.run.config import RunConfig
-from template_control.run.options import SimulationOptions
 from template_control.run.kinds.any_record import load_record
+from template_control.run.options import SimulationOptions
 from template_control.slip.similarity import Scale, scaled
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"

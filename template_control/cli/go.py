@@ -24,7 +24,7 @@ from template_control.cli.options.world import (
 )
 from template_control.cli.report.kept import run_and_keep
 from template_control.cli.report.output import INTERRUPTED
-from template_control.cli.report.run_table import nearest_text, speed_text
+from template_control.cli.report.run_table import failures_text, nearest_text, speed_text
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.run.summary import OTHERS, STRIDES, summarise
@@ -36,6 +36,7 @@ NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in 
 _FROM_THE_RUN = (
     "robot", "fell", "fall_reason", "duration", "speed_error_rms", "accepted_speed",
     "nearest_speed_taken", "joint_torque", "joint_speed", "saturated_share", "qp_failures",
+    "qp_failed_share",
     "real_time_factor",
 )  # fmt: skip
 
@@ -147,6 +148,6 @@ def _print(figures: dict[str, Any]) -> None:
         speed = speed_text(figures["joint_speed"][joint])
         table.add_row(f"{joint}, peak", f"{torque['peak']:.0f} of {torque['limit']:g} N m, {speed}")
     table.add_row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
-    table.add_row("QP failures", f"{figures['qp_failures']}")
+    table.add_row("QP failures", failures_text(figures))
     table.add_row("record", figures["record"] or "not saved")
     plain_console().print(table)

@@ -24,6 +24,7 @@ from template_control.plant.plant import Plant, plant_name
 from template_control.robot.biped import Biped
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.run.failures import QpFailures
 from template_control.run.in_use import in_use
 from template_control.run.kinds.free import Free
 from template_control.run.kinds.kind import Kind
@@ -238,7 +239,7 @@ def _loop(
     q, v, forces = robot.neutral(), np.zeros(robot.nv), np.zeros((2, robot.directions))
     contacts = ContactSensors(o.sensors, o.falls.contact_force * robot.mass * robot.gravity)
     thrown = o.falls.thrown * controller.parameters.speed_unit
-    done, tick = 0, 0
+    done, tick, failures = 0, 0, QpFailures(robot.name)
     begun: list[tuple[float, float]] = []
     while done < last and not planning.arrived:
         now = tick * dt
@@ -255,6 +256,7 @@ def _loop(
         except DivergedError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         seconds = time.perf_counter() - start
+        failures.tick(solution.solved, now)
         senses.expect(solution.acceleration)
         if not senses.exact or controller.frame.angle != 0.0:
             robot.update(q, v)  # what is recorded is true, and in the world's axes

@@ -151,11 +151,12 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         [m/s]), com_error_rms and com_error_max (x, y, while a foot is
         to stand), com_error_flight_rms (x, y; None without flight), joint_torque (per joint peak,
         rms, limit), joint_speed (per joint peak, limit), saturated_share, qp_failures,
-        cost_of_transport (work of the joints, all counted positive, over m g and distance),
-        flight_share (robot, template: of the gait), duty_factor (share of the time that a foot is
-        on the ground), control_tick_seconds (median, p99), qp_solve_seconds (the same over the
-        ticks in which a limit acts, so that ProxQP works, and their share), plan_seconds (median,
-        p99), real_time_factor, steps_not_nominal (plans that left the planner's own law),
+        qp_failed_share (of the ticks), cost_of_transport (work of the joints, all counted positive,
+        over m g and distance), flight_share (robot, template: of the gait), duty_factor (share of
+        the time that a foot is on the ground), control_tick_seconds (median, p99), qp_solve_seconds
+        (the same over the ticks in which a limit acts, so that ProxQP works, and their share),
+        plan_seconds (median, p99), real_time_factor, steps_not_nominal (plans that left the
+        planner's own law),
         record; of a run in space also joint_angle (per joint least and most, and the range's lower
         and upper [rad]) and what :func:`~template_control.run.kinds.free_summary.in_space` tells.
     """
@@ -176,6 +177,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "accepted_speed": _accepted(record),
         "nearest_speed_taken": _nearest(record),
         **{name: value for name, value in m["summary"].items() if name != "joint_work"},
+        "qp_failed_share": m["summary"]["qp_failures"] / max(len(record.tick_seconds), 1),
         "cost_of_transport": _cost_of_transport(record, walked),
         "flight_share": _flight_share(record),
         "duty_factor": _duty_factor(record),

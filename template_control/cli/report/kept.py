@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,6 +18,7 @@ from template_control.cli.options.output import output_folder
 from template_control.cli.report.output import progress_bar
 from template_control.errors import TemplateControlError
 from template_control.plant.quiet import stdout_to_stderr
+from template_control.run import failures
 from template_control.run.config import Ready, RunConfig
 from template_control.run.record import Record, RunInterrupted, one_line, recorded
 from template_control.storage import Files
@@ -75,9 +78,10 @@ def run_and_keep(
     files = Files()
     with output_folder(options.output) as folder, stdout_to_stderr():
         try:
-            with progress_bar(
-                plain_console(stderr=True), doing, config.simulation.steps
-            ) as advance:
+            with (
+                progress_bar(plain_console(stderr=True), doing, config.simulation.steps) as advance,
+                _failures_told(),
+            ):
                 record = ready.run(config.simulation, advance)
         except RunInterrupted as stop:
             record = stop.record
@@ -93,6 +97,24 @@ def run_and_keep(
             if more is not None:
                 files.write(lambda: more(record, folder))
     return Kept(record, None if path is None else str(path), files)
+
+
+class _Lines(logging.Handler):
+    """Prints each message on a line of standard error."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(f"template-control: {record.getMessage()}", file=sys.stderr)
+
+
+@contextmanager
+def _failures_told() -> Iterator[None]:
+    """Tell on the terminal, at once, that a run's QP fails."""
+    lines = _Lines(logging.WARNING)
+    failures.LOG.addHandler(lines)
+    try:
+        yield
+    finally:
+        failures.LOG.removeHandler(lines)
 
 
 def _give_up(error: Exception, config: RunConfig, folder: Path) -> NoReturn:

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from template_control.terminal import plain_console
 
+_UNCONTROLLED = 0.1  # of the ticks without a solved QP; a stumble has a few
 _MEAN = 50  # strides at most whose section states the summary averages
 
 
@@ -79,7 +80,7 @@ def print_table(figures: dict[str, Any]) -> None:
     if figures["cost_of_transport"] is not None:
         row("cost of transport", f"{figures['cost_of_transport']:.3f}")
     row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
-    row("QP failures", f"{figures['qp_failures']}")
+    row("QP failures", failures_text(figures))
     row("steps off the planner's own law", f"{figures['steps_not_nominal']}")
     for name, key in (
         ("control tick", "control_tick_seconds"),
@@ -138,6 +139,19 @@ def past_limit(past: bool) -> str:
         past: whether it is.
     """
     return ", past its limit" if past else ""
+
+
+def failures_text(figures: dict[str, Any]) -> str:
+    """In how many ticks the QP had no solution, and what many of them mean.
+
+    Args:
+        figures: of the run.
+    """
+    count, share = figures["qp_failures"], figures["qp_failed_share"]
+    if not count:
+        return "0"
+    text = f"{count}, {100 * share:.2g} % of the ticks"
+    return f"{text}: no controlled motion" if share > _UNCONTROLLED else text
 
 
 def nearest_text(nearest: dict[str, float]) -> str:
