@@ -2,24 +2,92 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from types import CodeType
+from typing import Any
 
 from template_control.robot.biped import Biped
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _LETTERS = 10
+WITHOUT = ("cli", "code_cache", "paper", "sweep", "view")
+"""Rooms that no trial's result depends on."""
 
 
 def fingerprint(model: Biped, *trials: object) -> str:
-    """Ten letters of a digest of this package's code, the robot's URDF and the trials.
+    """Ten letters of a digest of the code that a trial runs, the robot's URDF and the trials.
+
+    Comments, docstrings and lines do not count, nor do the rooms ``WITHOUT``.
 
     Args:
         model: the robot.
         trials: what else the results depend on; known by its ``repr``.
     """
     digest = hashlib.sha256(model.urdf.encode())
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        digest.update(path.read_bytes())
+    digest.update(_code(_PACKAGE).encode())
     digest.update(repr(trials).encode())
     return digest.hexdigest()[:_LETTERS]
+
+
+@cache
+def _code(package: Path) -> str:
+    """Digest of a package's code and data, but for the rooms ``WITHOUT``."""
+    digest = hashlib.sha256()
+    for path in sorted((*package.rglob("*.py"), *package.rglob("*.json"))):
+        place = path.relative_to(package)
+        if place.parts[0] in WITHOUT:
+            continue
+        digest.update(str(place).encode())
+        content = path.read_bytes()
+        if path.suffix == ".py":
+            tree = _without_docstrings(ast.parse(content))
+            for part in _parts(compile(tree, "", "exec", dont_inherit=True)):
+                digest.update(part)
+        else:
+            digest.update(content)
+    return digest.hexdigest()
+
+
+def _without_docstrings(tree: Any) -> Any:
+    """The tree, in place, without statements that are texts."""
+    for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+        statements = getattr(tree, name, None)
+        if isinstance(statements, list):
+            kept = [_without_docstrings(s) for s in statements if not _is_text(s)]
+            setattr(tree, name, kept or [ast.copy_location(ast.Pass(), s) for s in statements[:1]])
+    return tree
+
+
+def _is_text(statement: ast.AST) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )
+
+
+def _parts(code: CodeType) -> Iterator[bytes]:
+    """What a code object does: its instructions, names and constants, without line numbers."""
+    yield code.co_code
+    yield code.co_exceptiontable
+    names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
+    counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
+    yield repr((code.co_name, names, counts)).encode()
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _parts(constant)
+        else:
+            yield _shown(constant).encode()
+
+
+def _shown(constant: object) -> str:
+    """A constant's text, which is the same in every process."""
+    if isinstance(constant, frozenset):
+        return str(sorted(map(_shown, constant)))
+    if isinstance(constant, tuple):
+        return str([_shown(entry) for entry in constant])
+    return repr(constant)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import numbers
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -76,13 +76,16 @@ def name_of(function: Callable[..., Any]) -> str:
     return f"{kind.__module__}.{kind.__qualname__}"
 
 
-def header(function: Callable[..., Any], seed: int, items: Iterable[Any]) -> dict[str, Any]:
+def header(
+    function: Callable[..., Any], seed: int, items: Iterable[Any], whole: bool = True
+) -> dict[str, Any]:
     """What identifies a sweep: format, function, seed, number and SHA-256 of its plain items.
 
     Args:
         function: what the sweep calls; its name counts, not its code.
         seed: what the items' seeds come from.
         items: keyword arguments of each call, in order.
+        whole: whether number and SHA-256 of the items count, which all are in the lines too.
 
     Raises:
         SweepError: if the items or a partial's arguments are no plain data.
@@ -96,13 +99,8 @@ def header(function: Callable[..., Any], seed: int, items: Iterable[Any]) -> dic
             count += 1
     except TypeError as error:
         raise SweepError(f"{what} cannot be told in a file: {error}") from None
-    return {
-        "format": _FORMAT,
-        "function": name,
-        "seed": seed,
-        "items": count,
-        "sha256": digest.hexdigest(),
-    }
+    head = {"format": _FORMAT, "function": name, "seed": seed}
+    return {**head, "items": count, "sha256": digest.hexdigest()} if whole else head
 
 
 class SweepFile:
@@ -111,6 +109,8 @@ class SweepFile:
     Args:
         path: of the file; a new one is begun where there is none.
         head: of :func:`header`.
+        items: of a sweep that may have fewer or more of them in the file; None: the header tells
+            that they are these.
 
     Attributes:
         finished: outcome by item index, as the file had them; the last of an item counts.
@@ -120,8 +120,11 @@ class SweepFile:
             or it cannot be written.
     """
 
-    def __init__(self, path: str | Path, head: dict[str, Any]) -> None:
+    def __init__(
+        self, path: str | Path, head: dict[str, Any], items: Sequence[Any] | None = None
+    ) -> None:
         self.path = Path(path)
+        self._items = items
         self.finished: dict[int, Outcome] = {}
         if self.path.exists() and not self.path.is_file():
             self._refuse("is no file")
@@ -160,7 +163,7 @@ class SweepFile:
             if number == 0:
                 self._compare(line, head)
             else:
-                self._take(number, line, head["items"])
+                self._take(number, line, head.get("items"))
             end += len(line)
         self._file.seek(end)
         self._file.truncate()
@@ -180,17 +183,24 @@ class SweepFile:
                 what = "other items" if key == "sha256" else f"{key} {found.get(key)}, not {value}"
                 self._refuse(f"holds another sweep ({what})")
 
-    def _take(self, number: int, line: bytes, count: int) -> None:
+    def _take(self, number: int, line: bytes, count: int | None) -> None:
         try:
             entry = json.loads(line)
             index, error = entry["index"], entry.get("error")
-            known = 0 <= index < count and (isinstance(error, str) or "result" in entry)
+            known = 0 <= index < (np.inf if count is None else count)
+            known = known and (isinstance(error, str) or "result" in entry)
         except (ValueError, KeyError, TypeError, AttributeError):
             known = False
         if not known:
             raise SweepError(
                 f"{self.path} line {number + 1} is no result: delete the line, its item runs again"
             )
+        if self._items is not None:
+            if index >= len(self._items):
+                return  # a longer sweep's
+            item, own = entry.get("item"), plain(self._items[index])
+            if json.dumps(item, sort_keys=True) != json.dumps(own, sort_keys=True):
+                self._refuse(f"holds another sweep (another item {index})")
         self.finished[index] = Outcome(entry.get("result"), error)
 
     def append(self, index: int, item: Mapping[str, Any], seed: int, outcome: Outcome) -> None:

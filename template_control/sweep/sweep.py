@@ -103,6 +103,7 @@ class SweepOptions(Checked):
         label: of the bar, and of what goes wrong.
         retry_failed: run items again that the file has as failed.
         in_flight: how many items are with the executor at a time; at least its workers.
+        grows: the file may be of a sweep of fewer or more items, where these begin alike.
 
     Raises:
         SweepError: if no item may be in flight.
@@ -114,6 +115,7 @@ class SweepOptions(Checked):
     label: str = "sweep"
     retry_failed: bool = False
     in_flight: Count = 1000
+    grows: bool = False
 
 
 def grid(**axes: Iterable[Any]) -> list[Item]:
@@ -198,7 +200,9 @@ def sweep(
     takes_seed, rows = _checked(function, items, seed)
     check_pickles(function, executor)
     seeds = tuple(item_seed(seed, i) for i in range(len(rows)))
-    book = nullcontext() if path is None else SweepFile(path, header(function, seed, rows))
+    grown = rows if options.grows else None
+    head = header(function, seed, rows, whole=not options.grows)
+    book = nullcontext() if path is None else SweepFile(path, head, grown)
     with book as file, _bar(options.progress) as bar:
         ledger: dict[int, Outcome] = {} if file is None else file.finished
         if options.retry_failed:

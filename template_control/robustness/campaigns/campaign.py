@@ -215,13 +215,14 @@ def run_campaign(
 ) -> Campaign:
     """Run trials, or those that are missing.
 
-    A longer campaign begins with the trials of a shorter one, but has a file of its own.
+    A longer campaign begins with the trials of a shorter one, and goes on in its file.
 
     Args:
         conditions: what is tried.
         trials: how many.
         folder: for the trials' results, from which the same call goes on; None keeps them in
-            memory. They are those of this code and this URDF.
+            memory. They are those of this code and this URDF; a longer campaign goes on from a
+            shorter one's.
         executor: where to run the trials; None for one process a core.
         progress: show a bar on stderr.
 
@@ -236,10 +237,10 @@ def run_campaign(
     done = sweep(
         campaign_trial,
         items,
-        None if folder is None else folder / f"trials-{stem}-{trials}.jsonl",
+        None if folder is None else folder / f"trials-{stem}.jsonl",
         executor,
         conditions.seed,
-        SweepOptions(progress, label="trials", retry_failed=True),
+        SweepOptions(progress, label="trials", retry_failed=True, grows=True),
     )
     for i, reason in done.failures.items():
         raise SweepError(f"trial {i} came to no end: {reason}")
