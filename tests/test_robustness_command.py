@@ -152,3 +152,14 @@ def test_the_command_of_the_documentation_for_another_engine_runs(tmp_path, monk
     assert (tmp_path / "runs" / "robustness" / "five-link-mujoco").is_dir()
     (level, _) = found["disturbances"]["noise"]["levels"]
     assert level["interval"] == [pytest.approx(0.342, abs=1e-3), 1.0]  # two of two
+
+
+@pytest.mark.slow(seconds=6)
+@pytest.mark.usefixtures("brief")
+def test_a_robot_with_feet_of_other_names_is_disturbed(tmp_path, capfd):
+    path = tmp_path / "own.urdf"
+    path.write_text(robot_path("five-link").read_text().replace("_foot", "_toe"))
+    arguments = ["robustness", "--robot", str(path), "--feet", "left_toe", "right_toe", "--quick"]
+    arguments += ["--disturbance", "delay", "--json", "--output", str(tmp_path / "out")]
+    assert main(arguments) == 0
+    assert abs(json.loads(capfd.readouterr().out)["undisturbed"]["speed_error"]) < 0.02

@@ -111,6 +111,7 @@ class PlanarBiped(Biped):
         foot_radius: float | None = None,
         walk: tuple[float, float] | None = None,
         *,
+        foot_offset: tuple[float, float, float] | None = None,
         lossless: bool = False,
     ) -> PlanarBiped:
         """Load a planar URDF, or a 3D one that is held in its sagittal plane.
@@ -124,6 +125,8 @@ class PlanarBiped(Biped):
             sagittal_joints: of a 3D URDF, the hips and knees; its other joints are locked.
             locked: angles [rad] of locked joints; 0 for those not named.
             foot_radius: of spheres to be put into the feet of a 3D URDF [m].
+            foot_offset: of the spheres' centres from the foot links' origins, in the links' axes
+                [m]: a sole is below its ankle.
             walk: see the attribute.
             lossless: whether the joints' damping and friction are left out.
 
@@ -139,7 +142,7 @@ class PlanarBiped(Biped):
         drop_world(tree)
         read_losses(path, tree, lossless)
         if sagittal_joints:
-            planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius)
+            planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius, foot_offset)
         check_motion(path, tree)
         check_inertias(path, tree)
         find_meshes(path, tree)
@@ -150,7 +153,12 @@ class PlanarBiped(Biped):
         model = build_model(path, urdf)
         check_planar(path, model)
         check_guide(path, model)
-        for name, value in (("foot_radius", foot_radius), ("locked", locked or None)):
+        only_3d = {
+            "foot_radius": foot_radius,
+            "foot_offset": foot_offset,
+            "locked": locked or None,
+        }
+        for name, value in only_3d.items():
             if value is not None and not sagittal_joints:
                 raise RobotError(
                     f"{path}: {name} is for a 3D URDF, and no sagittal_joints are named: name them"

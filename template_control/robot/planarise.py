@@ -9,7 +9,7 @@ are kept, and forces out of the plane are the guide's.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +38,7 @@ def planarise(
     sagittal_joints: Sequence[str],
     locked: Mapping[str, float],
     foot_radius: float | None,
+    foot_offset: Sequence[float] | None = None,
 ) -> None:
     """Make a 3D URDF a planar one.
 
@@ -48,6 +49,7 @@ def planarise(
         sagittal_joints: hips and knees, the four hinges about the lateral axis that stay.
         locked: angles [rad] at which other joints are held; 0 for those not named.
         foot_radius: of spheres to put into the feet [m]; None to keep the feet's own.
+        foot_offset: of their centres from the feet's origins [m].
 
     Raises:
         RobotError: if a joint is missing or named twice, or a sagittal joint's axis is not lateral.
@@ -57,12 +59,8 @@ def planarise(
             f"{path}: sagittal_joints are {list(sagittal_joints)}: name {_SAGITTAL} different"
             " hinges in its legs: a hip and a knee each"
         )
-    if foot_radius is not None and not 0.0 < foot_radius < np.inf:
-        raise RobotError(f"foot_radius is {foot_radius!r} m: give a positive number")
     joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
-    for name in (*sagittal_joints, *locked):
-        if name not in joints:
-            raise RobotError(f"{path} has no joint {name!r}: its joints are {sorted(joints)}")
+    check_joint_names(path, robot, (*sagittal_joints, *locked))
     for name in sagittal_joints:
         if joints[name].get("type") not in _HINGES:
             raise RobotError(
@@ -77,7 +75,7 @@ def planarise(
     root = root_link(robot)
     take_points(path, robot)
     _shift(robot, root, hips)
-    spheres(robot, feet, foot_radius)
+    spheres(path, robot, feet, foot_radius, foot_offset)
     links = _free(_WORLD, {str(link.get("name")) for link in robot.findall("link")})
     for link in links:
         ET.SubElement(robot, "link", name=link)
@@ -117,6 +115,41 @@ def _origin(element: ET.Element) -> ET.Element:
 
 def _text(vector: Array) -> str:
     return " ".join(f"{x:.12g}" for x in vector)
+
+
+def check_joint_names(path: Path, robot: ET.Element, names: Iterable[str]) -> None:
+    """Check that joints are there.
+
+    Args:
+        path: of the URDF, for the message.
+        robot: its root element.
+        names: of the joints.
+
+    Raises:
+        RobotError: naming the one that is not.
+    """
+    joints = {str(joint.get("name")) for joint in robot.findall("joint")}
+    for name in names:
+        if name not in joints:
+            raise RobotError(f"{path} has no joint {name!r}: its joints are {sorted(joints)}")
+
+
+def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
+    """Names of the joints that neither are locked nor mimic a locked one.
+
+    Args:
+        robot: the root element of a URDF.
+        locked: names of those that are locked.
+    """
+    leaders = {
+        str(joint.get("name")): str(mimic.get("joint"))
+        for joint in robot.findall("joint")
+        for mimic in joint.findall("mimic")
+    }
+    held = set(locked)
+    for _ in leaders:  # one may mimic another that mimics
+        held |= {name for name, leader in leaders.items() if leader in held}
+    return {str(joint.get("name")) for joint in robot.findall("joint")} - held
 
 
 def lock(
@@ -216,19 +249,37 @@ def _shift(robot: ET.Element, root: str, hips: Array) -> None:
         origin.set("xyz", _text(_vector(origin.get("xyz")) - offset))
 
 
-def spheres(robot: ET.Element, feet: Sequence[str], radius: float | None) -> None:
+def spheres(
+    path: Path,
+    robot: ET.Element,
+    feet: Sequence[str],
+    radius: float | None,
+    offset: Sequence[float] | None = None,
+) -> None:
     """Leave collision shapes to the feet alone, and give them spheres.
 
     Args:
-        robot: the root element of a URDF; changed.
+        path: of the URDF, for the message.
+        robot: its root element; changed.
         feet: names of the foot links.
         radius: of the spheres [m]; None to keep the feet's own shapes.
+        offset: (3,) of their centres from the links' origins, in the links' axes [m].
+
+    Raises:
+        RobotError: if the radius is not positive, or an offset comes without it.
     """
+    if radius is not None and not 0.0 < radius < np.inf:
+        raise RobotError(f"foot_radius is {radius!r} m: give a positive number")
+    if offset is not None and radius is None:
+        raise RobotError(f"{path}: foot_offset places the spheres of foot_radius: give that too")
     for link in robot.findall("link"):
         foot = link.get("name") in feet
         for collision in link.findall("collision"):
             if not foot or radius is not None:
                 link.remove(collision)
         if foot and radius is not None:
-            geometry = ET.SubElement(ET.SubElement(link, "collision"), "geometry")
+            collision = ET.SubElement(link, "collision")
+            if offset is not None:
+                ET.SubElement(collision, "origin", xyz=_text(np.array(offset)))
+            geometry = ET.SubElement(collision, "geometry")
             ET.SubElement(geometry, "sphere", radius=f"{radius:g}")

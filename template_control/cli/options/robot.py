@@ -61,13 +61,21 @@ def add_robot_options(parser: argparse.ArgumentParser) -> None:
         "--locked",
         nargs="+",
         metavar="JOINT=RAD",
-        help="of a 3D URDF: angles of locked joints; 0 for those not named",
+        help="of a 3D URDF: angles of locked joints; in its plane a robot's other joints are locked"
+        " at 0",
     )
     own.add_argument(
         "--foot-radius",
         type=number(Range(0.0, 1.0, above=True)),
         metavar="M",
         help="of a 3D URDF: radius of the spheres put into its feet",
+    )
+    own.add_argument(
+        "--foot-offset",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="of these spheres' centres from the foot links' origins, in the links' axes [m]",
     )
     own.add_argument(
         "--lossless",
@@ -89,7 +97,7 @@ def robot_choice(options: argparse.Namespace, base: RobotChoice) -> RobotChoice:
     if options.robot is not None:
         base = RobotChoice()
         given["model"] = _model(options.robot)
-    for name in ("feet", "sagittal_joints"):
+    for name in ("feet", "sagittal_joints", "foot_offset"):
         if getattr(options, name) is not None:
             given[name] = tuple(getattr(options, name))
     if options.foot_radius is not None:

@@ -10,7 +10,7 @@ from typing import Any
 from rich.table import Table
 
 from template_control.checks import option_types as values
-from template_control.cli.options.robot import add_robot
+from template_control.cli.options.robot import add_robot_options, robot_choice
 from template_control.cli.trials.common import (
     add_engine,
     add_gait,
@@ -59,10 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " or a robot that falls undisturbed, 130 after Ctrl-C."
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
-    add_robot(parser)
-    parser.add_argument(
-        "--free", action="store_true", help="nothing holds the robot; it is pushed aside too"
-    )
+    add_robot_options(parser)
     add_gait(parser, "of a run at apex, 3 m/s for l0 = 1 m if not given; of a free walk the mean")
     parser.add_argument(
         "--disturbance",
@@ -92,8 +89,8 @@ def run(options: argparse.Namespace) -> int:
         ParameterError: if a walk is given a speed.
     """
     # Before a folder is made for it.
-    choice = RobotChoice(options.robot, free=options.free)
-    speed, name = _speed(options, choice), Path(options.robot).stem
+    choice = robot_choice(options, RobotChoice())
+    speed, name = _speed(options, choice), Path(choice.model).stem
     name += "-free" * choice.free + "-run" * (options.gait == "run")
     name += f"-{options.plant}" * (options.plant != Subject.plant)
     subject = Subject(choice, speed, options.plant)

@@ -11,7 +11,7 @@ knows nothing of the rest. The frame rests, but for :meth:`FreeBiped.turn`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import atan2, cos, isfinite, sin, sqrt
 from pathlib import Path
@@ -31,7 +31,7 @@ from template_control.robot.free.requirements import check_free, set_limits, set
 from template_control.robot.joint_losses import read_losses
 from template_control.robot.legs import HINGES
 from template_control.robot.meshes import find_meshes
-from template_control.robot.planarise import spheres
+from template_control.robot.planarise import check_joint_names, lock, moving_joints, spheres
 from template_control.robot.requirements import add_feet
 from template_control.robot.urdf import (
     build_model,
@@ -40,6 +40,7 @@ from template_control.robot.urdf import (
     check_motion,
     check_shapes,
     read_urdf,
+    take_points,
     write_out_massless,
 )
 
@@ -150,6 +151,8 @@ class FreeBiped(Biped):
         limits: JointLimits | None = None,
         walk: tuple[float, float] | None = None,
         *,
+        locked: Mapping[str, float] | None = None,
+        foot_offset: tuple[float, float, float] | None = None,
         lossless: bool = False,
     ) -> FreeBiped:
         """Load a URDF whose root link is the trunk: x forward, y left, z up.
@@ -162,6 +165,10 @@ class FreeBiped(Biped):
             foot_radius: of spheres to be put into the feet [m]; None to keep the feet's own.
             limits: in place of the URDF's; None to keep those.
             walk: see :class:`~template_control.robot.biped.Biped`.
+            locked: positions of joints that are held there [rad, m]; with a joint those that mimic
+                it.
+            foot_offset: of the spheres' centres from the foot links' origins, in the links' axes
+                [m]: a sole is below its ankle.
             lossless: whether the joints' damping and friction are left out.
 
         Raises:
@@ -176,7 +183,11 @@ class FreeBiped(Biped):
             set_limits(tree, limits.torque, limits.velocity)
             if limits.ranges:
                 set_ranges(path, tree, feet, limits.ranges)
-        spheres(tree, feet, foot_radius)
+        if locked:
+            check_joint_names(path, tree, locked)
+            lock(path, tree, moving_joints(tree, locked), locked)
+            take_points(path, tree)
+        spheres(path, tree, feet, foot_radius, foot_offset)
         check_motion(path, tree)
         check_inertias(path, tree)
         find_meshes(path, tree)

@@ -116,7 +116,9 @@ def check_free(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
                 )
     if len(legs[0]) + len(legs[1]) != model.nv - BASE_DOF:
         others = [n for j, n in enumerate(model.names) if j > 1 and j not in (*legs[0], *legs[1])]
-        raise RobotError(f"{path}: joints {others} are in no leg: make them fixed")
+        raise RobotError(
+            f"{path}: joints {others} are in no leg: make them fixed, or name them in `locked`"
+        )
     for kind, limits in (("effort", model.effortLimit), ("velocity", model.velocityLimit)):
         for joint in (*legs[0], *legs[1]):
             limit = limits[model.idx_vs[joint]]

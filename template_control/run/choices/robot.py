@@ -22,9 +22,12 @@ class RobotChoice(Checked):
         feet: its foot links; None: left_foot and right_foot.
         sagittal_joints: of a 3D URDF, hips and knees.
         foot_radius: of the spheres put into the feet of a 3D URDF [m].
-        locked: angle of each locked joint of a 3D URDF that is not at 0 [rad].
+        foot_offset: of their centres from the foot links' origins, in the links' axes [m].
+        locked: angle of each locked joint of a 3D URDF [rad]; in its plane a robot's other joints
+            are locked at 0.
         lossless: whether damping and friction of a URDF's joints are left out.
-        free: whether nothing holds the robot; its URDF is a 3D one, and all its joints move.
+        free: whether nothing holds the robot; its URDF is a 3D one, and all joints that are not
+            locked move.
     """
 
     model: str = "five-link"
@@ -34,6 +37,7 @@ class RobotChoice(Checked):
     locked: Mapping[str, float] = field(default_factory=dict)
     free: bool = False
     lossless: bool = False
+    foot_offset: tuple[float, float, float] | None = None
 
     def load(self) -> Biped:
         """The robot.
@@ -46,6 +50,7 @@ class RobotChoice(Checked):
             "feet": self.feet,
             "sagittal_joints": self.sagittal_joints,
             "foot_radius": self.foot_radius,
+            "foot_offset": self.foot_offset,
             "locked": self.locked,
             "lossless": self.lossless,
         }
@@ -56,10 +61,7 @@ class RobotChoice(Checked):
             names = ", ".join(name.replace("_", " ") for name in given)
             raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")
         if self.free:
-            idle = [
-                name.replace("_", " ") for name in ("sagittal_joints", "locked") if name in given
-            ]
-            if idle:
-                raise ParameterError(f"{', '.join(idle)} hold a robot in its plane: leave them out")
+            if self.sagittal_joints:
+                raise ParameterError("sagittal joints hold a robot in its plane: leave them out")
             return FreeBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
         return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
