@@ -65,6 +65,12 @@ SPHERE = '<collision>\n      <geometry><sphere radius="0.01"/>'
 MESH = '<collision>\n      <geometry><mesh filename="none.stl"/>'
 KNEE_LIMIT = '<limit lower="0" upper="2.5" effort="350" velocity="20"/>'
 HIP = '<joint name="left_hip" type="revolute">'
+
+
+def losing(joint, losses):
+    return changed(joint, f"{joint}<dynamics {losses}/>")
+
+
 MISTAKES = {
     "there is no URDF at …": lambda folder: tc.load_robot(folder / "none.urdf"),
     "there is no robot …": lambda _: tc.load_robot("none"),
@@ -81,6 +87,13 @@ MISTAKES = {
         '<origin xyz="0 0.1 0"', '<origin xyz="0.02 0.1 0"'
     ),
     "has effort … give its torque limit": changed('effort="350"', 'effort="0"'),
+    "dynamics has … give a finite number, not below zero": losing(HIP, 'damping="-1"'),
+    "has a damping of …, too much for a time step": lambda folder: walk(
+        losing(HIP, 'damping="1e6"')(folder), (1.1, 0.97, 0.0)
+    ),
+    "base joint … has damping or friction": losing(
+        '<joint name="base_x" type="prismatic">', 'friction="1"'
+    ),
     "has no foot link …": feet("left_foot", "toe"),
     "feet were named for … a biped has two": feet("left_foot"),
     "must have one sphere as collision shape": bolt(radius=None),
