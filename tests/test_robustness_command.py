@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 
 from template_control.cli.main import build_parser, main
+from template_control.cli.options.robot import robot_choice
 from template_control.cli.trials import robustness as command
 from template_control.robot.library import robot_path
 from template_control.robustness import disturbances, ladder
 from template_control.robustness.disturbances import DISTURBANCES
+from template_control.run.choices.robot import RobotChoice
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -83,6 +85,40 @@ def test_bad_input_is_one_line(arguments, culprit, tmp_path, monkeypatch, refuse
     line = refused(["robustness", *arguments])
     assert culprit in line
     assert not (tmp_path / "runs" / "robustness" / "hexapod").exists()
+
+
+OWN = [
+    *("--feet", "FL_FOOT", "FR_FOOT", "--foot-radius", "0.016"),
+    *("--sagittal-joints", "FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE", "--locked", "FL_HAA=0.0"),
+]
+
+
+def test_a_robot_of_ones_own_is_understood_as_walk_understands_it(
+    understood, tmp_path, monkeypatch, capfd
+):
+    words = ["--robot", str(robot_path("bolt")), *OWN]
+    found = []
+
+    def measured(subject, *_):
+        found.append(subject)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "measure", measured)
+    assert main(["robustness", *words, "--output", str(tmp_path)]) == 130
+    walked = understood(shlex.join(["template-control", "walk", *words]))
+    assert found[0].robot == robot_choice(walked, RobotChoice())
+    assert found[0].robot.locked == {"FL_HAA": 0.0}
+
+
+@pytest.mark.slow(seconds=20)
+def test_a_shipped_robot_given_by_its_urdf_takes_as_much(tmp_path, capfd):
+    words = ["--disturbance", "delay", "--quick", "--json"]
+    found = []
+    for name, own in (("bolt", []), (str(robot_path("bolt")), OWN)):
+        folder = str(tmp_path / f"trials-{len(found)}")
+        assert main(["robustness", "--robot", name, *own, *words, "--output", folder]) == 0
+        found.append(json.loads(capfd.readouterr().out)["disturbances"])
+    assert found[0] == found[1]
 
 
 def test_an_unknown_disturbance_is_refused(refused):

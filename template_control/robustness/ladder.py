@@ -140,7 +140,7 @@ def measure(
     if subject.plant != Subject.plant:
         moving["plant"] = subject.plant
     trials = [(d.name, d.levels, d.trials) for d in chosen]
-    stem = fingerprint(model, trials, moving, choice.free)
+    stem = fingerprint(model, trials, moving, called)
     found = {
         d.name: Finding(d, template=template_limit(known[d.name], where, AFTER, SETTLED))
         for d in chosen

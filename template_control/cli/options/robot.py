@@ -17,25 +17,14 @@ _DEFAULT = RobotChoice().model
 _TURN = Range(-6.3, 6.3)  # [rad] about once around: degrees are not taken for it
 
 
-def add_robot(parser: argparse.ArgumentParser, default: str | None = _DEFAULT) -> None:
-    """Add ``--robot``.
-
-    Args:
-        parser: of the command.
-        default: where it is not given; None where the command must know that it is not.
-    """
+def add_robot_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--robot`` and what a URDF of one's own may need."""
     parser.add_argument(
         "--robot",
-        default=default,
         metavar="NAME|URDF",
         help=f"a shipped robot ({', '.join(ROBOTS)}) or the path of a planar URDF; {_DEFAULT} if"
         " not given",
     )
-
-
-def add_robot_options(parser: argparse.ArgumentParser) -> None:
-    """Add ``--robot`` and what a URDF of one's own may need."""
-    add_robot(parser, None)
     parser.add_argument(
         "--free",
         action="store_const",
