@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import template_control as tc
 from template_control.embedding import ContactOptions, EmbeddingOptions
 from template_control.embedding.contacts import ContactMonitor
+from template_control.robot.library import load_free_robot
 from template_control.robot.start import state_at_vlo
 
 WEIGHT, DT = 785.0, 1e-3
@@ -113,6 +114,33 @@ def test_a_walk_bears_wrong_flags_by_doubting_them(robot, default_gait, seed):
     record = tc.simulate(robot, planner, flawed(20, seed))
     assert not record.fell
     assert record.section_state[-5:, 0] == pytest.approx(default_gait.vlo[0], rel=0.01)
+
+
+@pytest.mark.slow(seconds=8)
+def test_an_undisturbed_walk_is_the_same_whatever_the_doubt(robot, default_gait):
+    """All its touchdowns are due."""
+    planner = tc.LqrPlanner(default_gait)
+    walks = [
+        tc.simulate(
+            robot,
+            planner,
+            tc.SimulationOptions(
+                steps=4, embedding=EmbeddingOptions(contacts=ContactOptions(doubt=doubt))
+            ),
+        )
+        for doubt in (0.0, 0.05)
+    ]
+    np.testing.assert_array_equal(walks[0].torque, walks[1].torque)
+
+
+@pytest.mark.slow(seconds=12)
+@pytest.mark.parametrize("name", ["bolt", "five-link-3d"])
+def test_a_free_robot_bears_wrong_flags(name):
+    robot = load_free_robot(name)
+    sensors = tc.SensorOptions(contact_errors=0.02, seed=1)
+    options = tc.SimulationOptions(steps=12, sensors=sensors, record_every=10)
+    record = tc.simulate(robot, tc.LqrPlanner(tc.default_gait(robot)), options)
+    assert not record.fell
 
 
 @pytest.mark.slow(seconds=60)
