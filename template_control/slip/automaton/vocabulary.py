@@ -62,6 +62,10 @@ class Event(IntEnum):
     BACKWARD             -dx/dt
     REST                 -((dx/dt)^2 + (dy/dt)^2): the CoM stands still
     ===================  =====================================================
+
+    A guard that is zero (within 1e-10) where a phase begins does not fire there, and has to fall
+    below zero first. Three may fire there: FALL and BACKWARD, above zero too, and TOUCHDOWN of a
+    foot that is at the ground and not on its way up, unless a touchdown began the phase.
     """
 
     TOUCHDOWN = 0

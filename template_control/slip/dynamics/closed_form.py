@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.dynamics.guards import all_bends
 from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_bottom
 from template_control.slip.dynamics.locate import Watch, arm, first_event, root
 from template_control.slip.dynamics.model import Kernel, Model, backward, model_of
@@ -47,7 +48,7 @@ def _follow(path: Path, edge: int, t: float, watch: Watch) -> float:
     t = root(STANCE, path, event, guess, (0.5 * guess, 1.5 * guess), _EVENT_TIME, watch)
     if t.real >= 0.0:
         return t
-    watch.values[0, event], watch.armed[0] = -1.0, False
+    watch.values[0, event], watch.armed[0] = 0.0, False
     alone = Watch(watch.events[edge : edge + 1], *watch[1:])
     fired, t = first_event(STANCE, path, 3.0 * guess, 0.1 * guess, _EVENT_TIME, alone)
     return t if fired >= 0 else 0.0 * t - 1.0
@@ -166,20 +167,26 @@ def closed_form_stride(
     alpha = controls[0]
     rest_length = model.rest_length
     touchdown_height = rest_length * np.sin(alpha)
-    a, out, stiffness = scratch.path, scratch.out, scratch.stiffness
-    values, armed = scratch.values, scratch.armed
+    a, out, probe, stiffness = scratch.path, scratch.out, scratch.probe, scratch.stiffness
+    values, armed, bends = scratch.values, scratch.armed, scratch.bends
+    event = -1
     for _ in range(_MAX_PIECES):
         rear, front = tables.rear[node], tables.front[node]
         stiffness[0] = controls[rear] if rear >= 0 else 0.0
         stiffness[1] = controls[front] if front >= 0 else 0.0
         first_edge = tables.first_edge[node]
         guards = tables.event[first_edge : tables.first_edge[node + 1]]
-        watch = Watch(guards, toes, rest_length, touchdown_height, values, armed, out)
-        arm(watch, state)
+        watch = Watch(
+            guards, toes, rest_length, touchdown_height, values, armed, bends, out=out, probe=probe
+        )
+        arm(watch, state, event)
         if stiffness[0] == 0.0 and stiffness[1] == 0.0:
             for i in range(4):
                 a[i] = state[i]
             a[4], a[5] = model.gravity, model.along
+            pull = model.gravity + abs(model.along)
+            speed = abs(state[2].real) + abs(state[3].real) + pull * model.max_time
+            all_bends(state, toes, rest_length, (speed, pull, 0.0), model.max_time, bends)
             path = Path(a, a)
             substep = _SUBSTEP * np.sqrt(rest_length / model.gravity)
             edge, t = first_event(FLIGHT, path, model.max_time, substep, _EVENT_TIME, watch)
@@ -187,13 +194,16 @@ def closed_form_stride(
             for i in range(4):
                 state[i] = out[i]
         else:
+            bends[:] = 0.0  # such a path's guards are looked at where substeps end
             edge = _stance(map_kind, model, state, stiffness, a, watch)
         if edge == _NO_EVENT or not np.isfinite(state[0].real + state[2].real):
             return _TIMEOUT
         if edge == _GOES_ON:
+            event = -1
             continue
         edge += first_edge
-        note_bottom(tables.event[edge], state, toes, scratch.bottom)
+        event = tables.event[edge]
+        note_bottom(event, state, toes, scratch.bottom)
         apply_reset(tables.reset[edge], state, toes, rest_length, alpha)
         if tables.outcome[edge] >= 0:
             return tables.outcome[edge]

@@ -95,6 +95,41 @@ def all_guards(
 
 
 @inner
+def all_bends(
+    state: Array,
+    toes: Array,
+    rest_length: float,
+    steepest: tuple[float, float, float],
+    step: float,
+    bends: Array,
+) -> None:
+    """Write bounds of all guards' second time derivatives along a path into ``bends``.
+
+    That of a leg holds where it is longer than l0 / 2, and from below it holds always. REST never
+    rises above zero; its bound is zero.
+
+    Args:
+        state: (4,) x, y, dx/dt, dy/dt at the path's start [m, m/s].
+        toes: (2,) x of rear and front toe [m].
+        rest_length: l0 [m].
+        steepest: bounds of speed, acceleration and jerk along the path [m/s, m/s^2, m/s^3].
+        step: duration of the path [s].
+        bends: (NUM_EVENTS,) overwritten, by Event.
+    """
+    speed, acceleration, jerk = steepest
+    x, y = state[0].real, abs(state[1].real) + speed * step
+    rear, front = abs(x - toes[0].real), abs(x - toes[1].real)
+    turn = 3.0 * speed * acceleration
+    bends[_TOUCHDOWN] = bends[_VLO] = bends[_PASSED_FRONT_FOOT] = bends[_FALL] = acceleration
+    bends[_APEX] = bends[_BACKWARD] = jerk
+    bends[_BOTTOM] = turn + (rear + y) * jerk
+    bends[_VIRTUAL_BOTTOM] = turn + (0.5 * (rear + front) + y) * jerk
+    bends[_REAR_LIFTOFF] = acceleration + 2.0 * speed * speed / rest_length
+    bends[_FRONT_LIFTOFF] = bends[_REAR_LIFTOFF]
+    bends[_REST] = 0.0
+
+
+@inner
 def guard_rate(event: int, path: Array, toes: Array) -> float:
     """Time derivative of a guard along a path.
 

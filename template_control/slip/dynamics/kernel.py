@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from template_control.compiled import entry, inner
 from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
+from template_control.slip.dynamics.guards import all_bends
 from template_control.slip.dynamics.locate import Watch, arm, first_event
 from template_control.slip.dynamics.model import Kernel, model_of
 from template_control.slip.dynamics.path import COEFFICIENTS, SERIES, Path, sample
-from template_control.slip.dynamics.taylor import ORDER, expand
+from template_control.slip.dynamics.taylor import ORDER, expand, steepest
 
 Array = NDArray[np.float64]
 
@@ -46,11 +47,11 @@ class Scratch(NamedTuple):
         events: (MAX_EVENTS, 8) time, event, node left, node entered, state before the reset.
         work: (2, 4, ORDER + 1) for the series.
         path: (COEFFICIENTS,) of a closed-form phase.
-        out: (6,) a sample of a path.
+        out, probe: (6,) samples of a path.
         state, toes: (4,) and (2,) of the section maps.
         bottom: (2,) lengths of rear and front leg at the last (virtual) bottom [m].
         stiffness: (2,) of the phase's legs.
-        values, armed: (2, NUM_EVENTS) and (MAX_EDGES,) the guards.
+        values, bends, armed: (2, NUM_EVENTS), (NUM_EVENTS,) and (MAX_EDGES,) the guards.
     """
 
     cx: Array
@@ -60,11 +61,13 @@ class Scratch(NamedTuple):
     work: Array
     path: Array
     out: Array
+    probe: Array
     state: Array
     toes: Array
     bottom: Array
     stiffness: Array
     values: Array
+    bends: Array
     armed: NDArray[np.bool_]
 
 
@@ -78,11 +81,13 @@ def new_scratch(dtype: type[float] | type[complex] = float) -> Scratch:
         work=np.zeros((2, 4, ORDER + 1), dtype),
         path=np.zeros(COEFFICIENTS, dtype),
         out=np.zeros(6, dtype),
+        probe=np.zeros(6, dtype),
         state=np.zeros(4, dtype),
         toes=np.zeros(2, dtype),
         bottom=np.zeros(2, dtype),
         stiffness=np.zeros(2, dtype),
         values=np.zeros((2, NUM_EVENTS)),
+        bends=np.zeros(NUM_EVENTS),
         armed=np.zeros(MAX_EDGES, dtype=np.bool_),
     )
 
@@ -152,28 +157,33 @@ def run_stride(
     tables, model, node = kernel.tables, model_of(kernel), kernel.node
     gravity, rest_length, max_time = model.gravity, model.rest_length, model.max_time
     cx, cy, meta, events, work = scratch[:5]
-    out, stiffness, values, armed = scratch.out, scratch.stiffness, scratch.values, scratch.armed
+    out, probe, stiffness, bends = scratch.out, scratch.probe, scratch.stiffness, scratch.bends
+    values, armed = scratch.values, scratch.armed
     alpha = controls[0]
     touchdown_height = rest_length * np.sin(alpha)
     time, segments, event_count = 0.0, 0, 0
-    entered = True
+    entered, event = True, -1
     while time < max_time and segments < MAX_SEGMENTS and event_count < MAX_EVENTS:
         rear, front = tables.rear[node], tables.front[node]
         stiffness[0] = controls[rear] if rear >= 0 else 0.0
         stiffness[1] = controls[front] if front >= 0 else 0.0
         first_edge = tables.first_edge[node]
         guards = tables.event[first_edge : tables.first_edge[node + 1]]
-        watch = Watch(guards, toes, rest_length, touchdown_height, values, armed, out)
+        watch = Watch(
+            guards, toes, rest_length, touchdown_height, values, armed, bends, out=out, probe=probe
+        )
         if entered:
-            arm(watch, state)
+            arm(watch, state, event)
             entered = False
         row = segments if record else 0
         px, py = cx[row], cy[row]
         horizon = expand(state, toes, stiffness, model, px, py, work)
         horizon = min(horizon, max_time - time, 0.1 * np.sqrt(rest_length / gravity) * _SUBSTEPS)
+        all_bends(state, toes, rest_length, steepest(px, py, horizon), horizon, bends)
         path = Path(px, py)
         fired, step = first_event(SERIES, path, horizon, horizon / _SUBSTEPS, _EVENT_TIME, watch)
-        sample(SERIES, path, step, out)
+        if fired >= 0:
+            sample(SERIES, path, step, out)
         for i in range(4):
             state[i] = out[i]
         meta[row, 0], meta[row, 1], meta[row, 2] = time, step.real, node
@@ -185,14 +195,14 @@ def run_stride(
             continue
 
         fired += first_edge
-        outcome, target = tables.outcome[fired], tables.target[fired]
+        outcome, target, event = tables.outcome[fired], tables.target[fired], tables.event[fired]
         row = event_count if record else 0
-        events[row, 0], events[row, 1] = time, tables.event[fired]
+        events[row, 0], events[row, 1] = time, event
         events[row, 2], events[row, 3] = node, target
         for i in range(4):
             events[row, 4 + i] = state[i].real
         event_count += 1
-        note_bottom(tables.event[fired], state, toes, scratch.bottom)
+        note_bottom(event, state, toes, scratch.bottom)
         apply_reset(tables.reset[fired], state, toes, rest_length, alpha)
         if outcome >= 0:
             return outcome, (target if target >= 0 else node), segments, event_count, time

@@ -1,6 +1,8 @@
 """Which of a node's guards fires first along a path, and exactly when.
 
-The exact kernel's polynomials and the closed-form maps share this code.
+The exact kernel's polynomials and the closed-form maps share this code. Guards are looked at
+where substeps end. Bounds of their second derivatives exclude that one rises in between, or lead
+to where it does.
 """
 
 from __future__ import annotations
@@ -13,18 +15,22 @@ from numpy.typing import NDArray
 from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
 from template_control.slip.dynamics.guards import all_guards, guard, guard_rate
-from template_control.slip.dynamics.path import Path, sample
+from template_control.slip.dynamics.path import SERIES, Path, sample
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+_TOUCHDOWN = int(Event.TOUCHDOWN)
 _FALL = int(Event.FALL)
 _BACKWARD = int(Event.BACKWARD)
 _ARMING = 1e-10  # a guard must have been this far below zero before it can fire
+_ROUNDING = 2.2e-16  # of a guard [SI]
+_LOOKS = 2000  # at a guard within a substep: ten do, and only a state that is not finite needs more
 _ITERATIONS = 60
 _BRACKET_DONE = 1e-14  # [s]
 _CLOSE = 1e-9  # [s]; Newton's step after one this short is below rounding
 _CURVATURE = 1e4  # [1/s^3]; what the inverse cubic leaves over (step * last step)^2
+_GRAZING = 300.0  # [1/s], relative change of a guard's rate over time: its inverse is no cubic
 _ZERO = 1e-9  # of l0 (a bracket of no width around a jump holds no root)
 
 
@@ -38,7 +44,9 @@ class Watch(NamedTuple):
         touchdown_height: l0 sin(alpha) [m].
         values: (2, NUM_EVENTS) the guards at either end of a substep; from :func:`arm`.
         armed: (MAX_EDGES,) which may fire; from :func:`arm`.
-        out: (6,) a sample of the path, overwritten; complex for complex steps.
+        bends: (NUM_EVENTS,) bounds of the guards' second derivatives, from
+            :func:`~.guards.all_bends`. With zeros guards are only looked at where substeps end.
+        out, probe: (6,) samples of the path, overwritten; complex for complex steps.
     """
 
     events: IntArray
@@ -47,24 +55,29 @@ class Watch(NamedTuple):
     touchdown_height: float
     values: Array
     armed: NDArray[np.bool_]
+    bends: Array
     out: Array
+    probe: Array
 
 
 @inner
-def arm(watch: Watch, state: Array) -> None:
+def arm(watch: Watch, state: Array, fired: int) -> None:
     """Prepare ``watch`` at the start of a phase.
 
-    A guard that is zero there does not fire there; forbidden regions count at once.
+    A guard that is zero there does not fire there. Exceptions are forbidden regions, and the
+    touchdown of a foot that is on the ground already, unless the phase begins with a touchdown.
 
     Args:
         watch: the phase's guards; its ``values`` and ``armed`` are overwritten.
         state: (4,) x, y, dx/dt, dy/dt of the CoM at the start [m, m/s].
+        fired: value of the Event that the phase begins with, -1 at the start of a stride.
     """
     events, values, armed = watch.events, watch.values, watch.armed
     all_guards(state, watch.toes, watch.rest_length, watch.touchdown_height, values[0])
     for i in range(events.shape[0]):
         e = events[i]
-        armed[i] = values[0, e] < -_ARMING or e in (_FALL, _BACKWARD)
+        lands = e == _TOUCHDOWN and e != fired and values[0, e] <= _ARMING
+        armed[i] = values[0, e] < -_ARMING or e in (_FALL, _BACKWARD) or lands
 
 
 @inner
@@ -116,11 +129,17 @@ def root(
         else:
             lo = max(lo, t.real)
         following = t - g / rate
+        grazes = False
         if _CLOSE < step_last < np.inf:
-            following = _inverse_hermite(t_last, g_last, rate_last, t, g, rate)
+            slowest = min(rate.real, rate_last.real)
+            grazes = abs(rate.real - rate_last.real) > _GRAZING * slowest * step_last
+            if not grazes:
+                following = _inverse_hermite(t_last, g_last, rate_last, t, g, rate)
         if rate.real > 0.0 and lo <= following.real <= hi:
             step = abs(following - t)
-            done = step <= _CLOSE or _CURVATURE * (step * step_last) ** 2 <= tolerance
+            done = step <= _CLOSE or (
+                not grazes and _CURVATURE * (step * step_last) ** 2 <= tolerance
+            )
             t_last, g_last, rate_last, step_last = t, g, rate, step
             t = following
             if done:
@@ -137,6 +156,97 @@ def root(
 
 
 @inner
+def _clear(g_lo: float, g_hi: float, bend: float, width: float) -> bool:
+    """Whether a function cannot rise above zero within an interval.
+
+    A function below zero at both ends whose second derivative is at most ``bend`` lies below the
+    parabola through its ends that bends down so much.
+
+    Args:
+        g_lo, g_hi: values at the ends, not above zero.
+        bend: not below zero.
+        width: of the interval.
+    """
+    sag = 0.5 * bend * width * width
+    return sag <= _ROUNDING - g_lo - g_hi + 2.0 * np.sqrt(g_lo * g_hi)
+
+
+@inner
+def _comes_near(values: Array, event: int, sag: float) -> bool:
+    """Whether :func:`_clear`, with this ``sag``, has to be asked about a guard.
+
+    It is spared the root: the geometric mean of two values is at least the smaller one.
+    """
+    g_lo, g_hi = values[0, event], values[1, event]
+    highest = max(g_lo, g_hi)
+    return highest >= -_ARMING or sag > -(g_lo + g_hi) - 2.0 * highest
+
+
+@inner
+def _first_rise(
+    kind: int, path: Path, edge: int, span: tuple[float, float], tolerance: float, watch: Watch
+) -> float:
+    """Time at which a guard first fires within a substep, inf if it does not.
+
+    The substep is halved until each part, from the first on, either holds no rise, by the bound of
+    the guard's second derivative, or ends above zero. No rise is missed, however short the guard is
+    above or below zero.
+
+    Args:
+        kind, path: on which the guard is taken.
+        edge: which of the watched events.
+        span: the substep's ends [s]; ``watch`` holds the guard there.
+        tolerance: of the time [s].
+        watch: the node's guards; ``armed`` is updated. ``out`` is overwritten only if it fires.
+    """
+    event, probe = watch.events[edge], watch.probe
+    toes, rest_length, height = watch.toes, watch.rest_length, watch.touchdown_height
+    (t_lo, t_end), armed = span, watch.armed[edge]
+    g_lo, g_end = watch.values[0, event], watch.values[1, event]
+    bend = watch.bends[event]
+    probe[0] = 0.0
+    begin, found = t_lo + probe[0], np.inf + probe[0]  # of the path's type
+    if armed and g_lo >= 0.0:
+        # The phase begins at zero, or in a forbidden region.
+        sample(kind, path, t_lo, probe)
+        rate = guard_rate(event, probe, toes).real
+        falls = rate < 0.0 and rate * rate > 2.0 * _ROUNDING * bend
+        if g_lo > _ARMING or not (falls or (rate <= 0.0 and g_end < 0.0)):
+            return begin
+        armed = False
+    floor = 0.0 if event == _TOUCHDOWN else -_ARMING
+    t_hi, g_hi = t_end, g_end
+    for _ in range(_LOOKS):
+        if t_lo >= t_end:
+            break
+        if armed and g_hi >= 0.0 and t_hi != found.real:
+            start = t_lo - g_lo * (t_hi - t_lo) / (g_hi - g_lo)
+            found = root(kind, path, event, start, (t_lo, t_hi), tolerance, watch)
+            t_hi = t_end = found.real
+            g_hi = g_end = 0.0
+            continue
+        width = t_hi - t_lo
+        if armed:
+            clear = _clear(g_lo, g_hi, bend, width)
+        elif g_hi < floor:
+            clear = armed = _clear(0.0, g_hi, bend, width)
+        else:
+            clear = _clear(min(floor - g_lo, 0.0), floor - g_hi, bend, width)
+        if clear:
+            t_lo, g_lo = t_hi, g_hi
+            t_hi = min(t_lo + 2.0 * width, t_end)
+        else:
+            t_hi = t_lo + 0.5 * width
+        if t_hi == t_end:
+            g_hi = g_end
+        else:
+            sample(kind, path, t_hi, probe)
+            g_hi = guard(event, probe, toes, rest_length, height).real
+    watch.armed[edge] = armed
+    return found
+
+
+@inner
 def first_event(
     kind: int, path: Path, horizon: float, substep: float, tolerance: float, watch: Watch
 ) -> tuple[int, float]:
@@ -145,41 +255,39 @@ def first_event(
     Args:
         kind, path: the CoM's, see :func:`~.path.sample`.
         horizon: where to stop looking [s].
-        substep: a guard is taken to rise through zero at most once within it [s].
+        substep: longest between two looks at a guard that comes close to zero [s].
         tolerance: of event times [s].
         watch: the node's guards, once :func:`arm` has seen the phase's start; updated.
 
     Returns:
-        Which of the watched events, -1 if none fires, and the time [s].
+        Which of the watched events, and the time [s]; -1 and ``horizon`` if none fires, and
+        then ``out`` holds the path there.
     """
-    events, values, armed, out = watch.events, watch.values, watch.armed, watch.out
+    events, values, bends, out = watch.events, watch.values, watch.bends, watch.out
     out[0] = 0.0
     fired, fired_at = -1, horizon + out[0]
     t_lo = 0.0
+    # The bounds of a series' guards often clear all of it, or a half, at once.
+    reach = horizon if kind == SERIES else substep
     while t_lo < horizon and fired < 0:
-        t_hi = min(t_lo + substep, horizon)
+        t_hi = min(t_lo + reach, horizon)
         if t_hi > horizon - 1e-6 * substep:
             t_hi = horizon
         sample(kind, path, t_hi, out)
-        rose = False
         all_guards(out, watch.toes, watch.rest_length, watch.touchdown_height, values[1])
+        half = 0.5 * (t_hi - t_lo) ** 2
+        near = False
         for i in range(events.shape[0]):
-            g = values[1, events[i]]
-            if g < -_ARMING:
-                armed[i] = True
-            elif g >= 0.0 and armed[i]:
-                rose = True
-        if rose:
+            near |= _comes_near(values, events[i], half * bends[events[i]])
+        if near and reach > substep:
+            reach *= 0.5
+            continue
+        if near:
             for i in range(events.shape[0]):
-                g_lo, g_hi = values[0, events[i]], values[1, events[i]]
-                if not armed[i] or g_hi < 0.0:
-                    continue
-                t = t_lo + 0.0 * fired_at
-                if g_lo < 0.0:
-                    start = t_lo - g_lo * (t_hi - t_lo) / (g_hi - g_lo)
-                    t = root(kind, path, events[i], start, (t_lo, t_hi), tolerance, watch)
-                if fired < 0 or t.real < fired_at.real:
-                    fired, fired_at = i, t
+                if _comes_near(values, events[i], half * bends[events[i]]):
+                    t = _first_rise(kind, path, i, (t_lo, t_hi), tolerance, watch)
+                    if t.real < np.inf and (fired < 0 or t.real < fired_at.real):
+                        fired, fired_at = i, t
         for i in range(NUM_EVENTS):
             values[0, i] = values[1, i]
         t_lo = t_hi

@@ -86,3 +86,26 @@ def expand(
         if size > 0.0:
             step = min(step, (TOLERANCE / size) ** (1.0 / n))
     return step
+
+
+@inner
+def steepest(cx: Array, cy: Array, step: float) -> tuple[float, float, float]:
+    """Bounds of the CoM's speed, acceleration and jerk within ``step`` [m/s, m/s^2, m/s^3].
+
+    They are the series of the derivatives with the absolute values of all coefficients; the length
+    of a vector is at most |x| + |y|.
+
+    Args:
+        cx, cy: (ORDER + 1,) from :func:`expand`.
+        step: [s].
+    """
+    acceleration = jerk = 0.0
+    squared = step * step
+    for n in range(ORDER, 2, -2):  # by twos, for a shorter chain of products
+        even = n * (n - 1) * step * (abs(cx[n].real) + abs(cy[n].real))
+        odd = (n - 1) * (n - 2) * (abs(cx[n - 1].real) + abs(cy[n - 1].real))
+        acceleration = acceleration * squared + (even + odd)
+        jerk = jerk * squared + ((n - 2) * even + (n - 3) * odd)
+    acceleration = acceleration * step + 2.0 * (abs(cx[2].real) + abs(cy[2].real))
+    speed = abs(cx[1].real) + abs(cy[1].real) + acceleration * step
+    return speed, acceleration, jerk
