@@ -8,8 +8,11 @@ from scipy.optimize import brentq, minimize_scalar
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome, Phase, Reset, Slot
+from template_control.slip.dynamics.kernel import new_scratch
+from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section_map import RESULTS, closed_form, section_map
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -198,6 +201,20 @@ def test_a_flight_at_the_touchdown_height_lands_on_its_way_down(rise, first):
     u = controls(1.2, 25e3, 25e3)
     stride = simulate_stride(P, STRIDE_START["r"], [0.0, L0 * np.sin(1.2), 3.0, rise], u)
     assert stride.time_of(Event.TOUCHDOWN) == pytest.approx(first, abs=1e-9)
+
+
+@pytest.mark.parametrize("map_kind", MapKind)
+def test_a_hop_of_milliseconds_is_a_flight_in_every_map(map_kind):
+    """It ends where the stride from its apex does."""
+    kernel, kind, u = stride_kernel(P, "r"), closed_form(map_kind), controls(1.2, 25e3, 25e3)
+    rise, ground = 0.02, L0 * np.sin(1.2)
+    ends = np.empty((2, RESULTS))
+    for end, y, v in zip(
+        ends, (ground, ground + rise**2 / (2.0 * P.gravity)), (rise, 0.0), strict=True
+    ):
+        z = np.array([3.0, y, v])
+        assert section_map(kernel, kind, z, u, new_scratch(), end) == Outcome.SECTION
+    np.testing.assert_allclose(ends[0, :3], ends[1, :3], atol=1e-8)
 
 
 def test_the_touchdown_that_began_a_phase_does_not_end_it():
