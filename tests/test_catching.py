@@ -201,7 +201,7 @@ def test_a_push_within_a_step_is_answered_by_a_walk_or_by_a_run():
     assert report.target[2] == 0.0, "of an apex"
     assert planning.path.outcome is Outcome.SECTION
     planning.steady(node, Sensed(VLO.state(WALK.vlo), np.zeros(2)))
-    assert planning.assist == 0.0, "a planner that knows no slopes has no assist"
+    assert planning.ground.assist == 0.0, "a planner that knows no slopes has no assist"
     _, node = pushed(0.9, SteadyRoute.of(WALK))
     assert node.name == "SS_av^w", "this route knows no other way"
 

@@ -98,7 +98,7 @@ def test_template_forces_accelerate_the_template(gait):
     for row in stride.meta:
         t = row[0] + 0.5 * row[1]
         s = stride.sample(t)[0]
-        leg_forces(row, 0.0, s, np.array([P.mass, P.gravity, P.rest_length, 0.0]), forces)
+        leg_forces(row, 0.0, s, np.array([P.mass, P.gravity, 0.0, P.rest_length, 0.0]), forces)
         expected = P.mass * (s[4:] + [0.0, P.gravity])
         np.testing.assert_allclose(forces.sum(axis=0), expected, rtol=1e-9)
 

@@ -120,7 +120,7 @@ def test_feet_bear_the_assist_between_them(level_gait):
     gait = on_slope(level_gait, np.radians(2.0))
     p = gait.parameters
     stride = simulate_stride(p, STRIDE_START["w"], VLO.state(gait.vlo), gait.controls)
-    body, forces = np.array([p.mass, p.gravity, p.rest_length, p.assist]), np.empty((2, 2))
+    body, forces = np.array([p.mass, *p.gravity_parts, p.rest_length, p.assist]), np.empty((2, 2))
     for row in stride.meta:
         s = stride.sample(row[0] + 0.5 * row[1])[0]
         leg_forces(row, 0.0, s, body, forces)
@@ -233,7 +233,7 @@ def test_two_legs_take_a_drift_away(level_gait, standing, speed):
     before, _ = rest.ahead(node, sensed)(u)
     planning.steady(node, sensed)
     after, _ = rest.ahead(node, sensed)(u)
-    assert np.sign(planning.assist) == np.sign(level_gait.vlo[0] - speed)
+    assert np.sign(planning.ground.assist) == np.sign(level_gait.vlo[0] - speed)
     drifts = uncontrolled(level_gait) @ np.array([before, after] - level_gait.vlo).T
     assert abs(drifts[1]) < 0.1 * abs(drifts[0])
 

@@ -100,6 +100,8 @@ class EmbeddingController(AutomatonFollower):
             self._feel_friction(force, dt)
         self.feet.swing_time += dt
         self._sense()
+        if self._unfelt:
+            self._feel_ground()
         self._advance()
         q, v = self.frame.enter(q, v)
         self._plan_again()

@@ -30,7 +30,7 @@ class Plant(Protocol):
         """How long a :meth:`step` is [s]."""
 
     def ground_height(self, x: float) -> float:
-        """Height of the ground at ``x`` [m]; only to tell a fall."""
+        """Height of the ground at ``x`` [m]; to tell a fall, and to stand on at the start."""
 
     def reset(self, q: Array, v: Array) -> None:
         """Place the robot in a state; only for the start of a run.

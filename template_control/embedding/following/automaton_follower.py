@@ -84,6 +84,7 @@ class AutomatonFollower:
         curved = {name for name, station in self._stations.items() if station.control.curved}
         self.planning = StridePlanning(route, planners, o.replan, automaton, curved)
         self.station = next(iter(self._stations.values()))
+        self._unfelt = False  # the ground under feet that both stand where a run begins
 
     @property
     def node(self) -> Node:
@@ -152,6 +153,16 @@ class AutomatonFollower:
         self.contacts.begin()
         self._sense()
         self._decide(section)
+        self._unfelt = len(self.station.stance) > 1
+
+    def _feel_ground(self) -> None:
+        """Both feet stand where a run begins: the line through them is the ground."""
+        self._unfelt = False
+        other, landed = (self.feet.of[leg] for leg in self.station.stance)
+        self.ground.stand(other, landed)
+        if self._lean(self.ground.slope.slope, landed):
+            self.planning.follow(self.node, self.sensing.now, self.time)
+            self.place.restart()
 
     def _expected(self) -> list[bool | None]:
         """Whether each foot is to touch the ground now; None: it is due to land.

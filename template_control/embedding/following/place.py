@@ -40,7 +40,8 @@ class Place:
         p = parameters
         self.reference = reference
         self.forces = np.zeros((2, 2))
-        self._body = np.array([p.mass, p.gravity, p.rest_length, p.assist])
+        self._ground = p
+        self._body = np.array([p.mass, *p.gravity_parts, p.rest_length, p.assist])
         self.restart()
 
     def restart(self) -> None:
@@ -68,7 +69,9 @@ class Place:
         self.time, row = station.locate(*path.curve, x, y, self.time + passed, self.reference)
         self.offset += (s.state[2] - speed) * dt
         segment = path.curve.meta[row]
-        self._body[3] = planning.assist
+        if planning.ground is not self._ground:
+            self._ground = ground = planning.ground
+            self._body[1:3], self._body[4] = ground.gravity_parts, ground.assist
         leg_forces(segment, toe, self.reference, self._body, self.forces)
         if segment[3] != toe:
             # Template and robot are on either side of liftoff: to each foot its own force.

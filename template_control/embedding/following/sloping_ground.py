@@ -39,6 +39,14 @@ class SlopingGround:
         """Forget an earlier run; ``foot`` stands."""
         self.slope.begin(self._foothold(foot))
 
+    def stand(self, foot: int, other: int) -> None:
+        """Both feet stand: the ground is as steep as the line through them.
+
+        Args:
+            foot, other: the rear and the front one.
+        """
+        self.slope.stand(self._foothold(foot), self._foothold(other))
+
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
         """As :meth:`.SlopeFrame.enter`; what is told is kept."""
         self.told = q, v

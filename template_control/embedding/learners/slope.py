@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from itertools import combinations
-from math import atan
+from math import atan, tan
 from statistics import median
 from typing import Annotated
 
@@ -64,6 +64,23 @@ class SlopeEstimate:
         before = range(self.options.footholds - 1, -1, -1)
         self._places.extend((x - 0.5 * i * self._length, height) for i in before)
         self.slope = self.last = 0.0
+
+    def stand(self, rear: tuple[float, float], front: tuple[float, float]) -> None:
+        """Both feet stand where a run begins: as if the ground before had been such.
+
+        Args:
+            rear, front: x and height of the feet in the world [m].
+        """
+        (x, height), (ahead, above) = rear, front
+        slope = atan((above - height) / (ahead - x))
+        if abs(slope) <= self.options.change:
+            return
+        steepest = self.options.steepest
+        self.slope = self.last = min(max(slope, -steepest), steepest)
+        rise, last = tan(self.slope), self._places[-1]
+        before = range(len(self._places) - 1, -1, -1)
+        away = 0.5 * self._length
+        self._places.extend([(last[0] - i * away, last[1] - i * away * rise) for i in before])
 
     def land(self, place: tuple[float, float], other: tuple[float, float]) -> None:
         """A foot has landed.

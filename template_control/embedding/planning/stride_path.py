@@ -12,7 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.asking import answered
-from template_control.embedding.planners.planner import Decision, Planner, Planners, SlopePlanner
+from template_control.embedding.planners.planner import (
+    CurvePlanner,
+    Decision,
+    Planner,
+    Planners,
+    SlopePlanner,
+)
 from template_control.embedding.planning import choosing_again
 from template_control.embedding.planning.planned_path import PlannedPath
 from template_control.embedding.planning.replan_options import ReplanOptions
@@ -162,24 +168,34 @@ class StridePath(PlannedPath):
         Returns:
             The slope that is planned for: 0 by a planner that knows none, or no gait there.
         """
-        planner, report, ground = self.planner, self.reports[-1], self.parameters
-        if isinstance(planner, SlopePlanner):
-            ground = answered(SlipParameters, planner.on_slope, slope)
+        report, ground = self.reports[-1], self.parameters
+        # All of them: the strides ahead may be others' than the present one.
+        answers = {
+            id(planner): answered(SlipParameters, planner.on_slope, slope)
+            for planner in self.planners.values()
+            if isinstance(planner, SlopePlanner)
+        }
+        ground = answers.get(id(self.planner), ground)
+        if isinstance(self.planner, CurvePlanner) and ground.slope:
+            # No spring carries along a curve, but in the strides after it.
+            assists = (answer.assist for answer in answers.values())
+            ground = replace(ground, assist=next(filter(None, assists), 0.0))
         if self._rest.stand_on(ground):
             self.hold(replace(report.decision, nominal=False))
         return ground.slope
 
     @property
-    def assist(self) -> float:
-        """What the template's legs add in double stance [m/s^2]."""
-        return self._rest.ground.assist
+    def ground(self) -> SlipParameters:
+        """The template on its present ground."""
+        return self._rest.ground
 
     def steady(self, node: Node, sensed: Sensed) -> None:
         """Choose the assist of a double stance that begins on ground that was not expected.
 
         Arguments as for :meth:`follow`. The assist is a slope's: it is left to planners of slopes.
         """
-        if isinstance(self.planner, SlopePlanner):
+        planner = self.planner
+        if isinstance(planner, SlopePlanner) and not isinstance(planner, CurvePlanner):
             steady(self._rest, node, sensed, self.reports[-1], self.options.ground.assist)
 
     def land_off(self, node: Node, sensed: Sensed, now: float, height: float) -> Node:

@@ -42,22 +42,23 @@ class UnloadOptions(Checked):
 def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Array) -> None:
     """The template's leg forces (2, 2) [N], rows rear and front, columns x and y.
 
-    Springs push with k (l0 - l). Where none are, both legs carry m (g + y'') so that the centre of
-    pressure is x - y x'' / (g + y''), or the foot next to it; each force acts along its leg. The
-    assist of two legs moves load from one to the other, so that it lifts nothing.
+    Springs push with k (l0 - l). Where none are, both legs carry m (g_y + y'') so that the centre
+    of pressure is x - y (x'' + g_x) / (g_y + y''), or the foot next to it; each force acts along
+    its leg. The assist of two legs moves load from one to the other, so that it lifts nothing.
 
     Args:
         meta_row: (7,) toes and stiffnesses of the path's segment; NaN for legs without springs.
         toe: where x of the CoM is taken from [m].
         com: (6,) x and y of the template's CoM, and their first and second derivatives.
-        body: (4,) m, g, l0 and the assist of two legs [kg, m/s^2, m, m/s^2].
+        body: (5,) m, g_y and g_x of gravity towards the ground and back along it, l0, and the
+            assist of two legs [kg, m/s^2, m/s^2, m, m/s^2].
         forces: overwritten; zero for a leg in the air.
     """
-    com_x, com_y, rest_length = com[0] + toe, com[1], body[2]
+    com_x, com_y, rest_length = com[0] + toe, com[1], body[3]
     if np.isnan(meta_row[5]):
         lift = max(body[1] + com[5], 1e-6)  # legs do not pull
         rear, front = meta_row[3], meta_row[4]
-        share = (com_x - com_y * com[4] / lift - rear) / (front - rear)
+        share = (com_x - com_y * (com[4] + body[2]) / lift - rear) / (front - rear)
         share = min(max(share, 0.0), 1.0)
         for leg in range(2):
             load = body[0] * lift * (share if leg == 1 else 1.0 - share)
@@ -70,9 +71,9 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
         length = np.sqrt(dx * dx + com_y * com_y)
         size = max(0.0, k * (rest_length - length)) / length
         forces[leg, 0], forces[leg, 1] = size * dx, size * com_y
-    if body[3] == 0.0 or meta_row[5] == 0.0 or meta_row[6] == 0.0:
+    if body[4] == 0.0 or meta_row[5] == 0.0 or meta_row[6] == 0.0:
         return
-    moved = body[0] * body[3] / (meta_row[4] - meta_row[3])
+    moved = body[0] * body[4] / (meta_row[4] - meta_row[3])
     for leg in range(2):
         share = moved if leg == 0 else -moved
         forces[leg, 0] += share * (com_x - meta_row[3 + leg])

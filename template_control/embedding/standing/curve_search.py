@@ -21,7 +21,7 @@ class Rules(NamedTuple):
 
     Attributes:
         low, high: x between which the centre of pressure is to stay [m].
-        gravity: [m/s^2].
+        gravity: its parts away from the ground and along it, backward [m/s^2].
         reach: longest way from a foot to the CoM [m].
         slack: excess that costs nothing [m].
         pace: price of a second more or less than ``calm`` [m/s].
@@ -30,7 +30,7 @@ class Rules(NamedTuple):
 
     low: float
     high: float
-    gravity: float
+    gravity: tuple[float, float]
     reach: float
     slack: float
     pace: float
@@ -93,7 +93,8 @@ def _excess(c: Array, t: float, rules: Rules) -> float:
         x, y = x * t + c[0, n], y * t + c[1, n]
     for n in range(_TERMS - 1, 1, -1):
         ax, ay = ax * t + n * (n - 1) * c[0, n], ay * t + n * (n - 1) * c[1, n]
-    p = x - y * ax / max(rules.gravity + ay, _LIGHTEST * rules.gravity)
+    across, along = rules.gravity
+    p = x - y * (ax + along) / max(across + ay, _LIGHTEST * across)
     away = max(x - rules.low, rules.high - x)
     far = np.sqrt(away * away + y * y) - rules.reach
     return float(max(rules.low - p, p - rules.high, far))
@@ -102,5 +103,5 @@ def _excess(c: Array, t: float, rules: Rules) -> float:
 def curves() -> None:
     """The search, for whoever has it compiled before it is needed."""
     states = np.ones((1, 2, 3))
-    rules = Rules(0.0, 1.0, 9.81, 1.0, 0.0, 1.0, 1.0)
+    rules = Rules(0.0, 1.0, (9.81, 0.0), 1.0, 0.0, 1.0, 1.0)
     best_quintic(states, states, np.ones(1), rules, np.empty((2, _TERMS)))

@@ -62,13 +62,17 @@ class BetweenFeet:
 
     def at_rest(self, x: float) -> Array:
         """(2, 3) x and y, each position, velocity and acceleration, at rest over ``x``."""
-        return np.array([[x, 0.0, 0.0], [self.options.height, 0.0, 0.0]])
+        height = self.options.height
+        uphill = height * np.tan(self.parameters.slope)
+        return np.array([[x + uphill, 0.0, 0.0], [height, 0.0, 0.0]])
 
     @cached_property
     def _rules(self) -> Rules:
         p, o = self.parameters, self.options
         reach = o.reach * p.rest_length
-        return Rules(min(self.toes), max(self.toes), p.gravity, reach, o.slack, o.pace, o.calm)
+        return Rules(
+            min(self.toes), max(self.toes), p.gravity_parts, reach, o.slack, o.pace, o.calm
+        )
 
     def loaded(self, start: Array) -> Array:
         """Starts (n, 2, 3) with accelerations that load the front foot at once.
@@ -80,11 +84,11 @@ class BetweenFeet:
         x, y = start[:, 0]
         if y <= 0.0:
             return start[None]
-        lift = max(1.0 - self.options.fall, 1.0 + start[1, 2] / self.parameters.gravity)
-        lift *= self.parameters.gravity
+        across, along = self.parameters.gravity_parts
+        lift = max(1.0 - self.options.fall, 1.0 + start[1, 2] / across) * across
         starts = np.repeat(start[None], 1 + len(self.options.loads), axis=0)
         for i, share in enumerate(self.options.loads, 1):
-            starts[i, 0, 2] = (x - self.place(share)) * lift / y
+            starts[i, 0, 2] = (x - self.place(share)) * lift / y - along
         return starts
 
     def best(self, start: Array, ends: Array) -> tuple[Found, int]:

@@ -147,7 +147,22 @@ class Curves:
         return changed, chained(first, second)
 
 
-class StandPlanner(Curves):
+class SlopeCurves(Curves):
+    """Curves that know slopes: CoM and feet are those of axes that lean with the ground."""
+
+    def reset(self) -> None:
+        """See :class:`~.planner.Planner`: the ground is level again."""
+        self.on_slope(0.0)
+
+    def on_slope(self, slope: float) -> SlipParameters:
+        """See :meth:`~.planner.SlopePlanner.on_slope`."""
+        if slope != self.parameters.slope:
+            self.vaults = self.vaults.on_slope(slope)
+            self.parameters = self.vaults.parameters
+        return self.parameters
+
+
+class StandPlanner(SlopeCurves):
     """Stands: the CoM comes to rest between the feet, and stays there."""
 
     lands = False
@@ -162,7 +177,7 @@ class StandPlanner(Curves):
         return replace(decision, feasible=self._fits(found)), stride
 
 
-class StartPlanner(Curves):
+class StartPlanner(SlopeCurves):
     """Starts to walk: back, and forward to where the rear foot lifts off."""
 
     def decide(
@@ -201,7 +216,7 @@ class StopPlanner(StandPlanner):
         return self._step(min(steps, key=cost) if steps else None, self.gait.state, 0.0)
 
 
-class ChangePlanner(Curves):
+class ChangePlanner(SlopeCurves):
     """Makes a step to another speed."""
 
     def decide(

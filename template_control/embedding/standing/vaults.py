@@ -7,6 +7,7 @@ length as it passes, k (l0 - y) = m (g - v^2 / l0), and is the stiffer the slowe
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -94,12 +95,27 @@ class Vaults:
     ) -> None:
         ready((curves,))
         self.parameters, self.options, self.family = parameters, options, family
+        self._automaton = automaton
         self._simulator = StrideSimulator(parameters, automaton)
         self._node = automaton.start("w").name
         self._known: dict[float, Vault] = {}
         self._ways: dict[float, Array] = {}
         unit = parameters.speed_unit
-        self._speeds = np.linspace(options.slowest * unit, family.speeds[1], _SPEEDS)
+        # Uphill the CoM is behind the foot at VLO, and has to come over it.
+        uphill = max(np.tan(parameters.slope), 0.0) * np.sqrt(parameters.gravity * options.height)
+        slowest = options.slowest * unit
+        if uphill:
+            slowest = float(np.hypot(slowest, uphill))
+        self._speeds = np.linspace(slowest, family.speeds[1], _SPEEDS)
+
+    def on_slope(self, slope: float) -> Vaults:
+        """The same passes over a leg on other ground.
+
+        Args:
+            slope: its angle, uphill positive [rad].
+        """
+        ground = replace(self.parameters, slope=slope)
+        return Vaults(ground, self.options, self.family, self._automaton)
 
     def between(self, wanted: float, present: float) -> list[float]:
         """Speeds at VLO that are tried, the best first [m/s].
@@ -150,7 +166,10 @@ class Vaults:
     def _way(self, vault: Vault) -> Array:
         speed, height, vertical = vault.vlo
         u = controls(_FLAT, vault.stiffness, vault.stiffness)
-        past = self._simulator.run(self._node, [0.0, height, speed, -vertical], u)
+        # Uphill is downhill for one who walks back.
+        back = replace(self.parameters, slope=-self.parameters.slope)
+        simulator = StrideSimulator(back, self._automaton)
+        past = simulator.run(self._node, [0.0, height, speed, -vertical], u)
         shortest, longest = self.options.single
         # Whatever ends the stride: before it the leg pushes.
         longest = min(longest, 0.98 * past.duration)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from math import atan2, degrees, radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,10 @@ from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
+
+# Of the ground that a walk starts on [rad]: steeper uphill the CoM does not come over the front
+# foot before the centre of pressure has left the rear one.
+_UPHILL = radians(4.1)
 
 
 class Planar(Kind):
@@ -83,7 +88,7 @@ class Planar(Kind):
         if pose is None and route.section == APEX:
             pose = self._apex_pose(controller, z[: APEX.dimension], planner, node)
         if pose is None and route.section == REST:
-            pose = standing_pose(route.parameters)
+            pose = self._standing_pose(controller, o)
         if pose is not None:
             q, v = state_in(robot, pose)
             controller.start(pose.rear, pose.swung, first=first)
@@ -104,6 +109,23 @@ class Planar(Kind):
         swing = phase_control(o.phases, node).swing or controller.swings.other
         automaton = controller.planning.automaton
         return apex_pose(self.robot, ApexStart(z, planner.gait, swing, pitch, automaton))
+
+    def _standing_pose(self, controller: EmbeddingController, o: SimulationOptions) -> Pose:
+        """At rest on the ground of the plant.
+
+        Raises:
+            ParameterError: if it is steeper than a start can be made on.
+        """
+        pose = standing_pose(controller.planning.route.parameters, ground=o.plant.ground_height)
+        (rear, low), (front, high) = pose.feet.tolist()
+        slope, believed = atan2(high - low, front - rear), controller.options.slope.steepest
+        if not -believed <= slope <= min(believed, _UPHILL):
+            raise ParameterError(
+                f"{self.robot.name} stands on ground of {degrees(slope):.1f} degrees: let the run"
+                f" begin where it is between {-degrees(believed):.1f} and {degrees(_UPHILL):.1f}"
+                " degrees"
+            )
+        return pose
 
     def plant(self, world: World) -> AbstractContextManager[Plant]:
         """See :meth:`.kind.Kind.plant`."""

@@ -115,7 +115,7 @@ def references() -> None:
     coefficients, meta = np.ones((2, 1, ORDER + 1)), np.ones((1, 7))
     for locate in LOCATE.values():
         locate(coefficients, meta, np.ones(3), 0.1, 1.0, 0.0, np.zeros(6))
-    leg_forces(meta[0], 0.1, np.ones(6), np.array([1.0, 1.0, 1.0, 0.0]), np.zeros((2, 2)))
+    leg_forces(meta[0], 0.1, np.ones(6), np.array([1.0, 1.0, 0.0, 1.0, 0.0]), np.zeros((2, 2)))
     quintic_step(np.zeros(3), 0.1, 0.0, 1.0, 1e-3)
     shape = SwingOptions().shape
     swing_step(np.zeros(3), np.zeros(3), (0.1, 0.0, 1.0), shape, (0.0, 0.0), 1e-3)

@@ -1,0 +1,113 @@
+"""Standing, and starting to walk, on ground that is not level."""
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.embedding.learners.slope import SlopeEstimate, SlopeOptions
+from template_control.embedding.references.leg_forces import leg_forces
+from template_control.embedding.standing.default import standing_planners
+from template_control.embedding.standing.pose import standing_pose
+from template_control.errors import ParameterError
+from template_control.run.config import RunConfig
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import Outcome
+
+P = tc.SlipParameters()
+TOES = (0.0, 0.3)
+
+
+def sloping(degrees, start=-50.0):
+    """A slope that goes on behind the robot; or begins at ``start`` before it."""
+    rise = np.tan(np.radians(degrees))
+    below = start * rise if start < 0.0 else 0.0
+    return tc.Terrain(((start, below), (100.0, below + (100.0 - start) * rise)))
+
+
+def walked(plant, degrees, steps=12, **more):
+    """A record of a walk from a stand."""
+    world = plant(terrain=sloping(degrees, **more))
+    options = tc.SimulationOptions(steps=steps, plant=world)
+    return RunConfig().with_stands(True, False).prepare().run(options)
+
+
+@pytest.mark.parametrize("degrees", [-5.0, -2.0, 0.0, 1.0, 4.0])
+def test_who_rests_is_over_the_middle_of_the_feet(degrees):
+    """The weight's line through the CoM meets the ground there, and both legs bear half."""
+    slope = np.radians(degrees)
+    planner = standing_planners(P)["s"]
+    planner.on_slope(slope)
+    feet = planner._between(TOES)
+    com = feet.at_rest(0.15)
+    assert com[0, 0] - com[1, 0] * np.tan(slope) == pytest.approx(0.15)
+    body = np.array([P.mass, *planner.parameters.gravity_parts, P.rest_length, 0.0])
+    forces = np.empty((2, 2))
+    row = np.array([0.0, 1.0, 0.0, *TOES, np.nan, np.nan])
+    leg_forces(row, 0.0, com.T.ravel(), body, forces)
+    np.testing.assert_allclose(forces[:, 1], 0.5 * P.mass * P.gravity * np.cos(slope))
+    # What the legs push along the ground is what gravity pulls.
+    assert forces[:, 0].sum() == pytest.approx(P.mass * P.gravity * np.sin(slope))
+
+
+@pytest.mark.parametrize("degrees", [-5.0, -2.0, 0.0, 1.0, 3.0])
+def test_a_start_comes_over_the_front_foot(degrees):
+    """At VLO the CoM is fast enough to pass the vertical over the foot, which lies uphill."""
+    planner = standing_planners(P)["sw"]
+    planner.on_slope(np.radians(degrees))
+    rest = planner._between(TOES).at_rest(0.15)
+    decision = planner.decide(rest[:, 0], np.array([1.1, 0.978, 0.0]))
+    decision, stride = planner.curve(AUTOMATON.start("sw").name, rest, TOES, decision)
+    assert stride.outcome is Outcome.SECTION
+    x, y, speed, _ = stride.state
+    along = np.tan(np.radians(degrees)) * y  # from over the foot to where it is highest
+    assert x == pytest.approx(TOES[1])
+    assert speed**2 > P.gravity / y * max(along, 0.0) ** 2
+
+
+def test_planners_are_level_again_after_a_reset():
+    for planner in standing_planners(P).values():
+        if hasattr(planner, "on_slope"):
+            assert planner.on_slope(0.05).slope == 0.05
+            planner.reset()
+            assert planner.parameters == P
+
+
+@pytest.mark.parametrize("degrees", [-6.0, -1.0, 0.0, 4.0])
+def test_a_robot_stands_with_both_feet_on_the_ground(degrees):
+    ground = sloping(degrees)
+    pose = standing_pose(P, ground=ground.height_at)
+    for x, height in pose.feet:
+        assert height == pytest.approx(ground.height_at(x))
+    middle = pose.feet.mean(axis=0)
+    assert pose.com[0] == pytest.approx(middle[0])
+    away = (pose.com[1] - middle[1]) * np.cos(np.radians(degrees))
+    assert away == pytest.approx(standing_pose(P).com[1])
+
+
+@pytest.mark.parametrize("slope", [-0.2, -0.05, 0.003, 0.07, 0.2])
+def test_two_feet_that_stand_tell_the_slope(slope):
+    estimate = SlopeEstimate(SlopeOptions(), 1.0)
+    estimate.begin((0.3, 0.3 * np.tan(slope)))
+    estimate.stand((0.0, 0.0), (0.3, 0.3 * np.tan(slope)))
+    believed = 0.0 if abs(slope) < 0.004 else np.clip(slope, -0.12, 0.12)
+    assert estimate.slope == pytest.approx(believed)
+    if 0.004 < abs(slope) < 0.12:
+        estimate.land((0.9, 0.9 * np.tan(slope)), (0.3, 0.3 * np.tan(slope)))
+        assert estimate.slope == pytest.approx(believed)
+
+
+@pytest.mark.parametrize("degrees", [-10.0, 5.0, 8.0])
+def test_a_stand_where_no_slope_so_steep_is_believed_is_refused(degrees):
+    with pytest.raises(ParameterError, match=f"stands on ground of {degrees:.1f} degrees"):
+        walked(tc.PlantOptions, degrees)
+
+
+@pytest.mark.slow(seconds=60)
+@pytest.mark.parametrize("degrees", [-4.0, -2.0, 2.0, 4.0])
+@pytest.mark.parametrize("plant", [tc.PlantOptions, tc.MujocoOptions, tc.IdealOptions])
+def test_a_walk_starts_from_a_stand_on_a_slope(plant, degrees):
+    record = walked(plant, degrees)
+    assert not record.fell, record.metadata["fall_reason"]
+    assert abs(record.section_state[-1, 0] - record.section_target[-1, 0]) < 0.1
+    on_ground = record.foot[0, :, 1] - [sloping(degrees).height_at(x) for x in record.foot[0, :, 0]]
+    np.testing.assert_allclose(on_ground, 0.0, atol=1e-4)
