@@ -39,9 +39,6 @@ Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 
-_proxqp = load_proxqp()
-_SOLVED = _proxqp.QPSolverOutput.PROXQP_SOLVED
-
 
 @dataclass(frozen=True)
 class QpOptions(Checked):
@@ -147,17 +144,20 @@ class _Workspace:
         self.bias, self.force = self.contact[:, :, nv], self.contact[:, :, nv + 1]
         self.rows = rows
         self.answer: Array = self.matrices.minimum
+        self._proxqp = load_proxqp()
+        self._solved = self._proxqp.QPSolverOutput.PROXQP_SOLVED
         self.qp = self._new()
         self.ready = False
 
     def _new(self) -> Any:
-        qp = _proxqp.dense.QP(
+        proxqp = self._proxqp
+        qp = proxqp.dense.QP(
             len(self._identity),
             0,
             self.rows,
             False,
-            _proxqp.dense.HessianType.Dense,
-            _proxqp.dense.DenseBackend.PrimalDualLDLT,
+            proxqp.dense.HessianType.Dense,
+            proxqp.dense.DenseBackend.PrimalDualLDLT,
         )
         settings = qp.settings
         # The tolerance is tight because a warm start stops as soon as it is met.
@@ -174,19 +174,19 @@ class _Workspace:
             m = self.matrices
             self.qp.update(g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
             self.qp.solve()
-            if self.qp.results.info.status == _SOLVED:
+            if self.qp.results.info.status == self._solved:
                 return True
             # A failed solve leaves penalties behind with which the next one can stop at a
             # wrong answer, even after `init`; a new object costs microseconds.
             self.qp = self._new()
         qp = self.qp
-        qp.settings.initial_guess = _proxqp.InitialGuess.NO_INITIAL_GUESS
+        qp.settings.initial_guess = self._proxqp.InitialGuess.NO_INITIAL_GUESS
         m = self.matrices
         qp.init(H=self._identity, g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
         qp.solve()
-        self.ready = bool(qp.results.info.status == _SOLVED)
+        self.ready = bool(qp.results.info.status == self._solved)
         if self.ready:
-            qp.settings.initial_guess = _proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
+            qp.settings.initial_guess = self._proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
         else:
             self.qp = self._new()
         return self.ready
