@@ -12,7 +12,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from template_control.parts import ready
 from template_control.slip import (
     LateralLearnt,
     LateralOptions,
@@ -30,6 +29,7 @@ from template_control.slip import (
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.lateral.kernels import LATERAL
 from template_control.slip.maps.section import VLO
+from template_control.warm_up import ready
 
 _ROUNDS, _CALLS = 20, 200
 

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import minimize_scalar
 
-from template_control.parts import ready
 from template_control.slip import (
     LateralLearnt,
     LateralOptions,
@@ -27,6 +26,7 @@ from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.lateral.kernels import LATERAL as KERNELS
 from template_control.slip.lateral.transition import transition
 from template_control.slip.maps.section import VLO
+from template_control.warm_up import ready
 
 P = SlipParameters()
 WALK = gait_at(P, np.radians(68.0), 1.05)

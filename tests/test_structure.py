@@ -37,16 +37,14 @@ SLIP_STAGES = (
 )
 SHARED = (
     "checks",
-    "code_cache",
     "compiled",
-    "compiling",
     "errors",
     "file_lock",
-    "parts",
     "settings",
     "storage",
     "terminal",
     "version",
+    "warm_up",
 )  # of the root, what every room may import
 MOST_ROOMS = 12
 MOST_FILES = 25  # of a folder, its __init__.py included

@@ -79,6 +79,10 @@ _COMMANDS = {
         "template_control.cli.automaton",
         "show the hybrid automaton that simulator, planners and robot controller read",
     ),
+    "warm-up": _Command(
+        "template_control.cli.warm_up",
+        "compile once what all commands call; each compiles what it needs without it",
+    ),
     "reproduce": _Command(
         "template_control.paper.command",
         "reproduce a table or figure of the paper, ours beside the paper's",
@@ -194,13 +198,9 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
     """Run a command; with the ``output`` of the process, its signals are its affair too."""
     try:
         options = build_parser(arguments).parse_args(arguments)
-        # Not before: whoever asks for help need not wait for it.
-        from template_control.compiling import compiling
-        from template_control.terminal import plain_console
-
         if output is not None:
             on_signals(interrupt)
-        with compiling(plain_console(stderr=True)), _robot_notices():
+        with _robot_notices():
             status = int(options.run(options))
         sys.stdout.flush()
         return status

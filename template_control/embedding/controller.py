@@ -19,12 +19,12 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.walking.walk_kernels import CONTROL
 from template_control.errors import ParameterError
-from template_control.parts import ready
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
+from template_control.warm_up import ready
 from template_control.whole_body.solver import Solution, Stance, WholeBodyQp
 
 Array = NDArray[np.float64]

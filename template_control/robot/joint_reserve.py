@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import callee
+from template_control.compiled import compiled
 
 Array = NDArray[np.float64]
 
 
-@callee
+@compiled
 def joint_reserve(q: Array, speeds: Array, limits: Array, ranges: Array) -> tuple[float, float]:
     """The fastest joint, and the one that is soonest at a stop.
 

@@ -25,7 +25,6 @@ from template_control.embedding.planners.walking.walk_kernels import WALK
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.robot_template import check_apex
 from template_control.errors import ParameterError
-from template_control.parts import ready
 from template_control.robot.biped import Biped
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.planner import OwnPlanner, PlannerChoice
@@ -38,6 +37,7 @@ from template_control.slip.gaits.running_gait import RunningGait
 from template_control.slip.gaits.walking_family import walking_gait
 from template_control.slip.scenario.scenario import STAND_HEIGHT, Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
+from template_control.warm_up import ready
 
 _STAND = 2.0  # a walk's first and last stand [s]
 

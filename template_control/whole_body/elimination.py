@@ -15,12 +15,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import callee
+from template_control.compiled import compiled
 
 Array = NDArray[np.float64]
 
 
-@callee
+@compiled
 def cholesky(matrix: Array, size: int) -> bool:
     """Factor the leading block of a symmetric matrix in place; its lower triangle becomes L.
 
@@ -47,7 +47,7 @@ def cholesky(matrix: Array, size: int) -> bool:
     return True
 
 
-@callee
+@compiled
 def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
     """Solve L L^T x = b in place for several right-hand sides b.
 
@@ -69,7 +69,7 @@ def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
             columns[i, c] = value / factor[i, i]
 
 
-@callee
+@compiled
 def eliminate(
     mass_matrix: Array,
     nonlinear_effects: Array,

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import callee, compiled
+from template_control.compiled import compiled
 from template_control.whole_body.elimination import cholesky, eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
@@ -37,7 +37,7 @@ SINGULAR, BOUNDED, FREE = 0, 1, 2
 """What :func:`assemble` finds: no problem, one whose constraints act, one where none does."""
 
 
-@callee
+@compiled
 def rows_per_foot(directions: int) -> int:
     """Constraints of a stance foot: two for each tangential direction, one for the normal one.
 
@@ -204,7 +204,7 @@ def assemble(
     return BOUNDED
 
 
-@callee
+@compiled
 def _keeps(constraint: Array, lower: Array, upper: Array, z: Array) -> bool:
     """Whether lower <= constraint z <= upper; ``z`` may be longer."""
     for i in range(constraint.shape[0]):
@@ -216,7 +216,7 @@ def _keeps(constraint: Array, lower: Array, upper: Array, z: Array) -> bool:
     return True
 
 
-@callee
+@compiled
 def _forward(factor: Array, vector: Array) -> None:
     """vector = L^-1 vector, in place."""
     for i in range(vector.shape[0]):
@@ -225,7 +225,7 @@ def _forward(factor: Array, vector: Array) -> None:
         vector[i] /= factor[i, i]
 
 
-@callee
+@compiled
 def _backward(factor: Array, vector: Array) -> None:
     """vector = L^-T vector, in place."""
     for i in range(vector.shape[0] - 1, -1, -1):
@@ -258,7 +258,7 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
         out[i] = share * torque_limit[i]
 
 
-@callee
+@compiled
 def _add_square(
     row: Array, row_weight: float, scale: Array, hessian: Array, gradient: Array
 ) -> None:
@@ -285,7 +285,7 @@ def follow(a_map: Array, f_map: Array, tau: Array, acceleration: Array, force: A
     _affine(f_map, tau, force)
 
 
-@callee
+@compiled
 def _affine(matrix: Array, tau: Array, out: Array) -> None:
     """out = matrix[:, :-1] tau + matrix[:, -1]."""
     n = tau.shape[0]

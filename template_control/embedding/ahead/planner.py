@@ -32,7 +32,6 @@ from template_control.embedding.ahead.prospect import Aim, Plan, Prospect, Works
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.planners.walking.walk_kernels import WALK
-from template_control.parts import ready
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
@@ -41,6 +40,7 @@ from template_control.slip.gaits.gait import WalkingGait, with_push_off
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
+from template_control.warm_up import Part, ready
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class AheadPlanner:
         options: AheadOptions | None = None,
         speed: Positive | None = None,
     ) -> None:
-        ready((*WALK, plan_ahead))
+        ready((*WALK, *AHEAD))
         o = self.options = scaled(options or AheadOptions(), Scale.of(parameters))
         self.parameters = parameters
         self.table: GaitTable = gait_table(parameters, o)
@@ -201,3 +201,7 @@ def plan_ahead() -> None:
     aim = Aim(1.0, np.zeros(PADDED), ANY_ANGLE)
     work = Workspace(new_scratch(), new_scratch(complex))
     look_ahead(known, work, np.ones(PADDED), aim, plan)
+
+
+AHEAD = (Part(plan_ahead, 10.0),)
+"""What this planner calls, further than a walk."""

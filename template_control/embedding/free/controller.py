@@ -22,7 +22,6 @@ from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.sideways import SIDES, Sideways
 from template_control.embedding.planners.planner import Decision, Planner, Planners, decided
 from template_control.embedding.references.swing_foot import quintic_step
-from template_control.parts import ready
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -30,6 +29,7 @@ from template_control.slip.automaton.vocabulary import Event, Leg
 from template_control.slip.lateral.cycle import LateralWish
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import Route
+from template_control.warm_up import ready
 from template_control.whole_body.solver import Solution, Stance
 
 Array = NDArray[np.float64]

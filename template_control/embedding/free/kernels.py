@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.slip.lateral.kernels import LATERAL
+from template_control.warm_up import Part
 from template_control.whole_body.foot_task import follow_foot
 
 
@@ -16,5 +17,5 @@ def foot_in_plane() -> None:
     follow_foot(0, feels, wish, 0.0, (1.0,) * 4, np.zeros((2, 5)))
 
 
-FREE = (*LATERAL, foot_in_plane)
+FREE = (*LATERAL, Part(foot_in_plane, 0.3))
 """What a tick of a free robot's controller calls, and its planner aside."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import callee, compiled
+from template_control.compiled import compiled
 from template_control.whole_body.elimination import cholesky, solve_cholesky
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 _NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
 
 
-@callee
+@compiled
 def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Array) -> Array:
     """x + dx with the least |rows dx + residual| between the bounds.
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Share
-from template_control.compiled import callee, compiled
+from template_control.compiled import compiled
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, tuned
 
 Array = NDArray[np.float64]
@@ -124,7 +124,7 @@ def swing_step(
         _advance(y, ground, -landing_speed, to_go, dt)
 
 
-@callee
+@compiled
 def _advance(state: Array, target: float, speed: float, time: float, dt: float) -> None:
     p, v, a = state[0], state[1], state[2]
     # In tau = t / time: c0..c5 with c0 = p, c1 = v T, c2 = a T^2 / 2.

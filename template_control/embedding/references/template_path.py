@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
-from template_control.compiled import callee, compiled
+from template_control.compiled import compiled
 from template_control.embedding.phases import Clock
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.stride import Stride
@@ -185,7 +185,7 @@ def _landings(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[Landi
     return found.get(Leg.REAR, never), found.get(Leg.FRONT, never)
 
 
-@callee
+@compiled
 def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     """Value, first and second derivative at ``t`` into out[first], out[first+2], ..."""
     p = d = dd = 0.0
@@ -196,7 +196,7 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
     out[first], out[first + 2], out[first + 4] = p, d, 2.0 * dd
 
 
-@callee
+@compiled
 def sample(coefficients: Array, meta: Array, look: Array, time: float, out: Array) -> int:
     """Write the path at ``time`` into out (6,): x from the toe, y, and their two derivatives.
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
+from template_control.warm_up import Part
 
 Array = NDArray[np.float64]
 
@@ -101,7 +102,11 @@ def _excess(c: Array, t: float, rules: Rules) -> float:
 
 
 def curves() -> None:
-    """The search, for whoever has it compiled before it is needed."""
+    """The search, called to compile it."""
     states = np.ones((1, 2, 3))
     rules = Rules(0.0, 1.0, (9.81, 0.0), 1.0, 0.0, 1.0, 1.0)
     best_quintic(states, states, np.ones(1), rules, np.empty((2, _TERMS)))
+
+
+STAND = (Part(curves, 0.5),)
+"""What standing, starting and stopping call."""

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.standing.curve_search import curves
+from template_control.embedding.standing.curve_search import STAND
 from template_control.embedding.standing.options import StandingOptions
-from template_control.parts import ready
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Event, Slot
@@ -23,6 +22,7 @@ from template_control.slip.dynamics.stride import Stride, StrideSimulator, contr
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.warm_up import ready
 
 Array = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ class Vaults:
         family: Family,
         automaton: Automaton = AUTOMATON,
     ) -> None:
-        ready((curves,))
+        ready(STAND)
         self.parameters, self.options, self.family = parameters, options, family
         self._automaton = automaton
         self._simulator = StrideSimulator(parameters, automaton)

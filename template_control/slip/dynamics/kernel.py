@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import entry, inner
+from template_control.compiled import inner
 from template_control.slip.automaton.tables import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
 from template_control.slip.dynamics.guards import all_bends
@@ -216,7 +216,7 @@ def plain(kernel: Kernel) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     return tuple(kernel.tables), tuple(kernel[1:])
 
 
-@entry
+@inner
 def record_stride(
     kernel: tuple[tuple[Any, ...], tuple[Any, ...]],
     state: Array,

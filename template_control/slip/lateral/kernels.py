@@ -11,6 +11,7 @@ from template_control.slip.lateral.placing import LateralAim, place
 from template_control.slip.lateral.transition import acceleration, transition
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.warm_up import Part
 
 
 def sideways() -> None:
@@ -34,5 +35,5 @@ def sideways() -> None:
     place(path, aim, 0.0, two, two)
 
 
-LATERAL = (sideways,)
+LATERAL = (Part(sideways, 2.0),)
 """What a tick of a robot that is free in space calls, for :func:`~template_control.parts.ready`."""

@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from template_control.compiled import compiled, entry, inner, inner_by_type
+from template_control.compiled import compiled, inner, inner_by_type
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.dynamics.closed_form import closed_form_stride
 from template_control.slip.dynamics.kernel import Scratch, run_stride
@@ -98,7 +98,7 @@ def one_stride(
     return outcome
 
 
-@entry
+@inner
 def section_map(
     kernel: Kernel,
     kind: int | None,

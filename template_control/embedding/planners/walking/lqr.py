@@ -23,7 +23,6 @@ from template_control.embedding.planners.walking.step_law import Law, Strain
 from template_control.embedding.planners.walking.step_search import FALL_PRICE, Grid, Trust, choose
 from template_control.embedding.planners.walking.walk_kernels import WALK
 from template_control.errors import GaitError
-from template_control.parts import ready
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
@@ -36,6 +35,7 @@ from template_control.slip.similarity import (
     Scale,
     scaled,
 )
+from template_control.warm_up import ready
 
 Array = NDArray[np.float64]
 _LASTING = (0.0, 1.0, 1.0)  # what of an offset outlives another way of moving

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import callee
+from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
@@ -84,7 +84,7 @@ class Law(NamedTuple):
     kernel: Kernel
 
 
-@callee
+@compiled
 def copy(source: Array, target: Array) -> None:
     """Copy numbers; a slice would take Numba seconds to compile, for what it says of wrong shapes.
 
@@ -96,7 +96,7 @@ def copy(source: Array, target: Array) -> None:
         target[i] = source[i]
 
 
-@callee
+@compiled
 def bounded(law: Law, z: Array, u: Array) -> None:
     """Clip controls in place to what is admissible at a VLO state.
 
@@ -117,7 +117,7 @@ def bounded(law: Law, z: Array, u: Array) -> None:
         u[0] = min(u[0], np.arcsin(min(max(later / length, 0.0), 1.0)))
 
 
-@callee
+@compiled
 def linear(law: Law, z: Array, u: Array) -> None:
     """Write the law's controls, within their bounds, into ``u``.
 
@@ -133,7 +133,7 @@ def linear(law: Law, z: Array, u: Array) -> None:
     bounded(law, z, u)
 
 
-@callee
+@compiled
 def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -> int:
     """Take one walking step of the template, and add the robot's offset to where it ends.
 
@@ -163,7 +163,7 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -
     return outcome
 
 
-@callee
+@compiled
 def strain(law: Law, z: Array, u: Array, result: Array) -> float:
     """What the knees make a step cost, where the legs are shortest.
 
@@ -191,7 +191,7 @@ def strain(law: Law, z: Array, u: Array, result: Array) -> float:
     return total
 
 
-@callee
+@compiled
 def cost_to_go(target: Array, cost: Array, z: Array) -> float:
     """(z - z_s)^T P (z - z_s).
 

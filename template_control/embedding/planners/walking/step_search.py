@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.compiled import callee, compiled
+from template_control.compiled import compiled
 from template_control.embedding.planners.walking.step_law import (
     Law,
     bounded,
@@ -64,7 +64,7 @@ class Trust(NamedTuple):
     settled: float
 
 
-@callee
+@compiled
 def price(
     law: Law, exact: bool, s: Scratch, z: Array, u: Array, limit: float, first: Array
 ) -> float:
@@ -105,7 +105,7 @@ def price(
     return best
 
 
-@callee
+@compiled
 def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
     """Point ``i`` of the grid over all bounds into ``u`` (c,); the last control varies first."""
     for j in range(u.shape[0] - 1, -1, -1):
@@ -115,7 +115,7 @@ def _coarse(grid: Grid, law: Law, i: int, u: Array) -> None:
         i //= count
 
 
-@callee
+@compiled
 def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
     """Point ``i`` of a grid about ``centre`` (c,) into ``u`` (c,).
 
@@ -131,7 +131,7 @@ def _fine(grid: Grid, centre: Array, widths: tuple[float, float], i: int, u: Arr
         u[1 + beside // 2 * 2] += (2 * (beside % 2) - 1) * widths[1]
 
 
-@callee
+@compiled
 def search(law: Law, grid: Grid, s: Scratch, z: Array, best: Array, first: Array) -> float:
     """Improve ``best`` (c,) in place: a coarse grid over all bounds, then finer ones about it.
 

@@ -32,6 +32,7 @@ from template_control.slip.dynamics.taylor import ORDER
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.warm_up import Part
 from template_control.whole_body.foot_task import follow_foot
 from template_control.whole_body.problem import (
     Matrices,
@@ -129,9 +130,19 @@ def catch() -> None:
     aim_and_bounds(apex, apex, np.zeros(3), np.ones(3), (0.0, 1.0), limits)
 
 
-# The search calls the maps, so it comes after them; the others in order of their length.
-CONTROL = (whole_body, planar_terms, catch, references)
+CONTROL = (
+    Part(whole_body, 2.0),
+    Part(planar_terms, 0.7),
+    Part(catch, 1.3),
+    Part(references, 0.9),
+)
 """What a tick of the controller calls."""
 
-WALK = (closed_form_map, derivatives, exact_map, whole_body, step_search, *CONTROL[1:])
+WALK = (
+    Part(closed_form_map, 4.2),
+    Part(step_search, 6.3),
+    Part(derivatives, 4.7),
+    Part(exact_map, 2.8),
+    *CONTROL,
+)
 """What the default planner and the controller call."""

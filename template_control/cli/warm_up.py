@@ -1,0 +1,83 @@
+"""``template-control warm-up``: compile once what all commands call."""
+
+from __future__ import annotations
+
+import argparse
+
+from template_control.terminal import plain_console
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The command has no options: everything is compiled.
+
+    Args:
+        parser: of the command.
+    """
+    parser.description = (
+        "Compile all functions of the library and keep their machine code, so that no later"
+        " command compiles. Each command compiles what it needs without it, once."
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compile what is not yet; returns 0.
+
+    Args:
+        options: of the command line, none.
+    """
+    from template_control.compiled import cache_folder
+    from template_control.embedding.ahead.planner import AHEAD
+    from template_control.embedding.free.kernels import FREE
+    from template_control.embedding.planners.walking.walk_kernels import WALK
+    from template_control.embedding.standing.curve_search import STAND
+    from template_control.warm_up import Part, ready
+
+    other = (Part(scenarios, 6.0), Part(basins, 1.5), Part(floating_base, 1.0))
+    ready((*WALK, *AHEAD, *STAND, *FREE, *other, Part(ideal_plant, 2.0)))
+    plain_console().print(f"everything is compiled, in {cache_folder()}", soft_wrap=True)
+    return 0
+
+
+def scenarios() -> None:
+    """The paper's controllers on all maps: Example I."""
+    from template_control.slip.automaton.vocabulary import MapKind
+    from template_control.slip.scenario.run import simulate_scenario
+    from template_control.slip.scenario.scenario import example_one
+
+    for kind in MapKind:
+        simulate_scenario(example_one(kind))
+
+
+def basins() -> None:
+    """Steps to fall of the default gait."""
+    import numpy as np
+
+    from template_control.slip.gaits.basin import steps_to_fall
+    from template_control.slip.gaits.gait import gait_at
+    from template_control.slip.parameters import SlipParameters
+
+    template = SlipParameters()
+    gait = gait_at(template, 1.152, 1.1)
+    steps_to_fall(template, gait.vlo[None], gait.controls, np.zeros(2), limit=1)
+
+
+def floating_base() -> None:
+    """Terms of a robot with a floating base."""
+    from template_control.robot.library import load_free_robot
+
+    robot = load_free_robot("five-link-3d")
+    robot.update(robot.neutral(), 0.0 * robot.model.velocityLimit)
+
+
+def ideal_plant() -> None:
+    """A step of the paper's gait by the paper's controller on the ideal plant."""
+    from template_control.embedding.planners.walking.modified import ModifiedPlanner
+    from template_control.embedding.robot_template import paper_gait, template_for
+    from template_control.plant.ideal import IdealOptions
+    from template_control.robot.library import load_robot
+    from template_control.run.options import SimulationOptions
+    from template_control.run.simulation import simulate
+
+    robot = load_robot("five-link")
+    options = SimulationOptions(steps=1, plant=IdealOptions())
+    simulate(robot, ModifiedPlanner(paper_gait(template_for(robot))), options)

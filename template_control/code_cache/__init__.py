@@ -1,1 +1,0 @@
-"""What is kept of compiled functions: for which content of the sources, and in which form."""
