@@ -1,4 +1,4 @@
-from .executor import worker_processes as worker_processes
+from .executor import workers as workers
 from .executor import workers as workers
 from .sweep import SweepOptions as SweepOptions
 from .sweep import SweepResult as SweepResult

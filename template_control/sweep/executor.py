@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
+import multiprocessing
 import os
 import pickle
 import signal
@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from itertools import islice
-from multiprocessing import parent_process
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -21,7 +20,6 @@ from template_control.errors import SweepError
 from template_control.sweep.file import Outcome, plain
 
 _REFRESH = 0.2  # [s] between two looks of the progress bar
-_PR_SET_PDEATHSIG = 1
 _GRACE = 0.5  # [s] in which calls may end that Ctrl-C found running
 
 
@@ -132,7 +130,10 @@ def _call(_: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Ou
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
     """Ctrl-C reaches worker processes too, where a robot's run would end early, as if whole."""
-    if parent_process() is None or threading.current_thread() is not threading.main_thread():
+    if (
+        multiprocessing.parent_process() is None
+        or threading.current_thread() is not threading.main_thread()
+    ):
         yield
         return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -160,14 +161,14 @@ def _outcome(future: Future[Outcome]) -> Outcome:
 
 
 class _Workers(ProcessPoolExecutor):
-    """Processes of our own, which end with the ``with`` block of :func:`workers`."""
+    """Processes of :func:`workers`, told apart from a user's: who ends them cancels their calls."""
 
 
 def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
     """Give up what has not begun.
 
-    Our own workers are ended next, and their executor cancels what is left. Where one of them
-    dies meanwhile, it fails at a future that somebody else has cancelled.
+    Where a worker dies meanwhile, its executor fails at a future that somebody else has cancelled:
+    so calls of our own, which are ended next, are left to it.
     """
     if not isinstance(pool, _Workers):
         for future in under_way:
@@ -186,58 +187,34 @@ def _workers(executor: Executor | None) -> Iterator[Executor]:
 
 @contextmanager
 def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
-    """:func:`worker_processes` for the time of a ``with`` block.
+    """Worker processes of this machine for the time of a ``with`` block.
 
-    An error in the block, Ctrl-C for one, kills them whatever they are doing. So does the end of
-    the thread that the block is in: calls are submitted from there.
+    They leave Ctrl-C to this process, and end with it however it ends. An error in the block,
+    Ctrl-C for one, kills them whatever they are doing.
 
     Args:
         count: how many; None for one a core.
     """
-    pool = _Workers(count, initializer=_obey_parent_only, initargs=(True,))
+    others = set(multiprocessing.active_children())
+    pool = _Workers(count, initializer=_obey_parent_only)
     try:
         yield pool
     except BaseException:
-        # The executor forgets these when it is told to shut down.
-        processes, results = list((pool._processes or {}).values()), pool._result_queue
-        manager: threading.Thread | None = pool._executor_manager_thread  # type: ignore[assignment]
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
+        for process in set(multiprocessing.active_children()) - others:
             process.kill()
-        # Without a writer the executor's thread does not wait for the rest of half a result.
-        results._writer.close()  # type: ignore[attr-defined]
-        # At Python's end it would be woken through a pipe that it may be closing meanwhile.
-        if manager is not None:
-            manager.join(_GRACE)
         raise
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def worker_processes(count: int | None) -> ProcessPoolExecutor:
-    """Processes of this machine that leave Ctrl-C to the sweep and end with its process.
-
-    Args:
-        count: how many; None for one a core.
-    """
-    return ProcessPoolExecutor(count, initializer=_obey_parent_only)
-
-
-def _obey_parent_only(at_once: bool = False) -> None:
-    """In a worker: leave Ctrl-C to the parent, and end when it is killed.
-
-    Args:
-        at_once: also while compiled code runs, which lets no other thread of the worker run.
-            Linux does this when the thread ends that made the worker.
-    """
-    prctl = getattr(ctypes.CDLL(None), "prctl", None)
-    if at_once and prctl is not None:
-        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+def _obey_parent_only() -> None:
+    """In a worker: leave Ctrl-C to the parent, and end with it, once compiled code returns."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # A command line handles these in the parent; the executor ends its processes with the first.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
-    parent = parent_process()
+    parent = multiprocessing.parent_process()
     if parent is not None:
 
         def watch() -> None:
