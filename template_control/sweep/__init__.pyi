@@ -1,5 +1,4 @@
 from .executor import workers as workers
-from .executor import workers as workers
 from .sweep import SweepOptions as SweepOptions
 from .sweep import SweepResult as SweepResult
 from .sweep import grid as grid
