@@ -102,7 +102,7 @@ import template_control.run.config, template_control.robustness.disturbances
 import template_control.robustness.campaigns.first_wrong, template_control.run.kinds.free
 print(*{name.split(".")[1] for name in sys.modules if name.startswith("template_control.")})
 """
-    rooms = set(_told(code, "0").split()) - {"code_cache"}  # of compiled code, not of results
+    rooms = set(_told(code, "0").split())
     assert "embedding" in rooms
     assert not rooms & set(fingerprint.WITHOUT)
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from types import CodeType
 from typing import Any
 
 from template_control.robot.biped import Biped
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _LETTERS = 10
-WITHOUT = ("cli", "code_cache", "paper", "sweep", "view")
+WITHOUT = ("cli", "paper", "sweep", "view")
 """Rooms that no trial's result depends on."""
 
 
@@ -44,9 +42,7 @@ def _code(package: Path) -> str:
         digest.update(str(place).encode())
         content = path.read_bytes()
         if path.suffix == ".py":
-            tree = _without_docstrings(ast.parse(content))
-            for part in _parts(compile(tree, "", "exec", dont_inherit=True)):
-                digest.update(part)
+            digest.update(ast.dump(_without_docstrings(ast.parse(content))).encode())
         else:
             digest.update(content)
     return digest.hexdigest()
@@ -68,26 +64,3 @@ def _is_text(statement: ast.AST) -> bool:
         and isinstance(statement.value, ast.Constant)
         and isinstance(statement.value.value, str)
     )
-
-
-def _parts(code: CodeType) -> Iterator[bytes]:
-    """What a code object does: its instructions, names and constants, without line numbers."""
-    yield code.co_code
-    yield code.co_exceptiontable
-    names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
-    counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
-    yield repr((code.co_name, names, counts)).encode()
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _parts(constant)
-        else:
-            yield _shown(constant).encode()
-
-
-def _shown(constant: object) -> str:
-    """A constant's text, which is the same in every process."""
-    if isinstance(constant, frozenset):
-        return str(sorted(map(_shown, constant)))
-    if isinstance(constant, tuple):
-        return str([_shown(entry) for entry in constant])
-    return repr(constant)
