@@ -28,7 +28,7 @@ from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.robot.biped import Biped
 from template_control.robot.free.free_biped import FreeBiped
-from template_control.robot.library import load_free_robot, load_robot
+from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import state_at_vlo, state_in
 from template_control.run.kinds.free import Free
@@ -89,7 +89,7 @@ def _running(robot: PlanarBiped, speed: float) -> tuple[EmbeddingController, Any
 
 def _free() -> tuple[EmbeddingController, Any, Any]:
     """As :func:`_walking`, of Bolt in space."""
-    kind = Free(load_free_robot("bolt"))
+    kind = Free(load_floating_robot("bolt"))
     gait = gait_at(template_for(kind.robot), np.radians(68.0), 0.6)
     route = SteadyRoute.of(gait)
     controller = kind.controller(LqrPlanner(gait), FreeOptions(), route, AUTOMATON)

@@ -22,7 +22,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=None, help="the whole figure if not given")
     parser.add_argument("--picture", default="eight.png")
     chosen = parser.parse_args()
-    bolt = tc.load_free_robot("bolt")
+    bolt = tc.load_floating_robot("bolt")
     gait = tc.gait_for_speed(tc.template_for(bolt), chosen.speed)
     around = 2.0 * np.pi / chosen.rate
     course = tc.Course(turning_rate=chosen.rate, turns=((around, -chosen.rate),))

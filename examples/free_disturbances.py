@@ -68,7 +68,7 @@ def main() -> None:
     parser.add_argument("--places", type=int, default=3, help="of steps up, and of steps down")
     parser.add_argument("--only", default="", help="trials whose names begin so")
     options = parser.parse_args()
-    robot = tc.load_free_robot(options.robot)
+    robot = tc.load_floating_robot(options.robot)
     gait = tc.robot_gait_for_speed(robot, options.speed)
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
     stood = back = count = 0

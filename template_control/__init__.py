@@ -17,9 +17,9 @@ until ``logging`` is told otherwise: ``logging.basicConfig(level=logging.INFO)``
 
 import logging
 
-import lazy_loader
+from template_control.deprecated import attach_stub
 
 # A library leaves it to its user whether and where its messages are seen.
 logging.getLogger(__name__).addHandler(logging.NullHandler())
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -28,7 +28,7 @@ from .plant.mujoco import MujocoOptions as MujocoOptions
 from .plant.terrain.terrain import Terrain as Terrain
 from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
-from .robot.library import load_free_robot as load_free_robot
+from .robot.library import load_floating_robot as load_floating_robot
 from .robot.library import load_robot as load_robot
 from .robot.planar_biped import PlanarBiped as PlanarBiped
 from .run.config import RunConfig as RunConfig

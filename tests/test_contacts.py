@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import template_control as tc
 from template_control.embedding import ContactOptions, EmbeddingOptions
 from template_control.embedding.contacts import ContactMonitor
-from template_control.robot.library import load_free_robot
+from template_control.robot.library import load_floating_robot
 from template_control.robot.start import state_at_vlo
 
 WEIGHT, DT = 785.0, 1e-3
@@ -136,7 +136,7 @@ def test_an_undisturbed_walk_is_the_same_whatever_the_doubt(robot, default_gait)
 @pytest.mark.slow(seconds=12)
 @pytest.mark.parametrize("name", ["bolt", "five-link-3d"])
 def test_a_free_robot_bears_wrong_flags(name):
-    robot = load_free_robot(name)
+    robot = load_floating_robot(name)
     sensors = tc.SensorOptions(contact_errors=0.02, seed=1)
     options = tc.SimulationOptions(steps=12, sensors=sensors, record_every=10)
     record = tc.simulate(robot, tc.LqrPlanner(tc.default_gait(robot)), options)

@@ -20,7 +20,7 @@ from template_control.robot import (
     JointLimits,
     SolidLink,
     free_state_in,
-    load_free_robot,
+    load_floating_robot,
     robot_path,
 )
 from template_control.run.options import SimulationOptions
@@ -79,7 +79,7 @@ def table():
 
 
 def test_the_shipped_one_is_written_of_its_table(load):
-    shipped, made = load_free_robot("five-link-3d"), load(table().urdf())
+    shipped, made = load_floating_robot("five-link-3d"), load(table().urdf())
     assert made.joint_names == shipped.joint_names
     np.testing.assert_array_equal(made.torque_limit, shipped.torque_limit)
     np.testing.assert_array_equal(made.velocity_limit, shipped.velocity_limit)
@@ -93,7 +93,7 @@ def test_the_shipped_one_is_written_of_its_table(load):
 
 
 def test_it_has_the_size_of_the_reference_template():
-    robot = load_free_robot("five-link-3d")
+    robot = load_floating_robot("five-link-3d")
     template = tc.template_for(robot)
     assert robot.mass == pytest.approx(80.0)
     assert template.rest_length == pytest.approx(1.0, abs=1e-5)
@@ -206,9 +206,9 @@ MISTAKES = {
     "hang on the same leg: name one of each": lambda _: FreeBiped.from_urdf(
         robot_path("five-link")
     ),
-    "is planar and cannot walk free": lambda _: load_free_robot("human"),
+    "is planar and cannot walk free": lambda _: load_floating_robot("human"),
     "the legs do not reach a CoM height of …": lambda _: start(
-        load_free_robot("five-link-3d"), 1.4
+        load_floating_robot("five-link-3d"), 1.4
     ),
     "a start at height … needs joint … beyond its limits": lambda _: start(
         limited(((-0.5, 0.5), (-1.0, 1.0), (0.0, 0.3)))
@@ -230,7 +230,7 @@ def test_a_mistake_gives_its_message(message, load):
 
 @pytest.mark.slow(seconds=20)
 def test_it_walks_within_all_its_limits():
-    robot = load_free_robot("five-link-3d")
+    robot = load_floating_robot("five-link-3d")
     gait = tc.robot_gait_for_speed(robot, 1.0)
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
     record = tc.simulate(robot, planner, tc.SimulationOptions(steps=20))

@@ -73,7 +73,7 @@ def test_an_outlook_is_what_the_bounds_leave():
 @pytest.mark.slow(seconds=15)
 def test_a_push_towards_the_foot_that_lands_is_taken():
     """10 N s at 80 kg to the right, as the right foot lands: the left one would have to cross."""
-    robot = tc.load_free_robot("five-link-3d")
+    robot = tc.load_floating_robot("five-link-3d")
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 1.0), tc.embedding.FREE_PLANNER)
     push = tc.Push(10.0, 4, 0.3, direction=radians(-90.0))
     record = tc.simulate(robot, planner, tc.SimulationOptions(steps=10, pushes=(push,)))

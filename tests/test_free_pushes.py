@@ -19,7 +19,7 @@ FORCE = (8.0, -5.0)  # [N] along x and y
 
 @pytest.fixture(scope="module")
 def bolt():
-    return tc.load_free_robot("bolt")
+    return tc.load_floating_robot("bolt")
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ RADIUS = 0.01  # of the feet
 @pytest.fixture(scope="module")
 def record():
     """Three steps of the robot of human size, in a turn."""
-    robot = tc.load_free_robot("five-link-3d")
+    robot = tc.load_floating_robot("five-link-3d")
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 1.0), tc.embedding.FREE_PLANNER)
     course = tc.Course(turning_rate=0.4)
     return tc.simulate(robot, planner, tc.SimulationOptions(steps=3, course=course))

@@ -14,17 +14,17 @@ from template_control.plant.free.mujoco import FreeMujocoPlant
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.free.free_biped import FreeBiped, JointLimits
 from template_control.robot.free.start import FreePose, free_state_in
-from template_control.robot.library import FREE_ROBOTS, load_free_robot, robot_path
+from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
 
 
 @pytest.fixture(scope="module")
 def bolt():
-    return load_free_robot("bolt")
+    return load_floating_robot("bolt")
 
 
-@pytest.fixture(scope="module", params=FREE_ROBOTS)
+@pytest.fixture(scope="module", params=FLOATING_ROBOTS)
 def free_robot(request):
-    return load_free_robot(request.param)
+    return load_floating_robot(request.param)
 
 
 def states(robot, count=10):
@@ -230,7 +230,7 @@ def test_ranges_are_given_for_every_joint_of_a_leg():
 
 def test_a_planar_robot_is_not_free():
     with pytest.raises(RobotError, match="'five-link' is planar"):
-        load_free_robot("five-link")
+        load_floating_robot("five-link")
     with pytest.raises(RobotError, match="the same leg"):
         FreeBiped.from_urdf(robot_path("five-link"))
 

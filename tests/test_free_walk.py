@@ -11,7 +11,7 @@ from template_control.cli.main import main
 from template_control.cli.options.world import simulation_choice
 from template_control.cli.report.run_table import in_space
 from template_control.errors import ParameterError
-from template_control.robot.library import load_free_robot
+from template_control.robot.library import load_floating_robot
 from template_control.run.data_frame import columns
 from template_control.run.kinds.any_record import load_record
 from template_control.run.summary import summarise
@@ -20,7 +20,7 @@ STEPS = 12
 
 
 def walked(course=None, steps=STEPS):
-    robot = load_free_robot("bolt")
+    robot = load_floating_robot("bolt")
     gait = tc.gait_at(tc.template_for(robot), np.radians(68.0), 0.6)
     options = tc.SimulationOptions(steps=steps, course=course or tc.Course())
     return tc.simulate(robot, tc.LqrPlanner(gait), options), gait
@@ -57,7 +57,7 @@ def test_bolt_walks_free(straight):
 @pytest.mark.slow(seconds=15)
 def test_bolt_walks_slowly_too():
     """It fell at step 18 while the search priced no controls, and trusted the closed form."""
-    robot = load_free_robot("bolt")
+    robot = load_floating_robot("bolt")
     gait = tc.gait_for_speed(tc.template_for(robot), 0.4)
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
     record = tc.simulate(robot, planner, tc.SimulationOptions(steps=40, course=tc.Course()))
@@ -118,7 +118,7 @@ def test_the_command_line_tells_a_course(refused, understood):
 
 @pytest.mark.slow(seconds=20)
 def test_bolt_changes_its_speed_on_command():
-    robot = load_free_robot("bolt")
+    robot = load_floating_robot("bolt")
     command = tc.SpeedProfile(times=(0.0, 1.0, 4.0), speeds=(0.5, 0.5, 0.65))
     route = tc.SpeedRoute(tc.template_for(robot), command)
     record = tc.simulate(robot, route, tc.SimulationOptions(steps=20))
@@ -162,7 +162,7 @@ def test_a_joint_past_its_limit_is_told():
 def test_what_a_free_robot_cannot_do_is_refused(refused):
     assert "five-link" in refused(["walk", "--free", "--steps", "2"])
     assert "course" in refused(["walk", "--turn", "0.2", "--steps", "2"])
-    robot = load_free_robot("bolt")
+    robot = load_floating_robot("bolt")
     planner = tc.LqrPlanner(tc.default_gait(robot))
     for options, culprit in (
         (tc.SimulationOptions(plant=tc.IdealOptions()), "ideal"),

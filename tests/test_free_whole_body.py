@@ -9,7 +9,7 @@ import pytest
 from template_control.embedding.free.options import FreeOptions
 from template_control.errors import ParameterError
 from template_control.robot.free.start import FreePose, free_state_in
-from template_control.robot.library import load_free_robot, load_robot
+from template_control.robot.library import load_floating_robot, load_robot
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.foot_task import FootTask
@@ -36,7 +36,7 @@ STANCES = {0: (), 1: (0,), 2: (0, 1)}
 
 @pytest.fixture(scope="module")
 def bolt():
-    return load_free_robot("bolt")
+    return load_floating_robot("bolt")
 
 
 def standing(robot, rng):

@@ -12,7 +12,7 @@ from template_control.errors import RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
-from template_control.robot.library import load_free_robot, load_robot, robot_path
+from template_control.robot.library import load_floating_robot, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.options import SimulationOptions
 from template_control.run.simulation import simulate
@@ -389,7 +389,7 @@ def test_a_robot_in_millimetres_is_refused(load, five_link):
 
 
 def test_the_text_of_a_urdf_is_no_name(five_link):
-    for load_it in (load_robot, load_free_robot):
+    for load_it in (load_robot, load_floating_robot):
         with pytest.raises(RobotError, match="not the URDF's text") as error:
             load_it(five_link)
         assert len(str(error.value)) < 200

@@ -18,7 +18,7 @@ comma, path = sys.argv[1] == "comma", sys.argv[2]
 if comma:
     locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
 import template_control as tc
-from template_control.robot import load_free_robot
+from template_control.robot import load_floating_robot
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.plant.free.mujoco import FreeMujocoPlant
 
@@ -37,7 +37,7 @@ for world in worlds:
                          tc.SimulationOptions(steps=2, plant=world))
     bits = hashlib.sha256(record.q.tobytes() + record.contact_force.tobytes()).hexdigest()
     found[world.kind] = [record.steps, bits]
-free = load_free_robot("bolt")
+free = load_floating_robot("bolt")
 for plant in (FreeBulletPlant(free, tc.PlantOptions()), FreeMujocoPlant(free, tc.MujocoOptions())):
     q, v, force = free.neutral(), np.zeros(free.nv), np.zeros((2, 3))
     q[2], felt = 0.5, []

@@ -22,7 +22,7 @@ BOTH = np.ones(2, dtype=bool)
 
 @pytest.fixture(scope="module")
 def bolt():
-    return tc.load_free_robot("bolt")
+    return tc.load_floating_robot("bolt")
 
 
 def moving(robot, seed=3):

@@ -288,7 +288,7 @@ def test_unknown_disturbances_are_named():
 
 
 def test_a_free_robot_is_pushed_aside_too():
-    bolt = tc.load_free_robot("bolt")
+    bolt = tc.load_floating_robot("bolt")
     gait = tc.robot_gait_for_speed(bolt, 0.55)
     where = Situation(bolt, gait, LqrPlanner(gait, tc.embedding.FREE_PLANNER))
     turned = {d.name: d.options(where, 0.1, 3).pushes[0].direction for d in ASIDE}

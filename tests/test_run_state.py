@@ -33,7 +33,7 @@ def _count_resets(planner):
 @pytest.mark.parametrize("kind", ["planar walk", "planar run", "free walk"])
 def test_a_run_begins_once(kind):
     free = kind == "free walk"
-    robot = tc.load_free_robot("bolt") if free else tc.load_robot("five-link")
+    robot = tc.load_floating_robot("bolt") if free else tc.load_robot("five-link")
     parameters = tc.template_for(robot)
     if kind == "planar run":
         planner = RunningPlanner(running_gait(parameters, 2.5))

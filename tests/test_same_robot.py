@@ -12,9 +12,9 @@ from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.library import (
-    FREE_ROBOTS,
+    FLOATING_ROBOTS,
     ROBOTS,
-    load_free_robot,
+    load_floating_robot,
     load_robot,
     robot_path,
 )
@@ -86,10 +86,10 @@ def written(tmp_path):
 
 
 @pytest.mark.parametrize("engine", FREE)
-@pytest.mark.parametrize("name", FREE_ROBOTS)
+@pytest.mark.parametrize("name", FLOATING_ROBOTS)
 def test_a_shipped_free_robot_falls_as_its_model(name, engine):
     plant, options = FREE[engine]
-    robot = load_free_robot(name)
+    robot = load_floating_robot(name)
     falls_as_pinocchio_says(robot, plant(robot, options(time_step=DT)))
 
 

@@ -38,6 +38,7 @@ SLIP_STAGES = (
 SHARED = (
     "checks",
     "compiled",
+    "deprecated",
     "errors",
     "file_lock",
     "settings",

@@ -63,9 +63,9 @@ def basins() -> None:
 
 def floating_base() -> None:
     """Terms of a robot with a floating base."""
-    from template_control.robot.library import load_free_robot
+    from template_control.robot.library import load_floating_robot
 
-    robot = load_free_robot("five-link-3d")
+    robot = load_floating_robot("five-link-3d")
     robot.update(robot.neutral(), 0.0 * robot.model.velocityLimit)
 
 

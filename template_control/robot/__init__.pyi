@@ -8,9 +8,9 @@ from .free.free_five_link import FreeFiveLink as FreeFiveLink
 from .free.free_five_link import HipBlock as HipBlock
 from .free.start import FreePose as FreePose
 from .free.start import free_state_in as free_state_in
-from .library import FREE_ROBOTS as FREE_ROBOTS
+from .library import FLOATING_ROBOTS as FLOATING_ROBOTS
 from .library import ROBOTS as ROBOTS
-from .library import load_free_robot as load_free_robot
+from .library import load_floating_robot as load_floating_robot
 from .library import load_robot as load_robot
 from .library import robot_path as robot_path
 from .planar_biped import PlanarBiped as PlanarBiped

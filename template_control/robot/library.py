@@ -83,8 +83,8 @@ _ENTRIES = {
 ROBOTS: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
 """Names that :func:`load_robot` knows, with a line about each."""
 
-FREE_ROBOTS = tuple(name for name, entry in _ENTRIES.items() if entry.free)
-"""Names that :func:`load_free_robot` knows."""
+FLOATING_ROBOTS = tuple(name for name, entry in _ENTRIES.items() if entry.free)
+"""Names that :func:`load_floating_robot` knows."""
 
 
 @checked
@@ -156,7 +156,7 @@ def load_robot(name: str | Path) -> PlanarBiped:
 
 
 @checked
-def load_free_robot(name: str | Path) -> FreeBiped:
+def load_floating_robot(name: str | Path) -> FreeBiped:
     """A shipped robot by name, or any biped by the path of its URDF, that nothing holds.
 
     Raises:
@@ -168,8 +168,8 @@ def load_free_robot(name: str | Path) -> FreeBiped:
     path, entry = robot_path(text), _ENTRIES[text]
     if not entry.free:
         raise RobotError(
-            f"robot {text!r} is planar and cannot walk free: give one of {list(FREE_ROBOTS)} or a"
-            " URDF file"
+            f"robot {text!r} is planar and cannot walk free: give one of {list(FLOATING_ROBOTS)} or"
+            " a URDF file"
         )
     return FreeBiped.from_urdf(
         path, entry.feet, entry.foot_radius, limits=entry.limits, walk=entry.walk

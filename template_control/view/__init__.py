@@ -1,5 +1,5 @@
 """Figures, pages and films of recorded runs."""
 
-import lazy_loader
+from template_control.deprecated import attach_stub
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

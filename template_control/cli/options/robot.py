@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from template_control.checks import typed
 from template_control.checks.option_types import number
 from template_control.checks.ranges import Range
-from template_control.robot.library import FREE_ROBOTS, ROBOTS
+from template_control.robot.library import FLOATING_ROBOTS, ROBOTS
 from template_control.run.choices.robot import RobotChoice
 
 _DEFAULT = RobotChoice().model
@@ -29,8 +29,8 @@ def add_robot_options(parser: argparse.ArgumentParser) -> None:
         "--free",
         action="store_const",
         const=True,
-        help=f"nothing holds the robot: it walks in space, as {', '.join(FREE_ROBOTS)} can, and 3D"
-        " URDFs of two legs with hip ab- and adduction",
+        help=f"nothing holds the robot: it walks in space, as {', '.join(FLOATING_ROBOTS)} can, and"
+        " 3D URDFs of two legs with hip ab- and adduction",
     )
     own = parser.add_argument_group("a URDF of your own")
     own.add_argument(

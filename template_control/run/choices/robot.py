@@ -9,7 +9,7 @@ from template_control.checks.checked import Checked
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.free.free_biped import FreeBiped
-from template_control.robot.library import ROBOTS, load_free_robot, load_robot
+from template_control.robot.library import ROBOTS, load_floating_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 
 
@@ -56,7 +56,7 @@ class RobotChoice(Checked):
         }
         given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
         if not given:
-            return load_free_robot(self.model) if self.free else load_robot(self.model)
+            return load_floating_robot(self.model) if self.free else load_robot(self.model)
         if self.model in ROBOTS:
             names = ", ".join(name.replace("_", " ") for name in given)
             raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")

@@ -17,5 +17,5 @@ def spatial(robot: Biped) -> FreeBiped:
         return robot
     raise ParameterError(
         f"robot {robot.name} is held in its plane, and a task in space asks for a free one: take"
-        " load_free_robot, or tasks of the plane"
+        " load_floating_robot, or tasks of the plane"
     )

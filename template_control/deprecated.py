@@ -1,0 +1,41 @@
+"""Deprecated public names, which keep working for one version."""
+
+from __future__ import annotations
+
+import importlib
+import warnings
+from collections.abc import Callable
+
+import lazy_loader
+
+DEPRECATED = {
+    "template_control.load_free_robot": "template_control:load_floating_robot",
+    "template_control.robot.FREE_ROBOTS": "template_control.robot:FLOATING_ROBOTS",
+    "template_control.robot.load_free_robot": "template_control.robot:load_floating_robot",
+}
+"""Old name -> new one, as "package:name" of a public package."""
+
+
+def attach_stub(
+    package: str, file: str
+) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+    """As ``lazy_loader.attach_stub``; a deprecated name gives a DeprecationWarning and its object.
+
+    Args:
+        package: the package's ``__name__``.
+        file: the package's ``__file__``, beside its stub of the public names.
+
+    Returns:
+        The package's ``__getattr__``, ``__dir__`` and ``__all__``.
+    """
+    attribute, directory, names = lazy_loader.attach_stub(package, file)
+
+    def attribute_or_deprecated(name: str) -> object:
+        old = f"{package}.{name}"
+        if old not in DEPRECATED:
+            return attribute(name)
+        home, _, new = DEPRECATED[old].partition(":")
+        warnings.warn(f"{old} is deprecated: use {home}.{new}", DeprecationWarning, stacklevel=2)
+        return getattr(importlib.import_module(home), new)
+
+    return attribute_or_deprecated, directory, names

@@ -1,0 +1,42 @@
+"""Deprecated public names: each still works, warns at the caller's line, and names the new one."""
+
+import importlib
+
+import pytest
+
+from template_control.deprecated import DEPRECATED
+
+OLD_NAMES = {
+    "template_control.load_free_robot",
+    "template_control.robot.FREE_ROBOTS",
+    "template_control.robot.load_free_robot",
+}
+
+
+def test_no_deprecated_name_is_lost():
+    assert set(DEPRECATED) == OLD_NAMES
+
+
+@pytest.mark.parametrize("old", sorted(OLD_NAMES))
+def test_a_deprecated_name_is_the_new_object_and_warns(old):
+    package, _, name = old.rpartition(".")
+    home, _, new = DEPRECATED[old].partition(":")
+    home, package = importlib.import_module(home), importlib.import_module(package)
+    assert new in home.__all__
+    assert name not in package.__all__
+    with pytest.warns(DeprecationWarning, match=f"use {home.__name__}.{new}$") as caught:
+        assert getattr(package, name) is getattr(home, new)
+    assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_an_import_of_a_deprecated_name_warns_at_its_line():
+    with pytest.warns(DeprecationWarning, match="load_floating_robot") as caught:
+        from template_control import load_free_robot  # noqa: F401
+    assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_an_unknown_name_is_no_attribute():
+    import template_control
+
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = template_control.no_such_name
