@@ -109,7 +109,7 @@ def test_a_run_is_repeated_by_its_file(ran, record, tmp_path):
     [
         (["--speed", "9"], "no running gait has 9 m/s at its apex: give a speed from 1.2 to 5 m/s"),
         (["--speed", "0.8"], "no running gait has 0.8 m/s at its apex"),
-        (["--speed", "9", "--robot", "bolt"], "give a speed from 0.718 to 3 m/s"),
+        (["--speed", "9", "--robot", "bolt"], "give a speed from 0.72 to 2.99 m/s"),
         (
             ["--speed", "2", "--apex", "3"],
             "five-link cannot run at 2 m/s with its apex at 3 m: give",

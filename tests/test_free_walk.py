@@ -113,7 +113,7 @@ def test_the_command_line_tells_a_course(refused, understood):
     wanted = simulation_choice(understood(line), tc.SimulationOptions(), ends=False).course
     assert wanted == tc.Course(turning_rate=0.3, turns=((2.0, -0.2), (5.0, 0.0)))
     told = refused(["walk", "--robot", "bolt", "--free", "--turn", "left", "--steps", "1"])
-    assert "RATE@TIME" in told
+    assert "--turn left: rate is 'left': give a number" in told
 
 
 @pytest.mark.slow(seconds=20)

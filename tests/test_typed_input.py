@@ -37,7 +37,7 @@ def option_actions(command):
 
 
 NUMBERS = [
-    (command, action.option_strings[0], 2 if action.nargs == 2 else 1)
+    (command, action.option_strings[0], action.nargs if isinstance(action.nargs, int) else 1)
     for command in _COMMANDS
     for action in option_actions(command)
     if action.type is not None and "path" not in getattr(action.type, "__name__", "")
@@ -65,8 +65,8 @@ def test_no_option_reads_its_value_in_a_way_of_its_own():
 def test_a_number_that_is_none_names_its_option(text, refused):
     for command, flag, count in NUMBERS:
         words = [command, *POSITIONALS.get(command, ()), *[f"{flag}={text}"]]
-        if count == 2:
-            words = [command, *POSITIONALS.get(command, ()), flag, f" {text}", "1"]
+        if count > 1:
+            words = [*words[:-1], flag, f" {text}", *["1"] * (count - 1)]
         line = refused(words)
         assert re.search(rf"{flag} is '? ?{text}'?: give a", line), line
         assert not INTERNAL.search(line)

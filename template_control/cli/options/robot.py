@@ -61,7 +61,7 @@ def add_robot_options(parser: argparse.ArgumentParser) -> None:
     )
     own.add_argument(
         "--foot-offset",
-        type=float,
+        type=number(Range(-1.0, 1.0)),
         nargs=3,
         metavar=("X", "Y", "Z"),
         help="of these spheres' centres from the foot links' origins, in the links' axes [m]",

@@ -106,7 +106,8 @@ def sticks(record: Record, model: pin.Model) -> list[pin.GeometryObject]:
     made = []
     for leg, foot, color in zip(joints, m["feet"], (LEFT, RIGHT), strict=True):
         ends = [model.jointPlacements[joint].translation for joint in leg[1:]]
-        ends.append(model.frames[model.getFrameId(foot)].placement.translation)
+        frame = model.getFrameId(foot, pin.FrameType.BODY)
+        ends.append(model.frames[frame].placement.translation)
         made += [
             _stick(model, joint, np.zeros(3), end, radius, color)
             for joint, end in zip(leg, ends, strict=True)
