@@ -12,6 +12,7 @@ DEPRECATED = {
     "template_control.load_free_robot": "template_control:load_floating_robot",
     "template_control.robot.FREE_ROBOTS": "template_control.robot:FLOATING_ROBOTS",
     "template_control.robot.load_free_robot": "template_control.robot:load_floating_robot",
+    "template_control.whole_body.Wanted": "template_control.whole_body:References",
 }
 """Old name -> new one, as "package:name" of a public package."""
 

@@ -10,6 +10,7 @@ OLD_NAMES = {
     "template_control.load_free_robot",
     "template_control.robot.FREE_ROBOTS",
     "template_control.robot.load_free_robot",
+    "template_control.whole_body.Wanted",
 }
 
 

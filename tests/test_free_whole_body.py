@@ -11,13 +11,9 @@ from template_control.errors import ParameterError
 from template_control.robot.free.start import FreePose, free_state_in
 from template_control.robot.library import load_floating_robot, load_robot
 from template_control.slip.automaton.vocabulary import Leg
-from template_control.whole_body.com_task import ComTask
-from template_control.whole_body.foot_task import FootTask
-from template_control.whole_body.free.orientation_task import OrientationTask
-from template_control.whole_body.free.side_foot_task import SideFootTask
 from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
-from template_control.whole_body.task import DESIRED, WEIGHT, TaskStack
-from template_control.whole_body.wanted import Wanted
+from template_control.whole_body.task import DESIRED, WEIGHT, References, TaskStack
+from template_control.whole_body.tasks import ComTask, FootTask, OrientationTask, SideFootTask
 
 FRICTION = 0.6
 OPTIONS = QpOptions(
@@ -79,9 +75,9 @@ def test_a_joint_near_an_end_of_its_range_brakes(bolt):
 
 def solve(robot, rng, feet, qp, scale):
     standing(robot, rng)
-    stack, wanted = TaskStack(TASKS[feet], robot.nv), Wanted()
-    wanted.com_now[:] = *robot.com, *robot.com_velocity
-    stack.write(robot, wanted)
+    stack, references = TaskStack(TASKS[feet], robot.nv), References()
+    references.com_now[:] = *robot.com, *robot.com_velocity
+    stack.write(robot, references)
     rows = stack.table[:, robot.nv + DESIRED]
     rows[:] = rng.normal(0.0, scale, len(rows))
     forces = np.tile([0.0, 0.0, 12.3 / max(feet, 1)], feet)
@@ -143,7 +139,7 @@ def test_rows_match_finite_differences(bolt):
         rate = (measured(h) - measured(-h)) / (2.0 * h)
         bolt.update(q, v)
         stack = TaskStack(tasks, bolt.nv)
-        stack.write(bolt, Wanted())
+        stack.write(bolt, References())
         rows = stack.table[:, : bolt.nv] @ a + stack.table[:, bolt.nv]
         np.testing.assert_allclose(rows, rate, atol=1e-5)
     bolt.face(0.0, np.zeros(2))
@@ -155,10 +151,10 @@ def test_orientation_and_side_ask_for_their_way_back(bolt):
     q = bolt.neutral()
     q[3:7] = pin.Quaternion(pin.exp3(np.array([0.02, -0.03, 0.04]))).coeffs()
     bolt.update(q, np.zeros(bolt.nv))
-    wanted = Wanted()
-    wanted.side[0] = bolt.space.foot[0, 1] + 0.01, 0.0, 0.5
+    references = References()
+    references.side[0] = bolt.space.foot[0, 1] + 0.01, 0.0, 0.5
     stack = TaskStack((OrientationTask(), SideFootTask(Leg.REAR)), bolt.nv)
-    stack.write(bolt, wanted)
+    stack.write(bolt, references)
     desired = stack.table[:, bolt.nv + DESIRED]
     np.testing.assert_allclose(desired, [-2.0, 3.0, -36.0 * 0.04, 0.5 + 600.0 * 0.01], atol=0.1)
 
@@ -167,4 +163,4 @@ def test_a_planar_robot_has_no_tasks_in_space():
     robot = load_robot("five-link")
     stack = TaskStack((OrientationTask(),), robot.nv)
     with pytest.raises(ParameterError, match="held in its plane"):
-        stack.write(robot, Wanted())
+        stack.write(robot, References())

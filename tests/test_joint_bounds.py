@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from template_control.robot.joint_reserve import joint_reserve
-from template_control.whole_body.joint_bounds import JointBounds, JointTuning
+from template_control.whole_body.solver import JointBounds, QpOptions
 
 RANGES = np.array([[-2.0, 1.5], [0.0, 2.5]])
 LIMITS = np.array([10.0, 20.0])
-TUNING = JointTuning(speed_share=0.8, speed_horizon=0.02, stop_share=0.4, stop_horizon=0.05)
+TUNING = QpOptions(speed_share=0.8, speed_horizon=0.02, stop_share=0.4, stop_horizon=0.05)
 
 turning = st.floats(-30.0, 30.0, allow_subnormal=False)
 angles = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)).map(np.array)

@@ -18,7 +18,7 @@ from template_control.run.record import Record, recorded
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Phase
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.scenario.route import SteadyRoute, StrideGoal
-from template_control.whole_body.com_task import ComTask
+from template_control.whole_body.tasks import ComTask
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 OPTIONS = tc.SimulationOptions(steps=4, record_every=10)
@@ -152,8 +152,8 @@ class Task(ComTask):
 
     number = 0.0
 
-    def write(self, robot, wanted, rows):
-        super().write(robot, wanted, rows)
+    def write(self, robot, references, rows):
+        super().write(robot, references, rows)
         if robot.com[0] > 0.8:
             rows.desired[0] = self.number() if callable(self.number) else self.number
 

@@ -27,10 +27,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
 from template_control.view.figures import FIGURES, save_figures
-from template_control.whole_body.com_task import ComTask
-from template_control.whole_body.foot_task import FootTask
-from template_control.whole_body.momentum_task import MomentumTask
-from template_control.whole_body.posture_task import PostureTask
+from template_control.whole_body.tasks import ComTask, FootTask, MomentumTask, PostureTask
 
 P = SlipParameters(leg_stiffness=25e3)
 HEIGHT = 1.02  # of the apex [m]
@@ -86,8 +83,8 @@ class TuckedFoot:
     def weights(self):
         return (self.weight, self.weight)
 
-    def write(self, robot, wanted, rows):
-        foot, (kp, kd) = wanted.feet[self.leg], self.gains
+    def write(self, robot, references, rows):
+        foot, (kp, kd) = references.feet[self.leg], self.gains
         rows.jacobian[:] = robot.foot_jacobian[foot] - robot.com_jacobian
         rows.bias[:] = robot.foot_bias[foot] - robot.com_bias
         away = robot.com + self.place - robot.foot_position[foot]

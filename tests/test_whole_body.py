@@ -8,15 +8,17 @@ import pytest
 
 from template_control.robot.library import load_robot
 from template_control.slip.automaton.vocabulary import Leg
-from template_control.whole_body.com_task import ComTask
-from template_control.whole_body.foot_task import FootTask
-from template_control.whole_body.momentum_task import MomentumTask
-from template_control.whole_body.portable_proxqp import load_proxqp
-from template_control.whole_body.posture_task import PostureTask
 from template_control.whole_body.problem import rows_per_foot
-from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
-from template_control.whole_body.task import DESIRED, WEIGHT, TaskStack
-from template_control.whole_body.wanted import Wanted
+from template_control.whole_body.solver import (
+    FORCE_COST,
+    TORQUE_COST,
+    QpOptions,
+    Stance,
+    WholeBodyQp,
+    load_proxqp,
+)
+from template_control.whole_body.task import DESIRED, WEIGHT, References, TaskStack
+from template_control.whole_body.tasks import ComTask, FootTask, MomentumTask, PostureTask
 
 FRICTION = 0.6
 OPTIONS = QpOptions(friction=FRICTION, friction_margin=1.0)
@@ -32,9 +34,9 @@ STANCES = {0: (), 1: (0,), 2: (0, 1)}
 def written(robot, feet, rng=None, scale=0.0):
     """The rows of a phase's tasks, with random wanted accelerations."""
     stack = TaskStack(TASKS[feet], 7)
-    wanted = Wanted()
-    wanted.com_now[:] = *robot.com, *robot.com_velocity
-    stack.write(robot, wanted)
+    references = References()
+    references.com_now[:] = *robot.com, *robot.com_velocity
+    stack.write(robot, references)
     rows = stack.table[:, 7 + DESIRED]
     rows[:] = 0.0 if rng is None else rng.normal(0.0, scale, len(rows))
     return stack
@@ -109,9 +111,9 @@ def test_optimum_is_that_of_the_full_problem(robot, feet):
             hessian[a, a] += w * np.outer(t, t)
             gradient[a] += w * t * (row_bias - wanted)
         scale = (robot.mass * robot.gravity) ** 2
-        hessian[f, f] += OPTIONS.force_cost / scale * np.eye(m)
-        gradient[f] -= OPTIONS.force_cost / scale * reference
-        hessian[tau, tau] += OPTIONS.torque_cost / 350.0**2 * np.eye(4)
+        hessian[f, f] += FORCE_COST / scale * np.eye(m)
+        gradient[f] -= FORCE_COST / scale * reference
+        hessian[tau, tau] += TORQUE_COST / 350.0**2 * np.eye(4)
         equal = np.zeros((7 + m, n))
         equal[:7, a], equal[:7, f] = robot.mass_matrix, -jacobian.T
         equal[3:7, tau] = -np.eye(4)
@@ -303,9 +305,9 @@ def test_task_rows_are_the_rates_of_what_they_move(robot, random_states, task):
             robot.update(q + v * t + 0.5 * a * t * t, v + a * t)
             seen.append(quantity_of(task, robot))
         robot.update(q, v)
-        stack, wanted = TaskStack((task,), 7), Wanted()
-        wanted.com_now[:] = *robot.com, *robot.com_velocity
-        stack.write(robot, wanted)
+        stack, references = TaskStack((task,), 7), References()
+        references.com_now[:] = *robot.com, *robot.com_velocity
+        stack.write(robot, references)
         rate = (seen[1] - seen[0]) / (2.0 * h)
         rows = stack.table[:, :7] @ a + stack.table[:, 7]
         np.testing.assert_allclose(rows, rate, rtol=2e-6, atol=2e-5)
@@ -331,16 +333,16 @@ def test_a_flying_robot_keeps_its_momentum(robot):
 def test_a_foot_is_held_where_its_leg_would_go_straight(robot):
     q, v = standing(np.random.default_rng(11))
     robot.update(q, v)
-    stack, wanted = TaskStack((FootTask(Leg.FRONT),), 7), Wanted()
+    stack, references = TaskStack((FootTask(Leg.FRONT),), 7), References()
     position = robot.foot_position[1]
-    wanted.foot[1, :, 0] = position + [0.3, 0.0]
-    stack.write(robot, wanted)
+    references.foot[1, :, 0] = position + [0.3, 0.0]
+    stack.write(robot, references)
     free = stack.table[0, 7 + DESIRED]
-    wanted.furthest[1] = position[0]
-    stack.write(robot, wanted)
+    references.furthest[1] = position[0]
+    stack.write(robot, references)
     assert free > 100.0
     held = stack.table[0, 7 + DESIRED]
-    assert held == pytest.approx(200.0 * (wanted.hip_speed - robot.foot_velocity[1, 0]))
+    assert held == pytest.approx(200.0 * (references.hip_speed - robot.foot_velocity[1, 0]))
 
 
 def test_the_same_problem_gives_the_same_bits_wherever_it_lies_in_memory():

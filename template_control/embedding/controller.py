@@ -67,7 +67,7 @@ class EmbeddingController(AutomatonFollower):
         o = scaled(options or EmbeddingOptions(), Scale.of(route.parameters))
         super().__init__(robot, planners, o, route, automaton)
         self.qp = WholeBodyQp(robot, o)
-        self._in_air = FeetInAir(robot, self.feet, self.contacts, self.wanted)
+        self._in_air = FeetInAir(robot, self.feet, self.contacts, self.references)
 
     def tick(
         self,
@@ -125,24 +125,24 @@ class EmbeddingController(AutomatonFollower):
 
     def _swing(self, q: Array, v: Array, dt: float) -> None:
         """Move the references of the feet in the air towards their footholds."""
-        hips, self.wanted.hip_speed = self.robot.hips(q, v)
+        hips, self.references.hip_speed = self.robot.hips(q, v)
         station, time = self.station, self.place.time
         self._in_air.advance(station, self.planning, self.sensing, time, hips, dt)
 
     def _track(self, q: Array, v: Array, dt: float) -> None:
         """Let the phase's tasks write what they ask for."""
-        s, wanted, station = self.sensing.now, self.wanted, self.station
-        wanted.com_now[:] = s.state
-        wanted.com_now[0] -= s.toes[0]
-        wanted.com_push = self.learners.trim.acceleration if station.control.trims else 0.0
+        s, references, station = self.sensing.now, self.references, self.station
+        references.com_now[:] = s.state
+        references.com_now[0] -= s.toes[0]
+        references.com_push = self.learners.trim.acceleration if station.control.trims else 0.0
         pitch, turning = self.robot.trunk(q, v)
-        wanted.pitch_now[0], wanted.pitch_now[1] = pitch, turning
+        references.pitch_now[0], references.pitch_now[1] = pitch, turning
         tilt = self.frame.angle  # the trunk is held by the vertical
-        wanted.pitch = self.learners.lean.advance(pitch - tilt, dt) + tilt
-        wanted.feet = self.feet.of
-        station.tasks.write(self.robot, wanted)
+        references.pitch = self.learners.lean.advance(pitch - tilt, dt) + tilt
+        references.feet = self.feet.of
+        station.tasks.write(self.robot, references)
         if station.control.weighs and station.com is not None:
-            self.learners.load.observe(station.com.lift(wanted), dt)
+            self.learners.load.observe(station.com.lift(references), dt)
 
     def _stance(self) -> Stance:
         """The feet on the ground, the template's forces on them, and how far they unload."""

@@ -15,11 +15,8 @@ from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Leg, Phase
-from template_control.whole_body.com_task import ComTask
-from template_control.whole_body.foot_task import FootTask
-from template_control.whole_body.momentum_task import MomentumTask
-from template_control.whole_body.posture_task import PostureTask
 from template_control.whole_body.task import Task
+from template_control.whole_body.tasks import ComTask, FootTask, MomentumTask, PostureTask
 
 
 class Clock(StrEnum):

@@ -15,8 +15,8 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Leg, Phase
-from template_control.whole_body.com_task import ComTask
 from template_control.whole_body.task import TaskStack
+from template_control.whole_body.tasks import ComTask
 
 Array = NDArray[np.float64]
 

@@ -191,7 +191,7 @@ class Recorder:
         swing = self._swing[row]
         swing[:] = np.nan
         for leg in station.control.swings:
-            swing[feet[leg]] = c.frame.world(c.wanted.foot[feet[leg], :, 0])
+            swing[feet[leg]] = c.frame.world(c.references.foot[feet[leg], :, 0])
         self._before = time
         self.ticks += 1
         if self.ticks - self._block_start == _BLOCK:

@@ -239,8 +239,8 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
     """Write the joint torques of the QP's solution, tau_max * (L^-T w), into ``out``.
 
     They are kept within tau_max and rounded to 2^-24 of it, which is near ProxQP's tolerance.
-    Where a process has loaded another build of ProxQP than :mod:`.portable_proxqp` does, the last
-    digits of the solution depend on where its workspace happens to lie in memory; without the
+    Where a process has loaded another build of ProxQP than :func:`.solver.load_proxqp` does, the
+    last digits of the solution depend on where its workspace happens to lie in memory; without the
     rounding such a walk would not be the same twice.
 
     Args:

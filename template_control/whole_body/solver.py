@@ -6,13 +6,23 @@ ProxQP is asked where a limit acts. Elsewhere the minimum is known without it
 A joint near its limit of speed, or fast before its stop, has its acceleration bounded, in a
 workspace with these further rows. Where the motors cannot slow down so much, it shall not get
 faster; where they cannot do that either, the tick is solved without these rows.
+
+ProxQP is that built for any processor: the same problem gives the same bits each time. The builds
+with wider vector instructions sum in an order that depends on where in memory a solver happens to
+lie. Near the edge of what has a solution, the last bits decide; a run that is repeated with the
+same seed would then fall at another moment. For the small problems of a tick these builds are no
+faster.
 """
 
 from __future__ import annotations
 
 import logging
+import os
+import sys
 import time
 from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,8 +32,6 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import RATE, TIME, tuned
-from template_control.whole_body.joint_bounds import JointBounds, JointTuning
-from template_control.whole_body.portable_proxqp import load_proxqp
 from template_control.whole_body.problem import (
     FREE,
     SINGULAR,
@@ -39,20 +47,54 @@ Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 
+BUILD = "TEMPLATE_CONTROL_PROXQP"
+"""Environment variable: ``native`` leaves the build to proxsuite, as if it was imported alone."""
+
+FORCE_COST = 1e-3
+"""Of the contact forces' distance from the template's, per (m g)^2.
+
+Small: in double stance it chooses between forces that serve the tasks alike.
+"""
+
+TORQUE_COST = 1e-4
+"""Of the joint torques, per squared limit. Smaller: it only makes the optimum unique."""
+
+_CHECKS = "proxsuite.instructionset"
+"""Where proxsuite asks, while it is imported, which of its builds the processor can run."""
+
+
+def load_proxqp() -> Any:
+    """ProxQP of proxsuite's portable build.
+
+    The first robot's QP of a process calls it, not an import of this library. An import of
+    proxsuite later in the process gets this build too: only one can be loaded. Of a process that
+    has imported proxsuite before, the build that it chose is taken. The log says so.
+    """
+    if "proxsuite" not in sys.modules and os.environ.get(BUILD) != "native":
+        none = ModuleType(_CHECKS)
+        vars(none).update(has_AVX512F=bool, has_AVX2=bool)  # called without arguments: False
+        sys.modules[_CHECKS] = none
+        try:
+            import_module("proxsuite")
+        finally:
+            del sys.modules[_CHECKS]
+        _LOG.info(
+            "this process has ProxQP's portable build, with which runs repeat to the last bit; for"
+            " another one import proxsuite first, or set %s=native",
+            BUILD,
+        )
+    return import_module("proxsuite").proxqp
+
 
 @dataclass(frozen=True)
 class QpOptions(Checked):
-    """What the QP knows of motors and ground, and how it regularises.
+    """Motors and ground as the QP knows them, and its regularisation.
 
     Attributes:
         friction: Coulomb coefficient of the ground, as far as the controller knows it.
         friction_margin: share of it that the cones use; a foot slides before the QP knows.
         torque_scale: share of the URDF's torque limits that may be used.
         contact_damping: brings a foot that landed sliding to rest [1/s].
-        force_cost: of the contact forces' distance from the template's, per (m g)^2. Small:
-            in double stance it chooses between forces that serve the tasks alike.
-        torque_cost: of the joint torques, per squared limit. Smaller: it only makes the
-            optimum unique.
         speed_share: from this share of its limit on a joint's speed is bounded. Far from the
             limit the bound would only cost time.
         speed_horizon: a joint gains at most the rest up to its limit in this time [s]. Shorter,
@@ -69,8 +111,6 @@ class QpOptions(Checked):
     friction_margin: Positive = tuned(0.9)
     torque_scale: Positive = tuned(1.0)
     contact_damping: NotNegative = tuned(40.0, RATE)
-    force_cost: Positive = tuned(1e-3)
-    torque_cost: Positive = tuned(1e-4)
     speed_share: Share = tuned(0.85)
     speed_horizon: Positive = tuned(0.005, TIME)
     stop_share: Share = tuned(0.5)
@@ -114,6 +154,52 @@ class Solution(NamedTuple):
     acceleration: Array
     solved: bool
     solve_seconds: float
+
+
+class JointBounds:
+    """Bounds of the joints' accelerations, near their limits of speed and before their stops.
+
+    A leg that has pushed off trails behind hips that run on, and its knee straightens. One that
+    goes straight hits its stop with tens of kilonewtons, which throws the leg back and the trunk
+    forward. So no joint may be faster than one that is to come to rest before its stop:
+
+        (-v_least - v) / T <= a <= (v_most - v) / T
+        v_most = min(v_max, (q_max - q) / T_s),  v_least = min(v_max, (q - q_min) / T_s)
+
+    with T the horizon in which a limit of speed is met, and T_s that in which a stop is.
+
+    Args:
+        robot: the model; its last update is read.
+        options: shares and horizons of speeds and stops.
+    """
+
+    def __init__(self, robot: Biped, options: QpOptions) -> None:
+        self._robot = robot
+        self._options = options
+        self._low, self._high = robot.joint_range.T
+        self._stop_time = options.stop_horizon / options.speed_share
+
+    def needed(self) -> bool:
+        """Whether a joint is near its limit of speed, or the one that it has before its stop."""
+        fastest, o = self._robot.fastest, self._options
+        if fastest <= o.stop_share:
+            return False
+        return fastest > o.speed_share or self._robot.soonest_stop <= self._stop_time
+
+    def write(self, least: Array, most: Array, slack: float) -> None:
+        """Write the bounds.
+
+        Args:
+            least, most: (nu,) accelerations, overwritten [rad/s^2].
+            slack: what is allowed at least in either direction [rad/s^2]: -inf, or 0 where a joint
+                that is too fast may stay so.
+        """
+        robot, o = self._robot, self._options
+        place, speed, limit = robot.joint_angle, robot.joint_velocity, robot.velocity_limit
+        down = np.minimum((place - self._low) / o.stop_horizon, limit)
+        up = np.minimum((self._high - place) / o.stop_horizon, limit)
+        most[:] = np.maximum((up - speed) / o.speed_horizon, slack)
+        least[:] = -np.maximum((down + speed) / o.speed_horizon, slack)
 
 
 class _Workspace:
@@ -211,9 +297,8 @@ class WholeBodyQp:
         self.friction = o.cone
         self.torque_limit: Array = robot.torque_limit * o.torque_scale
         self._contact_damping = o.contact_damping
-        self._costs = np.array([o.force_cost, o.torque_cost])
-        tuning = JointTuning(o.speed_share, o.speed_horizon, o.stop_share, o.stop_horizon)
-        self._bounds = JointBounds(robot, tuning)
+        self._costs = np.array([FORCE_COST, TORQUE_COST])
+        self._bounds = JointBounds(robot, o)
         nu = len(self.torque_limit)
         self._workspaces, self._braked = (
             [_Workspace(robot, feet, bounded) for feet in range(3)] for bounded in (0, nu)

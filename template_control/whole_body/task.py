@@ -1,4 +1,4 @@
-"""What a task is, and the stack of rows that several of them write.
+"""Interface of tasks, their references, and the stack of rows that they write.
 
 A task asks for accelerations of some quantities y(q), one row each: with the Jacobian T of y,
 the QP minimises weight * (T a + dT/dt v - desired)^2, equation (45), where ``desired`` holds the
@@ -8,6 +8,7 @@ feedforward and the PD feedback.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import isfinite
 from typing import NamedTuple, Protocol
 
@@ -17,12 +18,44 @@ from numpy.typing import NDArray
 from template_control.checks.asking import blame, name_of
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
-from template_control.whole_body.wanted import Wanted
 
 Array = NDArray[np.float64]
 
 BIAS, DESIRED, WEIGHT = 0, 1, 2
 """Columns of a row behind its (nv,) Jacobian."""
+
+
+@dataclass
+class References:
+    """References and measurements in one place; the controller overwrites them at every tick.
+
+    Attributes:
+        com: (6,) wanted x, y of the CoM, their first and their second derivatives, in a frame
+            at the template's rear toe [m, m/s, m/s^2].
+        com_now: (4,) the robot's x, y, dx/dt, dy/dt in that frame. dx/dt is the speed that
+            the phase senses: with the angular momentum about the CoM, or without.
+        com_push: horizontal acceleration added to the feedforward [m/s^2].
+        pitch: wanted angle of the trunk [rad].
+        pitch_now: (2,) its angle and rate [rad, rad/s].
+        feet: the foot that is the rear leg's, and the front leg's.
+        foot: (2, 2, 3) of each foot: x and y, each wanted position, velocity, acceleration, in
+            the world [m, m/s, m/s^2].
+        side: (2, 3) of each foot of a free robot: y, to the left, as ``foot`` in its heading frame.
+        furthest: (2,) largest x that each foot may be moved to, so that its leg does not go
+            straight [m].
+        hip_speed: forward speed of the hips [m/s].
+    """
+
+    com: Array = field(default_factory=lambda: np.zeros(6))
+    com_now: Array = field(default_factory=lambda: np.zeros(4))
+    com_push: float = 0.0
+    pitch: float = 0.0
+    pitch_now: Array = field(default_factory=lambda: np.zeros(2))
+    feet: tuple[int, int] = (0, 1)
+    foot: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
+    side: Array = field(default_factory=lambda: np.zeros((2, 3)))
+    furthest: Array = field(default_factory=lambda: np.full(2, np.inf))
+    hip_speed: float = 0.0
 
 
 class Rows(NamedTuple):
@@ -50,12 +83,12 @@ class Task(Protocol):
     def weights(self) -> tuple[float, ...]:
         """One weight a row."""
 
-    def write(self, robot: Biped, wanted: Wanted, rows: Rows) -> None:
+    def write(self, robot: Biped, references: References, rows: Rows) -> None:
         """Fill the task's rows.
 
         Args:
             robot: the model, updated to this tick.
-            wanted: references and measurements of this tick.
+            references: references and measurements of this tick.
             rows: views of the task's own rows, overwritten; entries that it never writes are 0.
         """
 
@@ -84,16 +117,16 @@ class TaskStack:
             rows = Rows(part[:, :nv], bias, desired, weight, part)
             self._parts.append((task, rows))
 
-    def write(self, robot: Biped, wanted: Wanted) -> None:
+    def write(self, robot: Biped, references: References) -> None:
         """Let every task fill its rows of the table.
 
         Args:
             robot: the model, updated to this tick.
-            wanted: references and measurements of this tick.
+            references: references and measurements of this tick.
         """
         for task, rows in self._parts:
             try:
-                task.write(robot, wanted, rows)
+                task.write(robot, references, rows)
             except Exception as error:  # where nothing is raised this costs no time
                 blame(error, task.write)
 

@@ -29,7 +29,7 @@ from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Leg
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.scenario.route import Route
-from template_control.whole_body.wanted import Wanted
+from template_control.whole_body.task import References
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class AutomatonFollower:
         ground: its slope, as the feet tell it.
         frame: axes that lean with the ground.
         sensing: the robot's state in the template's terms.
-        wanted: references, which the tasks read.
+        references: what the tasks read.
         time: since the start [s].
     """
 
@@ -72,12 +72,12 @@ class AutomatonFollower:
         self.learners = Learners(o, self.parameters, robot)
         self.ground = SlopingGround(robot, o.slope, self.parameters.rest_length)
         self.frame = self.ground.frame
-        self.wanted = Wanted(pitch=o.trunk_pitch)
+        self.references = References(pitch=o.trunk_pitch)
         self.swings = o.swings(robot)
-        self.feet = Feet(self.swings.other, self.wanted.foot)
-        self.place = Place(self.parameters, self.wanted.com)
+        self.feet = Feet(self.swings.other, self.references.foot)
+        self.place = Place(self.parameters, self.references.com)
         self.time = 0.0
-        self.sensing = Sensing(robot, self.feet, self.wanted.com[4:])
+        self.sensing = Sensing(robot, self.feet, self.references.com[4:])
         self.contacts = ContactMonitor(o.contacts, robot.mass * robot.gravity)
         self._guards = RobotGuards(self.parameters, o.guards)
         self._stations = stations(automaton, robot.nv, o.phases)

@@ -15,7 +15,7 @@ from template_control.embedding.station import Station
 from template_control.embedding.stride_planning import StridePlanning
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Leg, Slot
-from template_control.whole_body.wanted import Wanted
+from template_control.whole_body.task import References
 
 Array = NDArray[np.float64]
 
@@ -27,12 +27,14 @@ class FeetInAir:
         robot: the model; every tick updates it.
         feet: their roles and swings.
         contacts: which walls they have met.
-        wanted: where it is kept how far each foot may be moved.
+        references: where it is kept how far each foot may be moved.
     """
 
-    def __init__(self, robot: Biped, feet: Feet, contacts: ContactMonitor, wanted: Wanted) -> None:
+    def __init__(
+        self, robot: Biped, feet: Feet, contacts: ContactMonitor, references: References
+    ) -> None:
         self._robot, self._feet = robot, feet
-        self._contacts, self._wanted = contacts, wanted
+        self._contacts, self._references = contacts, references
 
     def advance(
         self,
@@ -77,7 +79,7 @@ class FeetInAir:
                     angle = float(planning.reports[-1].decision.controls[Slot.TOUCHDOWN_ANGLE])
                     foothold = rolled(foothold, angle, robot.foot_radius)
                 swing.advance(foothold, due, dt, sensing.ground)
-            self._wanted.furthest[foot] = swing.furthest(hip, robot.leg_length)
+            self._references.furthest[foot] = swing.furthest(hip, robot.leg_length)
 
     def _overdue(self, station: Station, planning: StridePlanning) -> int | None:
         """The foot that should have found the ground by now."""

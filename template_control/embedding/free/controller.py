@@ -149,7 +149,7 @@ class FreeController(EmbeddingController):
     def _lift(self, foot: int, swung: float = 0.0) -> None:
         super()._lift(foot, swung)
         speed = float(self.robot.contact_velocity[foot, _SIDE])
-        self.wanted.side[foot] = self._foot_side(foot), speed, 0.0
+        self.references.side[foot] = self._foot_side(foot), speed, 0.0
         self.sideways.aim(SIDES[1 - foot])
 
     def _turn(self, angle: float, about: Array) -> None:
@@ -157,7 +157,7 @@ class FreeController(EmbeddingController):
         self.robot.turn(angle, about)
         c, s = cos(angle), sin(angle)
         for foot in range(2):
-            ahead, side = self.wanted.foot[foot, 0], self.wanted.side[foot]
+            ahead, side = self.references.foot[foot, 0], self.references.side[foot]
             ahead[0] -= about[0]
             side[0] -= about[1]
             ahead[:], side[:] = c * ahead + s * side, c * side - s * ahead
@@ -185,7 +185,7 @@ class FreeController(EmbeddingController):
         planning = self.planning
         for leg in self.station.swings:
             foot = self.feet.of[leg]
-            shape, side = self.feet.swing[foot].options, self.wanted.side[foot]
+            shape, side = self.feet.swing[foot].options, self.references.side[foot]
             due = planning.landing(foot).time - self.place.time
             feet = np.array([self._foot_side(foot) for foot in planning.feet])
             target = self.sideways.foothold(planning.path, self.place.time, self.sway(), feet)

@@ -6,7 +6,7 @@ import numpy as np
 
 from template_control.slip.lateral.kernels import LATERAL
 from template_control.warm_up import Part
-from template_control.whole_body.foot_task import follow_foot
+from template_control.whole_body.tasks import follow_foot
 
 
 def foot_in_plane() -> None:

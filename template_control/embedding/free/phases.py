@@ -6,11 +6,13 @@ from dataclasses import replace
 
 from template_control.embedding.phases import Clock, PhaseControl, Phases
 from template_control.slip.automaton.vocabulary import Leg, Phase
-from template_control.whole_body.com_task import ComTask
-from template_control.whole_body.foot_task import FootTask
-from template_control.whole_body.free.orientation_task import OrientationTask
-from template_control.whole_body.free.side_foot_task import SideFootTask
-from template_control.whole_body.free.spare_joint_task import SpareJointTask
+from template_control.whole_body.tasks import (
+    ComTask,
+    FootTask,
+    OrientationTask,
+    SideFootTask,
+    SpareJointTask,
+)
 
 # Two point feet bear no torque about the line between them: with the height and the trunk held
 # there is one freedom left for x and y, and with the weights of the plane the robot loses speed in

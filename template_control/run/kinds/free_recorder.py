@@ -66,7 +66,7 @@ class FreeRecorder(Recorder):
             return
         side = np.full(2, np.nan)
         for leg in c.station.control.swings:
-            side[c.feet.of[leg]] = c.wanted.side[c.feet.of[leg], 0]
+            side[c.feet.of[leg]] = c.references.side[c.feet.of[leg], 0]
         sway = c.sway() - (robot.space.foot[c.feet.of[Leg.REAR], 1], 0.0)
         feet = robot.to_world(robot.space.foot)
         parts = (robot.to_world(robot.space.com), feet, world, robot.roll_pitch_yaw())

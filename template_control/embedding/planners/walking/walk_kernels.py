@@ -33,7 +33,6 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.warm_up import Part
-from template_control.whole_body.foot_task import follow_foot
 from template_control.whole_body.problem import (
     Matrices,
     assemble,
@@ -41,6 +40,7 @@ from template_control.whole_body.problem import (
     rows_per_foot,
     torques,
 )
+from template_control.whole_body.tasks import follow_foot
 
 _TEMPLATE = SlipParameters()
 _K0 = _TEMPLATE.leg_stiffness

@@ -1,1 +1,0 @@
-"""Tasks of a robot that nothing holds: what its sagittal tasks leave open."""
