@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import template_control as tc
-from template_control.robustness.wilson import wilson_interval
+from template_control.robustness.findings import wilson_interval
 from template_control.slip import WalkingGait
 
 SEED = 1

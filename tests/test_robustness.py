@@ -18,11 +18,10 @@ from template_control.robustness import ladder as robustness
 from template_control.robustness.aside import ASIDE
 from template_control.robustness.disturbance import Situation
 from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES
-from template_control.robustness.findings import Finding, Level
+from template_control.robustness.findings import Finding, Level, wilson_interval
 from template_control.robustness.ladder import SETTLED, measure, off_gait, trial
 from template_control.robustness.subject import ENGINES, Subject
 from template_control.robustness.template_limit import template_limit
-from template_control.robustness.wilson import wilson_interval
 from template_control.run.choices.robot import RobotChoice
 from template_control.run.options import FallOptions
 from template_control.run.simulation import perturbed_start, simulate

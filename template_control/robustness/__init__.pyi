@@ -14,7 +14,7 @@ from .disturbances import DISTURBANCES as DISTURBANCES
 from .findings import Finding as Finding
 from .findings import Level as Level
 from .findings import Robustness as Robustness
+from .findings import wilson_interval as wilson_interval
 from .ladder import measure as measure
 from .ladder import trial as trial
 from .subject import Subject as Subject
-from .wilson import wilson_interval as wilson_interval

@@ -5,13 +5,37 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from scipy.stats import binomtest
+
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Count, Index
+from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.robustness.disturbance import Disturbance
-from template_control.robustness.wilson import wilson_interval
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
 
 _HALF = 0.5
+
+
+@checked
+def wilson_interval(successes: Index, trials: Count) -> tuple[float, float]:
+    """Wilson's 95 % interval of a success rate.
+
+    Args:
+        successes: how many.
+        trials: of how many, independent of each other.
+
+    Returns:
+        Least and largest rate.
+
+    Raises:
+        ParameterError: if there are more successes than trials, or a number is out of its range.
+    """
+    if successes > trials:
+        raise ParameterError(f"successes are {successes} of {trials} trials: give at most as many")
+    interval = binomtest(successes, trials).proportion_ci(method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 @dataclass(frozen=True)

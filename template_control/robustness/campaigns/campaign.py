@@ -18,10 +18,10 @@ from template_control.plant.ground import GroundStep
 from template_control.robustness.campaigns.first_wrong import first_wrong
 from template_control.robustness.campaigns.mix import Draw, Mix
 from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
+from template_control.robustness.findings import wilson_interval
 from template_control.robustness.fingerprint import fingerprint
 from template_control.robustness.ladder import off_gait
 from template_control.robustness.subject import ENGINES, Engine
-from template_control.robustness.wilson import wilson_interval
 from template_control.run.choices.gait import GaitChoice
 from template_control.run.choices.robot import RobotChoice
 from template_control.run.config import Ready, RunConfig

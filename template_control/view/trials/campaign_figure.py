@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.robustness.campaigns.campaign import Campaign, Trial
-from template_control.robustness.wilson import wilson_interval
+from template_control.robustness.findings import wilson_interval
 from template_control.view.style import LEFT, RIGHT, as_text
 
 _SHOWN = {
