@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from filelock import lock_descriptor, unlock_descriptor
 
 from template_control.errors import RecordError, TemplateControlError
-from template_control.file_lock import FileLock
 
 T = TypeVar("T")
 
@@ -112,10 +112,6 @@ def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
     return Path(path)
 
 
-Upgrade = Callable[[dict[str, Any]], dict[str, Any]]
-"""From the fields of an older format, by name, to those of today."""
-
-
 class Layout(NamedTuple):
     """What the fields of a record look like in its file.
 
@@ -135,22 +131,20 @@ def load(
     path: str | Path,
     kind: str,
     layout: Layout,
-    older: Mapping[str, Upgrade] | None = None,
 ) -> T:
-    """Read what :func:`save` wrote with the same ``kind``, or an older one.
+    """Read what :func:`save` wrote with the same ``kind``.
 
     Args:
         record_type: the dataclass.
         path: of the ``.npz``.
-        kind: format of today.
+        kind: format.
         layout: of that format.
-        older: how formats of earlier versions are upgraded.
 
     Raises:
         RecordError: if the file is missing or is no such record, naming the field that is wrong.
     """
     try:
-        values = _values(path, kind, older or {})
+        values = _values(path, kind)
         _check(values, layout)
     except FileNotFoundError:
         raise RecordError(f"there is no run at {path}: give a run.npz") from None
@@ -165,8 +159,8 @@ class _NoRecordError(Exception):
     """Why a file is none."""
 
 
-def _values(path: str | Path, kind: str, older: Mapping[str, Upgrade]) -> dict[str, Any]:
-    """The fields of today by name, and the metadata."""
+def _values(path: str | Path, kind: str) -> dict[str, Any]:
+    """The fields by name, and the metadata."""
     name = "it"
     values: dict[str, Any] = {}
     try:
@@ -176,8 +170,6 @@ def _values(path: str | Path, kind: str, older: Mapping[str, Upgrade]) -> dict[s
         name = "metadata"
         values[name] = json.loads(str(values[name]))
         found = str(values[name].pop("format", ""))
-        if found in older:
-            return older[found](values)
     except FileNotFoundError:
         raise
     except KeyError as error:
@@ -270,12 +262,41 @@ def writing(folder: Path) -> Iterator[Path]:
         raise RecordError(
             f"cannot write to {folder}: {error.strerror}; give another --output"
         ) from None
-    lock = FileLock(folder)
-    if not lock.take():
-        raise RecordError(
-            f"another command writes to {folder} now: wait for it, or give another --output"
-        )
     try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no folder as a file
+        descriptor = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT)
+    try:
+        if not take_lock(descriptor):
+            raise RecordError(
+                f"another command writes to {folder} now: wait for it, or give another --output"
+            )
         yield folder
     finally:
-        lock.release()
+        free_lock(descriptor)
+        os.close(descriptor)
+
+
+def take_lock(descriptor: int) -> bool:
+    """Take the lock of an open file, which the system frees when its holder ends.
+
+    Args:
+        descriptor: of the file.
+
+    Returns:
+        False while another process holds it; True also where the file system knows no locks.
+    """
+    try:
+        return lock_descriptor(descriptor, blocking=False)
+    except OSError:
+        return True
+
+
+def free_lock(descriptor: int) -> None:
+    """Free a lock; a process forked meanwhile has the file too, so that closing would not do.
+
+    Args:
+        descriptor: of the file, which may be unlocked.
+    """
+    with suppress(OSError):
+        unlock_descriptor(descriptor)

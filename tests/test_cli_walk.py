@@ -198,9 +198,10 @@ def test_a_file_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(RecordError, match="there is no run"):
         Record.load(tmp_path / "missing.npz")
     old = tmp_path / "old.npz"
-    np.savez(old, metadata=np.array('{"format": "template-control run 1"}'))
-    with pytest.raises(RecordError, match=r"another version .*'template-control run 1'"):
-        Record.load(old)
+    for number in (1, 4):
+        np.savez(old, metadata=np.array(f'{{"format": "template-control run {number}"}}'))
+        with pytest.raises(RecordError, match=rf"another version .*run {number}'"):
+            Record.load(old)
 
 
 def test_figures_need_samples(tmp_path):

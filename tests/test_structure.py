@@ -40,7 +40,6 @@ SHARED = (
     "compiled",
     "deprecated",
     "errors",
-    "file_lock",
     "settings",
     "storage",
     "terminal",

@@ -16,7 +16,6 @@ from template_control.checks.typed import entries, number
 from template_control.checks.words import inward
 from template_control.cli.main import _COMMANDS, build_parser
 from template_control.errors import GaitError, ParameterError, RecordError, RobotError
-from template_control.file_lock import LOCKS, FileLock
 from template_control.plant.terrain.spec import KINDS, terrain_from
 from template_control.plant.terrain.terrain import Terrain
 from template_control.robot.five_link import SolidLink
@@ -218,8 +217,6 @@ def test_a_mix_says_which_key_is_wrong(tmp_path, refused):
         Mix().times(100.0)
 
 
-needs_locks = pytest.mark.skipif(not LOCKS, reason="processes cannot see one another's locks here")
-
 HOLDER = """
 import sys
 from pathlib import Path
@@ -230,7 +227,6 @@ with writing(Path(sys.argv[1])):
 """
 
 
-@needs_locks
 @pytest.mark.parametrize(
     "words",
     [
@@ -264,14 +260,12 @@ def test_a_folder_belongs_to_one_command_at_a_time(words, tmp_path, refused):
         pass
 
 
-@needs_locks
 def test_a_folder_is_let_go_whatever_ends_the_block(tmp_path):
     with pytest.raises(KeyError), writing(tmp_path / "new"):
         raise KeyError
-    with writing(tmp_path / "new"):
-        assert not FileLock(tmp_path / "new").take()
-        with pytest.raises(RecordError, match="another command writes"), writing(tmp_path / "new"):
-            pass
+    new = tmp_path / "new"
+    with writing(new), pytest.raises(RecordError, match="another command writes"), writing(new):
+        pass
     assert not list((tmp_path / "new").iterdir())
 
 

@@ -19,14 +19,10 @@ from template_control.errors import RecordError, TemplateControlError
 from template_control.plant.ground import GroundStep
 from template_control.plant.terrain.terrain import Terrain
 from template_control.run.data_frame import to_dataframe
-from template_control.run.old_record import from_five_slots, from_taken, from_walk
 
 Array = NDArray[np.float64]
 
 FORMAT = "template-control run 5"
-_TAKEN = "template-control run 4"  # which took every target as it was
-_FIVE_SLOTS = "template-control run 3"  # without push-off
-_WALKS = "template-control run 2"  # which knew VLO and walking steps only
 LAYOUT = storage.Layout(
     fields={
         "time": "T",
@@ -251,18 +247,12 @@ class Record:
     @classmethod
     @checked
     def load(cls, path: str | Path) -> Record:
-        """Read a run that :meth:`save` wrote, now or in an earlier version.
+        """Read a run that :meth:`save` wrote.
 
         Raises:
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
-        return storage.load(
-            cls,
-            path,
-            FORMAT,
-            cls.layout,
-            {_WALKS: from_walk, _FIVE_SLOTS: from_five_slots, _TAKEN: from_taken},
-        )
+        return storage.load(cls, path, FORMAT, cls.layout)
 
 
 class RunInterrupted(KeyboardInterrupt):

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO, NamedTuple, NoReturn
 import numpy as np
 
 from template_control.errors import SweepError
-from template_control.file_lock import FileLock
+from template_control.storage import free_lock, take_lock
 
 _FORMAT = "template-control sweep 1"
 
@@ -132,9 +132,8 @@ class SweepFile:
             self._file: BinaryIO = self.path.open("a+b")
         except OSError as error:
             self._refuse(f"cannot be written ({error.strerror})")
-        self._lock = FileLock(self.path)
         try:
-            if not self._lock.take():
+            if not take_lock(self._file.fileno()):
                 self._refuse("is being written by another sweep", "wait for that")
             self._read(head)
         except BaseException:
@@ -145,10 +144,10 @@ class SweepFile:
         raise SweepError(f"{self.path} {why}: {mend}") from None
 
     def _close(self) -> None:
+        free_lock(self._file.fileno())
         # What a full disk refused is told by then; closing tries it once more.
         with suppress(OSError):
             self._file.close()
-        self._lock.release()
 
     def _read(self, head: dict[str, Any]) -> None:
         """Take over what is there, cut a torn end off, begin an empty file."""

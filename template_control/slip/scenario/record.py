@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from template_control import storage
 from template_control.checks.checked import checked
-from template_control.slip.automaton.vocabulary import NUM_SLOTS
 
 Array = NDArray[np.float64]
 
 FORMAT = "template-control scenario 2"
-_FIVE_SLOTS = "template-control scenario 1"  # without push-off
 _LAYOUT = storage.Layout(
     fields={
         "time": "T",
@@ -42,15 +40,6 @@ _LAYOUT = storage.Layout(
         "parameters": (dict,),
     },
 )
-
-
-def padded_controls(controls: Array) -> Array:
-    """Controls (S, any) of a version with fewer slots as (S, NUM_SLOTS); those it lacks are 0."""
-    return np.pad(controls, ((0, 0), (0, max(NUM_SLOTS - controls.shape[1], 0))))
-
-
-def _from_five_slots(fields: dict[str, Any]) -> dict[str, Any]:
-    return {**fields, "controls": padded_controls(fields["controls"])}
 
 
 @dataclass(frozen=True)
@@ -154,4 +143,4 @@ class ScenarioRecord:
     @checked
     def load(cls, path: str | Path) -> ScenarioRecord:
         """Read it; see :func:`~template_control.storage.load`."""
-        return storage.load(cls, path, FORMAT, _LAYOUT, {_FIVE_SLOTS: _from_five_slots})
+        return storage.load(cls, path, FORMAT, _LAYOUT)
