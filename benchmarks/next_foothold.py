@@ -27,7 +27,7 @@ from template_control.slip import (
     simulate_stride,
 )
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.lateral.kernels import LATERAL
+from template_control.slip.lateral.placing import LATERAL
 from template_control.slip.maps.section import VLO
 from template_control.warm_up import ready
 

@@ -22,7 +22,7 @@ from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.ahead.planner import AheadPlanner
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
+from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 

@@ -29,7 +29,7 @@ from template_control.slip import (
     simulate_stride,
 )
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.lateral.transition import transition
+from template_control.slip.lateral.path import transition
 from template_control.slip.maps.section import VLO
 from template_control.slip.similarity import Scale, scaled
 

@@ -9,8 +9,7 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.errors import GaitError
 from template_control.robot.library import ROBOTS
-from template_control.slip.gaits.mean_speed import mean_speed_range
-from template_control.slip.gaits.walking_family import speed_range, walking_gait
+from template_control.slip.gaits.walking_by_speed import mean_speed_range, speed_range, walking_gait
 
 P = tc.SlipParameters()
 

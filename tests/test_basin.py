@@ -3,14 +3,19 @@
 import numpy as np
 import pytest
 
-from template_control.paper.deadbeat import backward_set, controlled_end, inside_share, settles
-from template_control.paper.stability import branch
+from template_control.paper.stability import (
+    backward_set,
+    branch,
+    controlled_end,
+    inside_share,
+    settles,
+)
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.basin import margin, steps_to_fall, velocity_angle, vlo_state
+from template_control.slip.gaits.branch import Kind
 from template_control.slip.gaits.gait import gait_from_energy
-from template_control.slip.gaits.stability import Kind
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters

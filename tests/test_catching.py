@@ -16,12 +16,11 @@ from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.stride_planning import StridePlanning
 from template_control.embedding.touchdown import free_controls
-from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.breaking import RUN_ON
+from template_control.slip.automaton.automaton import AUTOMATON, RUN_ON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.running_gait import running_gait, running_speeds
-from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.catching import BreakingRoute, CatchingRoute, CatchOptions

@@ -6,12 +6,15 @@ import pytest
 from template_control.errors import ParameterError
 from template_control.paper.stability import branch
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
-from template_control.slip.control.controllers import ActiveRunning, ModifiedWalking
-from template_control.slip.control.section_target import section_target, targeted
+from template_control.slip.control.controllers import (
+    ActiveRunning,
+    ModifiedWalking,
+    section_target,
+    targeted,
+)
 from template_control.slip.dynamics.stride import controls
-from template_control.slip.gaits.branch import Special
-from template_control.slip.gaits.controlled_branch import ControlledFamily, controlled_fixed_point
-from template_control.slip.gaits.stability import Kind
+from template_control.slip.gaits.branch import Kind, Special
+from template_control.slip.gaits.gait_branch import ControlledFamily, controlled_fixed_point
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters

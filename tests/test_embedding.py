@@ -17,7 +17,7 @@ from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.gaits.gait import gait_from_energy
-from template_control.slip.gaits.mean_speed import gait_for_speed
+from template_control.slip.gaits.walking_by_speed import gait_for_speed
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()

@@ -11,8 +11,7 @@ from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome, 
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator, controls, simulate_stride
-from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section_map import RESULTS, closed_form, section_map
+from template_control.slip.maps.return_map import RESULTS, ReturnMap, closed_form, section_map
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()

@@ -13,11 +13,12 @@ from template_control.paper.example_two import (
     EARLIER,
     PLANNERS,
     START,
+    beginning,
+    liftoff,
     sections,
     start_state,
     template_walk,
 )
-from template_control.paper.example_two_figures import beginning, liftoff
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
 from template_control.run.options import SimulationOptions

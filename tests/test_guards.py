@@ -7,11 +7,17 @@ from hypothesis import strategies as st
 
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome
-from template_control.slip.dynamics.guards import all_bends, all_guards, guard, guard_rate
-from template_control.slip.dynamics.model import kernel_model
-from template_control.slip.dynamics.path import SERIES, Path, sample
+from template_control.slip.dynamics.guards import (
+    SERIES,
+    Path,
+    all_bends,
+    all_guards,
+    guard,
+    guard_rate,
+    sample,
+)
+from template_control.slip.dynamics.model import ORDER, expand, kernel_model, steepest
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.dynamics.taylor import ORDER, expand, steepest
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()

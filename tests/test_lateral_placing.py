@@ -23,8 +23,8 @@ from template_control.slip import (
     simulate_stride,
 )
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.lateral.kernels import LATERAL as KERNELS
-from template_control.slip.lateral.transition import transition
+from template_control.slip.lateral.path import transition
+from template_control.slip.lateral.placing import LATERAL as KERNELS
 from template_control.slip.maps.section import VLO
 from template_control.warm_up import ready
 

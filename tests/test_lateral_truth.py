@@ -24,7 +24,7 @@ from template_control.slip import (
     simulate_stride,
 )
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.lateral.transition import acceleration, transition
+from template_control.slip.lateral.path import acceleration, transition
 from template_control.slip.maps.section import VLO
 
 P = SlipParameters()

@@ -21,10 +21,9 @@ from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
+from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.scenario.speed_command import SpeedProfile
-from template_control.slip.scenario.speed_route import SpeedRoute
+from template_control.slip.scenario.route import SpeedProfile, SpeedRoute
 
 P = tc.SlipParameters()
 OPTIONS = AheadOptions()

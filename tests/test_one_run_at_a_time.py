@@ -11,7 +11,7 @@ from template_control.embedding.planners.transition import RUN_TO_WALK, Transiti
 from template_control.embedding.robot_route import robot_route
 from template_control.errors import ParameterError
 from template_control.slip.gaits.running_gait import running_gait
-from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.scenario.scenario import Scenario, Segment
 
 OPTIONS = tc.SimulationOptions(steps=3, record_every=10)

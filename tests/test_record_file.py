@@ -11,8 +11,7 @@ import pytest
 import template_control as tc
 from template_control.errors import RecordError
 from template_control.run.record import Record
-from template_control.slip.scenario.record import ScenarioRecord
-from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import example_one
 
 

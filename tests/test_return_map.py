@@ -7,16 +7,16 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from template_control.errors import ParameterError
-from template_control.paper.error_study import Grid, study
+from template_control.paper.map_errors import Grid, study
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
-from template_control.slip.dynamics.path import COEFFICIENTS, STANCE, Path, sample
-from template_control.slip.dynamics.stance_map import (
+from template_control.slip.dynamics.closed_form import (
     Launch,
     axial_torsional,
     harmonic,
     momentum_changes,
 )
+from template_control.slip.dynamics.guards import COEFFICIENTS, STANCE, Path, sample
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO

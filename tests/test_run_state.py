@@ -16,7 +16,7 @@ from template_control.run.options import SimulationOptions
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.slip.gaits.running_gait import running_gait
-from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.gaits.walking_by_speed import walking_gait
 
 
 def _count_resets(planner):

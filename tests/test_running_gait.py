@@ -9,7 +9,7 @@ from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.flight import flight_share
+from template_control.slip.gaits.gait import flight_share
 from template_control.slip.gaits.running_gait import RunningFamily, running_gait, running_speeds
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters

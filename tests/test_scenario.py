@@ -12,8 +12,7 @@ from template_control.errors import RecordError, ScenarioError
 from template_control.paper import REPRODUCTIONS
 from template_control.paper.example_one import summary
 from template_control.slip.automaton.vocabulary import MapKind
-from template_control.slip.scenario.record import ScenarioRecord
-from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment, example_one
 from template_control.slip.scenario.scenario_file import load_scenario
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.node import Edge, Node
+from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import (
     MAX_EDGES,
     Event,

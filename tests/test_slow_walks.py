@@ -11,10 +11,9 @@ from template_control.embedding.planning.replan_options import ReplanOptions
 from template_control.embedding.section_report import Learnt
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.stride_planning import StridePlanning
-from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.breaking import BREAKS
+from template_control.slip.automaton.automaton import AUTOMATON, BREAKS
 from template_control.slip.automaton.vocabulary import Outcome
-from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.section import REST, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.catching import CatchingRoute, CatchOptions

@@ -5,10 +5,9 @@ import pytest
 
 import template_control as tc
 from template_control.errors import ScenarioError
-from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
+from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.section import VLO
-from template_control.slip.scenario.speed_command import SpeedCommand, SpeedProfile
-from template_control.slip.scenario.speed_route import SpeedRoute
+from template_control.slip.scenario.route import SpeedCommand, SpeedProfile, SpeedRoute
 
 P = tc.SlipParameters()
 

@@ -10,9 +10,8 @@ from template_control.cli.main import main
 from template_control.errors import GaitError, ParameterError
 from template_control.paper.stability import branch, lower_limit
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
-from template_control.slip.gaits.branch import Special
+from template_control.slip.gaits.branch import Kind, Special, classify, closed_loop_eigenvalues
 from template_control.slip.gaits.gait_branch import Family
-from template_control.slip.gaits.stability import Kind, classify, closed_loop_eigenvalues
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters

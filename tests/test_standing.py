@@ -18,7 +18,7 @@ from template_control.errors import ParameterError, ScenarioError
 from template_control.run.options import Push
 from template_control.slip import Event, Slot, walking_gait
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.gaits.walking_family import speed_range
+from template_control.slip.gaits.walking_by_speed import speed_range
 from template_control.slip.maps.section import REST, VLO
 from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment

@@ -8,8 +8,7 @@ from template_control.embedding import gaits_by_speed, standing_planners, standi
 from template_control.embedding.standing.options import StandingOptions
 from template_control.run.options import Push
 from template_control.slip import Event
-from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.breaking import STEP_OUT
+from template_control.slip.automaton.automaton import AUTOMATON, STEP_OUT
 from template_control.slip.maps.section import REST
 from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment

@@ -25,7 +25,7 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator, simulate_stride
 from template_control.slip.gaits.running_gait import running_gait, running_speeds
-from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters

@@ -12,8 +12,8 @@ import pytest
 
 import template_control as tc
 from template_control import slip
+from template_control.checks.fitting import inward
 from template_control.checks.typed import entries, number
-from template_control.checks.words import inward
 from template_control.cli.main import _COMMANDS, build_parser
 from template_control.errors import GaitError, ParameterError, RecordError, RobotError
 from template_control.plant.terrain.spec import KINDS, terrain_from

@@ -16,7 +16,7 @@ from template_control.run.options import Push, SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import perturbed_start, simulate
 from template_control.run.summary import summarise
-from template_control.slip.gaits.mean_speed import gait_for_speed
+from template_control.slip.gaits.walking_by_speed import gait_for_speed
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()

@@ -13,12 +13,20 @@ from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.errors import GaitError
 from template_control.robot.library import ROBOTS
 from template_control.slip.automaton.vocabulary import Outcome
-from template_control.slip.gaits.by_speed import family_search
-from template_control.slip.gaits.by_speed.family_cost import FamilyCost, gait_figures
-from template_control.slip.gaits.by_speed.family_search import SearchEffort, search_family
-from template_control.slip.gaits.by_speed.nearest import NATURAL, coordinates, nearest_gait
-from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
+from template_control.slip.gaits import family_search
+from template_control.slip.gaits.family_search import (
+    FamilyCost,
+    SearchEffort,
+    gait_figures,
+    search_family,
+)
 from template_control.slip.gaits.gait import vlo_jacobians, without_push_off
+from template_control.slip.gaits.walking_by_speed import (
+    NATURAL,
+    coordinates,
+    nearest_gait,
+    walking_by_speed,
+)
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.similarity import REFERENCE
 
@@ -140,7 +148,7 @@ def test_the_command_writes_what_the_library_reads(monkeypatch, tmp_path, capsys
     assert "largest eigenvalues" in capsys.readouterr().out
     made = json.loads((tmp_path / "walking.json").read_text())
     assert (tmp_path / "by_speed.png").exists()
-    place = files("template_control.slip.gaits.by_speed").joinpath("walking.json")
+    place = files("template_control.slip.gaits").joinpath("walking.json")
     shipped = json.loads(place.read_text())
     assert made.keys() == shipped.keys()
     assert made["cost"] == shipped["cost"]

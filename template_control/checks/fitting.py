@@ -1,21 +1,94 @@
-"""Fits a value to an annotation, or says what would fit."""
+"""Fitting of a value to an annotation, and the words of messages about it."""
 
 from __future__ import annotations
 
 import inspect
+import math
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from functools import cache, partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    NoReturn,
+    ParamSpec,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from template_control.checks.ranges import Range, Rising, Shape
-from template_control.checks.words import shown, words_for
-from template_control.errors import ParameterError, TemplateControlError
+from template_control.errors import DivergedError, ParameterError, TemplateControlError
+
+_LONGEST = 60  # characters of a value that a message shows
+
+
+def shown(value: Any) -> str:
+    """A value for a message, on one line and not long."""
+    try:
+        text = f"{value:g}" if isinstance(value, float) else repr(value)
+    except Exception:  # a stranger's __repr__ may do anything
+        text = f"a {type(value).__name__}"
+    text = " ".join(text.split())
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+def inward(low: float, high: float, digits: int = 3) -> str:
+    """A range for a message, rounded so that both ends that are printed lie in it.
+
+    Args:
+        low, high: ends of the range.
+        digits: of the larger one.
+    """
+    size = max(abs(low), abs(high))
+    step = 10.0 ** (math.floor(math.log10(size)) + 1 - digits) if size > 0.0 else 1.0
+    first, last = math.ceil(low / step - 1e-9) * step, math.floor(high / step + 1e-9) * step
+    if first > last:
+        return f"{low!r} to {high!r}"
+    return f"{first:.{digits + 2}g} to {last:.{digits + 2}g}"
+
+
+def words_for(hint: Any) -> str:
+    """What fits an annotation, for a message."""
+    origin, args = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        return "one of " + ", ".join(repr(x) for x in args)
+    if origin is Annotated:
+        return next(
+            (
+                extra.words("whole number" if args[0] is int else "number")
+                for extra in args[1:]
+                if isinstance(extra, Range)
+            ),
+            words_for(args[0]),
+        )
+    if origin is tuple:
+        if len(args) == 2 and args[1] is Ellipsis:
+            return "a tuple"
+        each = list(dict.fromkeys(words_for(x) for x in args))
+        if len(each) == 1:
+            return f"{len(args)} times {each[0]}"
+        return ", ".join(each)
+    if origin in (list, Sequence):
+        return "a list"
+    if origin in (Mapping, dict):
+        return "a mapping"
+    if hint is float:
+        return Range().words("number")
+    if hint is int:
+        return "a whole number"
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return f"a {hint.__name__}: " + ", ".join(str(member) for member in hint)
+    name = getattr(hint, "__name__", str(hint))
+    return f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"
+
 
 _ANY_NUMBER = Range()
 
@@ -306,3 +379,69 @@ def _members(kind: type) -> tuple[str, ...]:
         if not name.startswith("_")
     ]
     return tuple(dict.fromkeys(names))
+
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def asked(method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """Call a method; an error goes up with the name of its class and method.
+
+    An error of this library has them in its message, any other one in a note. A state of the
+    part's own that is not finite is no divergence of the run, but a ParameterError.
+
+    Args:
+        method: of a planner, a route or a task.
+        args, kwargs: its arguments.
+
+    Returns:
+        What the method returns.
+    """
+    try:
+        return method(*args, **kwargs)
+    except Exception as error:
+        blame(error, method)
+
+
+def blame(error: Exception, method: Callable[..., Any]) -> NoReturn:
+    """Raise an error that came up in a method, as :func:`asked` does.
+
+    Args:
+        error: that is being handled.
+        method: where it came up.
+    """
+    if isinstance(error, TemplateControlError):
+        kind = ParameterError if isinstance(error, DivergedError) else type(error)
+        raise kind(f"{name_of(method)}: {error}") from error
+    error.add_note(f"It came up in {name_of(method)}.")
+    raise error
+
+
+def answered(kind: type[T], method: Callable[P, Any], *args: P.args, **kwargs: P.kwargs) -> T:
+    """As :func:`asked`, of a method that must return one kind of object.
+
+    Args:
+        kind: of what it returns.
+        method, args, kwargs: as for :func:`asked`.
+
+    Raises:
+        ParameterError: if it returns something else.
+    """
+    answer = asked(method, *args, **kwargs)
+    if not isinstance(answer, kind):
+        raise ParameterError(
+            f"{name_of(method)} returned {shown(answer)}: return a {kind.__name__}"
+        )
+    return answer
+
+
+def name_of(method: Callable[..., Any]) -> str:
+    """Class and name of a method, for a message.
+
+    Args:
+        method: bound to its object, as a rule.
+    """
+    owner = getattr(method, "__self__", None)
+    name = getattr(method, "__name__", None)
+    return shown(method) if owner is None or name is None else f"{type(owner).__name__}.{name}"

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any, get_args, get_origin
 
-from template_control.checks.fitting import Refused, fitter
-from template_control.checks.words import words_for
+from template_control.checks.fitting import Refused, fitter, words_for
 from template_control.errors import ParameterError
 
 

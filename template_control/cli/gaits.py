@@ -22,13 +22,17 @@ from template_control.checks.ranges import Degrees, Positive, Range
 from template_control.cli.report.family import make_family
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind
-from template_control.slip.control.controllers import ActiveRunning, ModifiedWalking
-from template_control.slip.control.section_target import VARIED, section_target, targeted
+from template_control.slip.control.controllers import (
+    VARIED,
+    ActiveRunning,
+    ModifiedWalking,
+    section_target,
+    targeted,
+)
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.branch import QUANTITIES, BranchPoint
-from template_control.slip.gaits.by_speed.family_search import SearchEffort
-from template_control.slip.gaits.controlled_branch import ControlledFamily
-from template_control.slip.gaits.gait_branch import Family
+from template_control.slip.gaits.family_search import SearchEffort
+from template_control.slip.gaits.gait_branch import ControlledFamily, Family
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters

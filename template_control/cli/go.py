@@ -28,8 +28,7 @@ from template_control.cli.report.run_table import failures_text, nearest_text, s
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.run.summary import OTHERS, STRIDES, summarise
-from template_control.slip.scenario.record import ScenarioRecord
-from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.terminal import plain_console
 
 NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from template_control.checks.checked import checked
-from template_control.checks.words import inward
+from template_control.checks.fitting import inward
 from template_control.embedding.ahead.gait_row import STATE
 from template_control.embedding.ahead.gait_table import gait_table, row_at
 from template_control.embedding.ahead.options import AheadOptions
@@ -16,9 +16,8 @@ from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.gaits.by_speed.speed_family import family_speeds
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
-from template_control.slip.gaits.walking_family import speed_range
+from template_control.slip.gaits.walking_by_speed import family_speeds, speed_range
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.scenario import Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute

@@ -5,21 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.checks.checked import checked
+from template_control.checks.fitting import inward
 from template_control.checks.ranges import Angle, Positive
-from template_control.checks.words import inward
 from template_control.errors import GaitError
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.by_speed.family_cost import stance_figures
-from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
+from template_control.slip.gaits.family_search import stance_figures
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy, with_push_off
-from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
-from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.gaits.walking_by_speed import gait_for_speed, walking_by_speed
+from template_control.slip.maps.return_map import RESULTS, ReturnMap
 from template_control.slip.maps.section import VLO
-from template_control.slip.maps.section_map import RESULTS
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.asking import asked
+from template_control.checks.fitting import asked
 from template_control.embedding.planners.planner import (
     BreakingPlanner,
     CurvePlanner,

@@ -13,8 +13,7 @@ from template_control.robot.library import load_robot
 from template_control.run.simulation import simulate
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind, Slot
-from template_control.slip.scenario.record import ScenarioRecord
-from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import example_one
 from template_control.view.route_figures import route_figures
 from template_control.view.scenario_figures import energy_figure, scenario_figure

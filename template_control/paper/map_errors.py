@@ -2,17 +2,206 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.paper.error_study import ErrorStudy, Grid, study
-from template_control.paper.map_figures import error_figure
 from template_control.paper.reproduction import Reproduction
-from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
+from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Numbers of points over Table II's ranges, ends included.
+
+    Attributes:
+        stiffness: of k0 from 10 to 25 kN/m.
+        angle: of alpha from 60 to 80 degrees.
+        speed: of dx/dt at VLO from 0.5 to 2 m/s.
+        height: of y at VLO strictly between l0 sin(alpha) and l0 (cell centres).
+    """
+
+    stiffness: int = 10
+    angle: int = 21
+    speed: int = 12
+    height: int = 12
+
+    def states(self, parameters: SlipParameters) -> tuple[Array, Array]:
+        """VLO states (n, 3) and controls (n, NUM_SLOTS) of the grid, dy/dt = 0."""
+        share = (np.arange(self.height) + 0.5) / self.height
+        k, a, u, f = np.meshgrid(
+            np.linspace(10e3, 25e3, self.stiffness),
+            np.radians(np.linspace(60.0, 80.0, self.angle)),
+            np.linspace(0.5, 2.0, self.speed),
+            share,
+            indexing="ij",
+        )
+        lowest = parameters.rest_length * np.sin(a)
+        y = lowest + f * (parameters.rest_length - lowest)
+        z = np.stack((u, y, np.zeros_like(u)), axis=-1).reshape(-1, 3)
+        controls = np.zeros((len(z), NUM_SLOTS))
+        controls[:, Slot.TOUCHDOWN_ANGLE] = a.ravel()
+        controls[:, Slot.K_SC] = controls[:, Slot.K_SD] = k.ravel()
+        return z, controls
+
+
+@dataclass(frozen=True)
+class MapErrors:
+    """Errors of one map over the valid runs; NaN where the map says the step fails.
+
+    Attributes:
+        position: (n,) e of (31) at the next VLO [%].
+        velocity: (n,) script E of (32) [%].
+        failed: number of valid runs in which the map's step fails.
+    """
+
+    position: Array
+    velocity: Array
+    failed: int
+
+    def statistics(self) -> dict[str, dict[str, float]]:
+        """Mean, sd and max of both, as in Table III."""
+        return {
+            name: {
+                "mean": float(np.nanmean(e)),
+                "sd": float(np.nanstd(e)),
+                "max": float(np.nanmax(e)),
+            }
+            for name, e in (("position", self.position), ("velocity", self.velocity))
+        }
+
+
+@dataclass(frozen=True)
+class ErrorStudy:
+    """Result of :func:`study`.
+
+    Attributes:
+        tried: states on the grid.
+        distance: (n,) d_v of (33) of the valid runs.
+        errors: by map.
+    """
+
+    tried: int
+    distance: Array
+    errors: dict[MapKind, MapErrors]
+
+    @property
+    def valid(self) -> int:
+        """Number of valid runs."""
+        return len(self.distance)
+
+
+def study(grid: Grid | None = None, parameters: SlipParameters | None = None) -> ErrorStudy:
+    """Compare the closed-form VLO maps with the exact one over a grid.
+
+    A run is valid if the exact step completes and its energy allows the next touchdown,
+    (29) and (30).
+
+    Args:
+        grid: numbers of points; None for the default ones.
+        parameters: the template, whose stiffness the grid replaces; None for Table IV's.
+    """
+    p = parameters or SlipParameters()
+    z, u = (grid or Grid()).states(p)
+    tried = len(z)
+    true = ReturnMap(p, "w")(z, u)
+    valid = (true.outcome == Outcome.SECTION) & _may_touch_down(p, z, u)
+    z, u = z[valid], u[valid]
+    state, advance = true.state[valid], true.advance[valid]
+    position, velocity = np.column_stack((advance, state[:, 1])), state[:, [0, 2]]
+    speed = np.linalg.norm(velocity, axis=1)
+    errors = {}
+    for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.GEYER):
+        mapped = ReturnMap(p, "w", kind)(z, u)
+        guess = np.column_stack((mapped.advance, mapped.state[:, 1]))
+        e = np.linalg.norm(guess - position, axis=1) / np.linalg.norm(position, axis=1)
+        ev = np.linalg.norm(mapped.state[:, [0, 2]] - velocity, axis=1) / np.ptp(speed)
+        failed = int(np.sum(mapped.outcome != Outcome.SECTION))
+        errors[kind] = MapErrors(100.0 * e, 100.0 * ev, failed)
+    relative = np.abs((state[:, :2] - z[:, :2]) / z[:, :2])
+    return ErrorStudy(tried, relative.sum(axis=1), errors)
+
+
+def _may_touch_down(p: SlipParameters, z: Array, u: Array) -> NDArray[np.bool_]:
+    """(29) and (30): the energy is enough for the next touchdown."""
+    k, low = u[:, Slot.K_SC], p.rest_length * np.sin(u[:, Slot.TOUCHDOWN_ANGLE])
+    at_rest = np.column_stack((np.zeros_like(low), low, np.zeros_like(low)))
+    return np.asarray(VLO.energy(p, z, k) >= VLO.energy(p, at_rest, k))
+
+
+_COLORS = ("#db7321", "#2a6196", "#6b7078", "#3a9a4a")
+
+
+def error_figure(edges: Array, counts: Array, means: Mapping[str, tuple[Array, Array]]) -> Figure:
+    """Mean errors binned over d_v, with the number of runs in each bin.
+
+    Args:
+        edges: (b + 1,) of the bins.
+        counts: (b,) runs.
+        means: by map, (b,) mean position and velocity errors [%].
+    """
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    centres, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    for panel, (axes, label) in enumerate(
+        zip(
+            figure.subplots(1, 2), ("position error e_v [%]", "velocity error E_v [%]"), strict=True
+        )
+    ):
+        bars = axes.twinx()
+        bars.bar(centres, counts, width=0.9 * width, color="0.88", zorder=0)
+        bars.set_ylabel("runs")
+        axes.set_zorder(bars.get_zorder() + 1)
+        axes.patch.set_visible(False)
+        for color, (name, values) in zip(_COLORS, means.items(), strict=False):
+            axes.plot(centres, values[panel], "o-", color=color, markersize=4, label=name)
+        axes.set(xlabel="d_v", ylabel=label, yscale="log")
+        axes.legend(loc="lower right")
+    return figure
+
+
+def stride_figure(
+    paths: Sequence[tuple[str, Array]],
+    legs: Sequence[tuple[Array, Array]],
+    events: Sequence[tuple[str, float, float]],
+    title: str,
+) -> Figure:
+    """A stride's CoM path with its legs at the events.
+
+    Args:
+        paths: label and (n, 2) x, y of each path [m].
+        legs: toe and CoM (2,) of each leg drawn.
+        events: name, x and y of each event.
+        title: over the figure.
+    """
+    figure = Figure(figsize=(9.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    for toe, com in legs:
+        axes.plot([toe[0], com[0]], [toe[1], com[1]], color="0.75", linewidth=1.0, zorder=1)
+    for color, (label, path) in zip(_COLORS, paths, strict=False):
+        axes.plot(path[:, 0], path[:, 1], color=color, linewidth=1.6, label=label, zorder=2)
+    for i, (name, x, y) in enumerate(events):
+        axes.plot(x, y, "o", color="black", markersize=3.5, zorder=3)
+        axes.annotate(
+            name,
+            (x, y),
+            xytext=(0, 9 + 12 * (i % 2)),
+            textcoords="offset points",
+            ha="center",
+            fontsize=8,
+        )
+    axes.axhline(0.0, color="0.4", linewidth=0.8)
+    axes.set(xlabel="x [m]", ylabel="y [m]", title=title, ylim=(-0.03, 1.3))
+    axes.legend(loc="upper right", ncols=2)
+    return figure
+
 
 _PAPER = {
     "position": {"mean": 1.0, "sd": 1.4, "max": 18.0},

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.paper.map_figures import stride_figure
+from template_control.paper.map_errors import stride_figure
 from template_control.paper.reproduction import Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Slot

@@ -34,7 +34,7 @@ from template_control.run.record import Record
 from template_control.run.simulation import STEPS, simulate
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
-from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.scenario.scenario import STAND_HEIGHT, Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.warm_up import ready

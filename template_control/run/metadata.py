@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from template_control.checks.words import shown
+from template_control.checks.fitting import shown
 from template_control.embedding.controller import EmbeddingController
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import plant_name
 from template_control.run.options import SimulationOptions
 from template_control.run.recorder import Recorder
-from template_control.slip.gaits.flight import flight_share
+from template_control.slip.gaits.gait import flight_share
 
 
 def about(controller: EmbeddingController, o: SimulationOptions) -> dict[str, Any]:

@@ -85,7 +85,7 @@ def simulate(
 
     Ctrl-C ends the run, and the loop it stands in; so does an error of the route, of a planner or
     of a task. What was recorded until then is the attribute ``record`` of the exception
-    (:func:`~.record.recorded`).
+    (:func:`~.run.recorded`).
 
     Args:
         robot: model of the controller, and whose URDF the plant loads.

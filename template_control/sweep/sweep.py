@@ -29,9 +29,8 @@ from rich.progress import (
 )
 
 from template_control.checks.checked import Checked
-from template_control.checks.fitting import check
+from template_control.checks.fitting import check, shown
 from template_control.checks.ranges import Count, Index, Range
-from template_control.checks.words import shown
 from template_control.errors import SweepError
 from template_control.sweep.executor import ExecutorLostError, check_pickles, run_calls
 from template_control.sweep.file import Outcome, SweepFile, header

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.run.record import Record
 from template_control.run.summary import STANDING
-from template_control.slip.scenario.record import ScenarioRecord
+from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.figure_file import save_figure
 from template_control.view.state_figures import template_energies
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text, shade

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.slip.automaton.vocabulary import Slot
-from template_control.slip.scenario.record import ScenarioRecord
+from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.figure_file import save_figure
 from template_control.view.style import as_text
 

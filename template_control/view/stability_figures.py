@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.slip.gaits.branch import BranchPoint, Special
-from template_control.slip.gaits.stability import Kind
+from template_control.slip.gaits.branch import BranchPoint, Kind, Special
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

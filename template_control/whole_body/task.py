@@ -15,7 +15,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.asking import blame, name_of
+from template_control.checks.fitting import blame, name_of
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 

@@ -13,8 +13,8 @@ from rich.table import Table
 
 from template_control import storage
 from template_control.slip.automaton.vocabulary import Slot
-from template_control.slip.gaits.by_speed.family_cost import FamilyCost
-from template_control.slip.gaits.by_speed.family_search import (
+from template_control.slip.gaits.family_search import (
+    FamilyCost,
     Member,
     SearchEffort,
     family_data,

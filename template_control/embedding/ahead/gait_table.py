@@ -26,8 +26,8 @@ from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.planners.walking.lqr import settling_map
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.dynamics.stride import controls
-from template_control.slip.gaits.by_speed.speed_family import Chain, walking_by_speed
 from template_control.slip.gaits.gait import WALKING_SLOTS
+from template_control.slip.gaits.walking_by_speed import Chain, walking_by_speed
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters

@@ -18,7 +18,7 @@ from template_control.embedding.ahead.plan_cost import (
 from template_control.embedding.ahead.prospect import Aim, Plan, Prospect, Workspace
 from template_control.embedding.planners.gauss_newton import bounded_step
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.maps.section_map import RESULTS, one_stride
+from template_control.slip.maps.return_map import RESULTS, one_stride
 
 Array = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from template_control.embedding.ahead.gait_row import (
 )
 from template_control.embedding.ahead.prospect import Aim, Plan, Prospect, Workspace
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.maps.section_map import RESULTS, Derivatives, section_jacobian
+from template_control.slip.maps.return_map import RESULTS, Derivatives, section_jacobian
 from template_control.whole_body.elimination import cholesky
 
 Array = NDArray[np.float64]

@@ -26,7 +26,7 @@ from template_control.robot.free.free_biped import FreeBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Event, Leg
-from template_control.slip.lateral.cycle import LateralWish
+from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import Route
 from template_control.warm_up import ready

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from template_control.slip.lateral.kernels import LATERAL
+from template_control.slip.lateral.placing import LATERAL
 from template_control.warm_up import Part
 from template_control.whole_body.tasks import follow_foot
 

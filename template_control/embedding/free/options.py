@@ -15,7 +15,7 @@ from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.embedding.references.swing_foot import SwingOptions
 from template_control.estimation.noise_filter import NoiseFilterOptions
 from template_control.slip.automaton.vocabulary import Phase
-from template_control.slip.lateral.options import LateralOptions
+from template_control.slip.lateral.gait import LateralOptions
 from template_control.slip.similarity import LENGTH, TIME, tuned
 
 

@@ -8,13 +8,23 @@ from numpy.typing import NDArray
 from template_control.embedding.free.hurry import Outlook, outlook
 from template_control.embedding.references.template_path import TemplatePath
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.lateral.cycle import LateralCycle, LateralWish, lateral_cycle
-from template_control.slip.lateral.gait import LateralGait, lateral_gait
-from template_control.slip.lateral.learnt import LateralLearnt
-from template_control.slip.lateral.options import LateralOptions
+from template_control.slip.lateral.gait import (
+    LateralCycle,
+    LateralGait,
+    LateralOptions,
+    LateralWish,
+    Side,
+    lateral_cycle,
+    lateral_gait,
+)
 from template_control.slip.lateral.path import LateralPath, lateral_path
-from template_control.slip.lateral.placing import LateralAim, Placement, lateral_aim, place
-from template_control.slip.lateral.side import Side
+from template_control.slip.lateral.placing import (
+    LateralAim,
+    LateralLearnt,
+    Placement,
+    lateral_aim,
+    place,
+)
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
 

@@ -24,13 +24,12 @@ from template_control.embedding.standing.default import (
 from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
-from template_control.slip.gaits.walking_family import walking_gait
+from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.section import APEX
 from template_control.slip.scenario.catching import CatchingRoute
-from template_control.slip.scenario.route import Route, SteadyRoute
+from template_control.slip.scenario.route import Route, SpeedRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
-from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.slip.similarity import REFERENCE
 
 # A slow stride lasts 1.3 sqrt(l0 / g); a run that is behind its profile must be able to catch up.

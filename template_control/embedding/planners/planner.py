@@ -10,8 +10,8 @@ from typing import Annotated, ParamSpec, Protocol, TypeGuard, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.asking import answered, name_of
 from template_control.checks.checked import Checked
+from template_control.checks.fitting import answered, name_of
 from template_control.checks.ranges import Shape
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from template_control.checks.asking import asked
+from template_control.checks.fitting import asked
 from template_control.embedding.planners.planner import BreakingPlanner, Decision, Free, decided
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.section_report import SectionReport
 from template_control.embedding.sensing import Sensed
 from template_control.embedding.touchdown import free_controls
-from template_control.slip.automaton.breaking import BREAKS
+from template_control.slip.automaton.automaton import BREAKS
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
 from template_control.slip.maps.section import REST, section_of

@@ -10,10 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.asking import asked, name_of
-from template_control.checks.fitting import check
+from template_control.checks.fitting import asked, check, name_of, shown
 from template_control.checks.ranges import Shape, Triple
-from template_control.checks.words import shown
 from template_control.embedding.planners.planner import (
     Decision,
     ForgettingPlanner,

@@ -11,7 +11,7 @@ from template_control.embedding.planners.planner import CurvePlanner, decided
 from template_control.embedding.planning.rest_of_stride import RestOfStride
 from template_control.embedding.section_report import SectionReport
 from template_control.embedding.sensing import Sensed
-from template_control.slip.automaton.breaking import STEP_OUT
+from template_control.slip.automaton.automaton import STEP_OUT
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.maps.section import REST
 

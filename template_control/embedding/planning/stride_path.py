@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.asking import answered
+from template_control.checks.fitting import answered
 from template_control.embedding.planners.planner import (
     CurvePlanner,
     Decision,

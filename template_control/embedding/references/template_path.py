@@ -21,8 +21,8 @@ from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.embedding.phases import Clock
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Outcome, Reset
+from template_control.slip.dynamics.model import ORDER
 from template_control.slip.dynamics.stride import Stride
-from template_control.slip.dynamics.taylor import ORDER
 from template_control.slip.maps.section import VLO
 from template_control.slip.similarity import TIME, tuned
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Outcome, Reset
+from template_control.slip.dynamics.model import ORDER
 from template_control.slip.dynamics.stride import FiredEvent, Stride
-from template_control.slip.dynamics.taylor import ORDER
 
 Array = NDArray[np.float64]
 

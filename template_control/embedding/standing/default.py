@@ -16,8 +16,7 @@ from template_control.embedding.standing.planners import (
 )
 from template_control.embedding.standing.stepping import StepPlanner
 from template_control.embedding.standing.vaults import Family, Vaults
-from template_control.slip.gaits.by_speed.speed_family import walking_by_speed
-from template_control.slip.gaits.walking_family import speed_range, walking_gait
+from template_control.slip.gaits.walking_by_speed import speed_range, walking_by_speed, walking_gait
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
 

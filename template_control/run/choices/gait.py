@@ -18,8 +18,8 @@ from template_control.embedding.robot_template import (
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.slip.gaits.gait import WalkingGait
-from template_control.slip.gaits.mean_speed import gait_for_speed
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
+from template_control.slip.gaits.walking_by_speed import gait_for_speed
 from template_control.slip.similarity import REFERENCE
 
 _GAIT_NUMBERS = {

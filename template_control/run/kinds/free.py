@@ -30,7 +30,7 @@ from template_control.run.options import SimulationOptions
 from template_control.run.recorder import Recorder
 from template_control.run.sensing import Senses, SensorOptions, Sensors
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.lateral.cycle import LateralWish
+from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import Route
 

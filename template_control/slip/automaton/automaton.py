@@ -11,16 +11,376 @@ takes its place (``Reset.SHIFT``). At the liftoff into a flight the legs change 
 
 from __future__ import annotations
 
-from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.running import running
-from template_control.slip.automaton.standing import standing, steps_from_a_stand
-from template_control.slip.automaton.transitions import (
-    run_to_walk,
-    simplified_walk_to_run,
-    walk_to_run,
+from collections.abc import Mapping
+
+from template_control.slip.automaton.hybrid import Automaton, Edge, Node
+from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
+
+SINGLE_STANCE_FAILURES = (
+    Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
 )
-from template_control.slip.automaton.vocabulary import Slot
-from template_control.slip.automaton.walking import walking
+"""Of a single stance that goes to VLO or stands on one leg."""
+
+AWAITING_TOUCHDOWN_FAILURES = (
+    Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+"""Of a single stance whose front leg is to touch down."""
+
+DOUBLE_STANCE_FAILURES = (
+    Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+    Edge(Event.PASSED_FRONT_FOOT, Outcome.NO_LIFTOFF),
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+"""Of a double stance on springs."""
+
+RUNNING_STANCE_FAILURES = (
+    Edge(Event.FALL, Outcome.FALL),
+    Edge(Event.BACKWARD, Outcome.BACKWARD),
+)
+"""Of a stance that a flight follows: its liftoff is wanted."""
+
+CURVE_FAILURES = (Edge(Event.FALL, Outcome.FALL),)
+"""Of a double stance that follows a curve in time."""
+
+FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
+"""Of a flight: it ends at the ground."""
+
+
+def walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
+    """VLO -> touchdown -> virtual bottom -> rear liftoff -> VLO.
+
+    Args:
+        gait: kind of its stride.
+        rear: stiffnesses of the rear leg in double stance, before and after the bottom.
+    """
+    return (
+        Node(
+            f"SS_av^{gait}",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, f"DS_sc^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
+                *AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            f"DS_sc^{gait}",
+            Phase.DS,
+            rear[0],
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, f"DS_sd^{gait}", Reset.NONE, f"G_b^{gait}"),
+                # The paper assumes a virtual bottom in every double stance; a short one of a
+                # disturbed walker ends without.
+                Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}"),
+                *DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            f"DS_sd^{gait}",
+            Phase.DS,
+            rear[1],
+            Slot.K_SD,
+            (
+                Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}"),
+                *DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            f"SS_bv^{gait}",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.VLO, f"SS_av^{gait}", Reset.NONE, f"G_v^{gait}", section=True),
+                *SINGLE_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
+def running() -> tuple[Node, ...]:
+    """Apex -> touchdown -> bottom -> liftoff -> apex."""
+    return (
+        Node(
+            "F_aa^r",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^r", Reset.PLACE_REAR, "G_t^r"), *FLIGHT_FAILURES),
+        ),
+        Node(
+            "SS_sc^r",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^r", Reset.NONE, "G_b^r"), *RUNNING_STANCE_FAILURES),
+        ),
+        Node(
+            "SS_sd^r",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.SWAP, "G_l^r"),
+                *RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "F_ba^r",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *FLIGHT_FAILURES),
+        ),
+    )
+
+
+def walk_to_run() -> tuple[Node, ...]:
+    """The WRT stride: the rear leg walks, the front leg runs (Section IV-C1)."""
+    return (
+        Node(
+            "SS_av^wr",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
+                # A walker that is too fast takes off before.
+                Edge(Event.REAR_LIFTOFF, "F_aa^wr", Reset.SWAP, "G_l^wr"),
+                *AWAITING_TOUCHDOWN_FAILURES[1:],
+            ),
+        ),
+        Node(
+            "F_aa^wr",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^wr", Reset.PLACE_REAR, "G_t^wr"), *FLIGHT_FAILURES),
+        ),
+        Node(
+            "DS_sc^wr",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                *DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sd^wr",
+            Phase.DS,
+            Slot.K_SD,
+            Slot.K_SC_WR,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                *DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_sc^wr",
+            Phase.SS,
+            Slot.K_SC_WR,
+            None,
+            (
+                Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_sd^wr",
+            Phase.SS,
+            Slot.K_SD_WR,
+            None,
+            (
+                Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.SWAP, "G_f^wr"),
+                *RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "F_ba^wr",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *FLIGHT_FAILURES),
+        ),
+    )
+
+
+def simplified_walk_to_run() -> tuple[Node, ...]:
+    """The WRT stride as its controller sees it (Section IV-C1).
+
+    The rear leg is ignored after the virtual bottom, though its liftoff still ends the
+    phase; from there on the stride is the real one.
+    """
+    return (
+        Node(
+            "SS_av^wr*",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^wr*", Reset.PLACE_FRONT, "G_t^wr"),
+                *AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sc^wr*",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "SS_br^wr*",
+            Phase.SS,
+            None,
+            Slot.K_SC_WR,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                # Alone, the front leg may be passed before: that is no failure here.
+                Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *RUNNING_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
+def run_to_walk() -> tuple[Node, ...]:
+    """The RWT stride: apex -> touchdown -> bottom -> VLO (Section IV-C2)."""
+    return (
+        Node(
+            "F_aa^rw",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^rw", Reset.PLACE_REAR, "G_t^rw"), *FLIGHT_FAILURES),
+        ),
+        Node(
+            "SS_sc^rw",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^rw", Reset.NONE, "G_b^rw"), *RUNNING_STANCE_FAILURES),
+        ),
+        Node(
+            "SS_sd^rw",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^rw", section=True),
+                *SINGLE_STANCE_FAILURES,
+            ),
+        ),
+    )
+
+
+def standing() -> tuple[Node, ...]:
+    """Standing, and the strides from it, to it and between two walking speeds.
+
+    No springs carry their double stances: the CoM follows a curve in time there. The template's
+    own simulator falls through them.
+    """
+    return (
+        Node(
+            "DS_ar^s",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^s", section=True), *CURVE_FAILURES),
+        ),
+        Node(
+            "DS_ar^sw",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^sw"), *CURVE_FAILURES),
+        ),
+        Node(
+            "SS_av^ws",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_br^ws", Reset.PLACE_FRONT, "G_t^ws"),
+                *AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_br^ws",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^ws", section=True), *CURVE_FAILURES),
+        ),
+        Node(
+            "SS_av^ww",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_bl^ww", Reset.PLACE_FRONT, "G_t^ww"),
+                *AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_bl^ww",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^ww"), *CURVE_FAILURES),
+        ),
+    )
+
+
+def _stepping(gait: str, lifts: Edge, rests: Edge) -> tuple[Node, ...]:
+    """From a stand, over one leg, to a stand; ``lifts`` and ``rests`` begin and end it."""
+    return (
+        Node(f"DS_al^{gait}", Phase.DS, None, None, (lifts, *CURVE_FAILURES)),
+        Node(
+            f"SS_bt^{gait}",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, f"DS_br^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
+            ),
+        ),
+        Node(f"DS_br^{gait}", Phase.DS, None, None, (rests, *CURVE_FAILURES)),
+    )
+
+
+def steps_from_a_stand() -> tuple[Node, ...]:
+    """A step forward, and one back, whose foot lands behind the other: then they change roles."""
+    return (
+        *_stepping(
+            "sf",
+            Edge(Event.REAR_LIFTOFF, "SS_bt^sf", Reset.SHIFT, "G_l^sf"),
+            Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^sf", section=True),
+        ),
+        *_stepping(
+            "sb",
+            Edge(Event.FRONT_LIFTOFF, "SS_bt^sb", Reset.NONE, "G_l^sb"),
+            Edge(Event.REST, "DS_ar^s", Reset.SWAP, "G_r^sb", section=True),
+        ),
+    )
+
 
 AUTOMATON = Automaton(
     nodes=(
@@ -53,3 +413,41 @@ AUTOMATON = Automaton(
 STRIDE_START = AUTOMATON.starts
 """First node of each kind of stride (superscripts of Table I; * the controller's WRT, wp
 walking with push-off)."""
+
+
+RUN_ON: Mapping[str, str] = {
+    "SS_av^w": "SS_av^wr",
+    "DS_sc^w": "DS_sc^wr",
+    "DS_sd^w": "DS_sd^wr",
+    "SS_bv^w": "SS_av^wr",
+    "SS_av^wp": "SS_av^wr",
+    "DS_sc^wp": "DS_sc^wr",
+    "DS_sd^wp": "DS_sd^wr",
+    "SS_bv^wp": "SS_av^wr",
+}
+"""By a walking node: where the walk-to-run stride goes on from there.
+
+In single stance the other foot lands next, whether VLO is past or not.
+"""
+
+_BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
+_BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
+
+BREAKS: Mapping[str, Mapping[str, str]] = {
+    "wr": RUN_ON,
+    "ww": dict.fromkeys(_BOTH_STAND, "DS_bl^ww"),
+    "ws": dict.fromkeys(_BOTH_STAND, "DS_br^ws"),
+    "sb": dict.fromkeys(_BEFORE_VLO, "SS_bt^sb"),
+}
+"""By the kind of a stride that a walk can break into: from which nodes, and where it goes on.
+
+The last three are of a slow walk, whose springs would throw it back. A curve in time carries the
+CoM while both feet stand, on or to rest; the foot that is up is set down behind again.
+"""
+
+STEP_OUT: Mapping[str, tuple[str, ...]] = {
+    "DS_ar^s": ("sf", "sb"),
+    "DS_br^ws": ("sf", "sb"),
+    "DS_br^sf": ("sf", "sb"),
+}
+"""By a node in which both feet stand: strides with a step, where the CoM cannot come to rest."""

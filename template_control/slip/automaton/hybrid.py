@@ -1,15 +1,132 @@
-"""A hybrid automaton: its nodes, and where each kind of stride starts among them."""
+"""Hybrid automata: nodes, edges with guards and resets, and their tables for compiled code."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from template_control.errors import ParameterError
-from template_control.slip.automaton.node import Edge, Node
-from template_control.slip.automaton.tables import Tables, pack
-from template_control.slip.automaton.vocabulary import MAX_EDGES, Event, Outcome, Phase
+from template_control.slip.automaton.vocabulary import (
+    MAX_EDGES,
+    Event,
+    Leg,
+    Outcome,
+    Phase,
+    Reset,
+    Slot,
+)
+
+_STANCE = {Phase.F: (), Phase.SS: (Leg.REAR,), Phase.DS: (Leg.REAR, Leg.FRONT)}
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A transition: when ``event`` fires, apply ``reset`` and go to ``target``.
+
+    Attributes:
+        event: the guard.
+        target: name of the successor node, or the failure the stride ends with.
+        reset: what happens to the toes.
+        guard: the guard's name in Fig. 2 (empty for failures).
+        section: True where a stride ends (VLO or apex), and the next begins at ``target``.
+    """
+
+    event: Event
+    target: str | Outcome
+    reset: Reset = Reset.NONE
+    guard: str = ""
+    section: bool = False
+
+
+@dataclass(frozen=True)
+class Node:
+    """A circle of Fig. 2, ``phase_subphase^gait``; leg stiffness is constant in it.
+
+    Attributes:
+        name: the node's name, such as ``"DS_sc^w"``.
+        phase: flight, single or double stance.
+        rear: stiffness slot of the rear (in single stance: the only) leg, None in the air.
+        front: stiffness slot of the front leg, None in the air.
+        edges: the ways out, failures included.
+    """
+
+    name: str
+    phase: Phase
+    rear: Slot | None
+    front: Slot | None
+    edges: tuple[Edge, ...]
+
+    @property
+    def gait(self) -> str:
+        """Superscript of the name: ``"wr"`` of ``"SS_av^wr"``."""
+        return self.name.partition("^")[2]
+
+    @property
+    def stance(self) -> tuple[Leg, ...]:
+        """The legs on the ground: none in flight, the rear one in single stance, or both."""
+        return _STANCE[self.phase]
+
+    def edge(self, event: Event) -> Edge | None:
+        """The edge that ``event`` fires, or None."""
+        return next((e for e in self.edges if e.event is event), None)
+
+
+IntArray = NDArray[np.int64]
+
+
+class Tables(NamedTuple):
+    """Arrays that a compiled kernel interprets.
+
+    Attributes:
+        rear: (nodes,) stiffness slot of the rear leg, -1 in the air.
+        front: (nodes,) stiffness slot of the front leg, -1 in the air.
+        first_edge: (nodes + 1,) edges of node i are ``first_edge[i]:first_edge[i + 1]``.
+        event: (edges,) value of the guard's :class:`Event`.
+        target: (edges,) successor node, -1 where the stride fails.
+        reset: (edges,) value of the :class:`Reset`.
+        outcome: (edges,) -1 if the stride goes on, else the :class:`Outcome` it ends with.
+    """
+
+    rear: IntArray
+    front: IntArray
+    first_edge: IntArray
+    event: IntArray
+    target: IntArray
+    reset: IntArray
+    outcome: IntArray
+
+
+def pack(nodes: Sequence[Node]) -> Tables:
+    """Pack an automaton's ``nodes`` into :class:`Tables`."""
+    index = {node.name: i for i, node in enumerate(nodes)}
+    edges = [edge for node in nodes for edge in node.edges]
+    counts = [len(node.edges) for node in nodes]
+
+    def array(values: list[int]) -> IntArray:
+        return np.array(values, dtype=np.int64)
+
+    return Tables(
+        rear=array([-1 if n.rear is None else int(n.rear) for n in nodes]),
+        front=array([-1 if n.front is None else int(n.front) for n in nodes]),
+        first_edge=array([0, *np.cumsum(counts).tolist()]),
+        event=array([int(e.event) for e in edges]),
+        target=array([-1 if isinstance(e.target, Outcome) else index[e.target] for e in edges]),
+        reset=array([int(e.reset) for e in edges]),
+        outcome=array(
+            [
+                int(e.target)
+                if isinstance(e.target, Outcome)
+                else (int(Outcome.SECTION) if e.section else -1)
+                for e in edges
+            ]
+        ),
+    )
+
 
 __all__ = ["Automaton", "Edge", "Node"]
 

@@ -15,7 +15,7 @@ from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, Model, model_of, stride_kernel
-from template_control.slip.maps.section_map import RESULTS, closed_form, one_stride
+from template_control.slip.maps.return_map import RESULTS, closed_form, one_stride
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -111,7 +111,7 @@ def modified_step(
     Args:
         aim: the VLO state wanted, and the bounds.
         controls: (NUM_SLOTS,) touchdown angle and kappa_1; kappa_2 is overwritten.
-        The rest as in :func:`~template_control.slip.maps.section_map.one_stride`.
+        The rest as in :func:`~template_control.slip.maps.return_map.one_stride`.
 
     Returns:
         The Outcome's value.

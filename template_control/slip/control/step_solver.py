@@ -77,7 +77,7 @@ class Step(Protocol):
             u: (NUM_SLOTS,) controls; touchdown angle [rad] and stiffnesses [N/m] by Slot.
 
         Returns:
-            (RESULTS,) as of :func:`~template_control.slip.maps.section_map.section_map`; how the
+            (RESULTS,) as of :func:`~template_control.slip.maps.return_map.section_map`; how the
             stride ended.
         """
 

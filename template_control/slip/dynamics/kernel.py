@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import inner
-from template_control.slip.automaton.tables import Tables
+from template_control.slip.automaton.hybrid import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
-from template_control.slip.dynamics.guards import all_bends
+from template_control.slip.dynamics.guards import COEFFICIENTS, SERIES, Path, all_bends, sample
 from template_control.slip.dynamics.locate import Watch, arm, first_event
-from template_control.slip.dynamics.model import Kernel, model_of
-from template_control.slip.dynamics.path import COEFFICIENTS, SERIES, Path, sample
-from template_control.slip.dynamics.taylor import ORDER, expand, steepest
+from template_control.slip.dynamics.model import ORDER, Kernel, expand, model_of, steepest
 
 Array = NDArray[np.float64]
 

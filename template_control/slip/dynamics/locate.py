@@ -14,8 +14,14 @@ from numpy.typing import NDArray
 
 from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
-from template_control.slip.dynamics.guards import all_guards, guard, guard_rate
-from template_control.slip.dynamics.path import SERIES, Path, sample
+from template_control.slip.dynamics.guards import (
+    SERIES,
+    Path,
+    all_guards,
+    guard,
+    guard_rate,
+    sample,
+)
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -253,7 +259,7 @@ def first_event(
     """First of a node's guards that fires within ``horizon``, and when.
 
     Args:
-        kind, path: the CoM's, see :func:`~.path.sample`.
+        kind, path: the CoM's, see :func:`~.guards.sample`.
         horizon: where to stop looking [s].
         substep: longest between two looks at a guard that comes close to zero [s].
         tolerance: of event times [s].

@@ -1,4 +1,10 @@
-"""What a compiled stride reads: the template's physics and where in the automaton it begins."""
+"""Physics of a compiled stride and its start in the automaton, and the dynamics' Taylor series.
+
+The right-hand side is built from sums, products and one power, so all Taylor
+coefficients of the CoM path follow from recurrences (automatic differentiation of the
+ODE; Jorba and Zou 2005). A phase then takes one to three steps, each a polynomial that
+also serves as dense output and as the path on which events are located.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.compiled import inner
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.tables import Tables
+from template_control.slip.automaton.hybrid import Automaton, Tables
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -105,3 +110,98 @@ def stride_kernel(
     """
     node = automaton.index[automaton.start(stride).name]
     return Kernel(automaton.tables, *kernel_model(parameters), node=node)
+
+
+ORDER = 16
+"""Degree of the polynomials."""
+
+TOLERANCE = 1e-13
+"""Size of the last terms relative to the rest length; sets the step."""
+
+
+@inner
+def expand(
+    state: Array,
+    toes: Array,
+    stiffness: Array,
+    model: Model,
+    cx: Array,
+    cy: Array,
+    work: Array,
+) -> float:
+    """Taylor coefficients of the CoM path from ``state`` and the step they are good for.
+
+    Args:
+        state: (4,) x, y, dx/dt, dy/dt [m, m/s] in the world frame (y up).
+        toes: (2,) x of the rear and the front toe [m].
+        stiffness: (2,) stiffness [N/m] of the rear and front leg, 0 for a leg in the air.
+        model: the template.
+        cx, cy: (ORDER + 1,) overwritten with x(t) = sum cx[i] t^i, and y.
+        work: (2, 4, ORDER + 1) scratch.
+
+    Returns:
+        The step h [s] within which the truncated series are exact to ``TOLERANCE``.
+    """
+    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
+    along = backward(model, stiffness)
+    cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
+    for n in range(ORDER - 1):
+        ax = ay = 0.0 * cx[0]
+        if n == 0:
+            ax, ay = ax - along, ay - gravity
+        for leg in range(2):
+            if stiffness[leg] == 0.0:
+                continue
+            d, s, q, w = work[leg, 0], work[leg, 1], work[leg, 2], work[leg, 3]
+            d[n] = cx[n] - (toes[leg] if n == 0 else 0.0)
+            total = 0.0 * cx[0]
+            for j in range((n + 1) // 2):
+                total += d[j] * d[n - j] + cy[j] * cy[n - j]
+            total *= 2.0
+            if n % 2 == 0:
+                total += d[n // 2] * d[n // 2] + cy[n // 2] * cy[n // 2]
+            s[n] = total
+            if n == 0:
+                q[0] = 1.0 / np.sqrt(total)
+                w[0] = stiffness[leg] / mass * (rest_length * q[0] - 1.0)
+            else:
+                total = 0.0 * cx[0]
+                for j in range(n):
+                    total += (-0.5 * (n - j) - j) * s[n - j] * q[j]
+                q[n] = total / (n * s[0])
+                w[n] = stiffness[leg] / mass * rest_length * q[n]
+            for j in range(n + 1):
+                ax += w[j] * d[n - j]
+                ay += w[j] * cy[n - j]
+        scale = 1.0 / ((n + 1) * (n + 2))
+        cx[n + 2] = ax * scale
+        cy[n + 2] = ay * scale
+    step = np.inf
+    for n in (ORDER - 1, ORDER):
+        size = max(abs(cx[n]), abs(cy[n])) / rest_length
+        if size > 0.0:
+            step = min(step, (TOLERANCE / size) ** (1.0 / n))
+    return step
+
+
+@inner
+def steepest(cx: Array, cy: Array, step: float) -> tuple[float, float, float]:
+    """Bounds of the CoM's speed, acceleration and jerk within ``step`` [m/s, m/s^2, m/s^3].
+
+    They are the series of the derivatives with the absolute values of all coefficients; the length
+    of a vector is at most |x| + |y|.
+
+    Args:
+        cx, cy: (ORDER + 1,) from :func:`expand`.
+        step: [s].
+    """
+    acceleration = jerk = 0.0
+    squared = step * step
+    for n in range(ORDER, 2, -2):  # by twos, for a shorter chain of products
+        even = n * (n - 1) * step * (abs(cx[n].real) + abs(cy[n].real))
+        odd = (n - 1) * (n - 2) * (abs(cx[n - 1].real) + abs(cy[n - 1].real))
+        acceleration = acceleration * squared + (even + odd)
+        jerk = jerk * squared + ((n - 2) * even + (n - 3) * odd)
+    acceleration = acceleration * step + 2.0 * (abs(cx[2].real) + abs(cy[2].real))
+    speed = abs(cx[1].real) + abs(cy[1].real) + acceleration * step
+    return speed, acceleration, jerk

@@ -19,8 +19,8 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel
+from template_control.slip.maps.return_map import RESULTS, one_stride
 from template_control.slip.maps.section import VLO
-from template_control.slip.maps.section_map import RESULTS, one_stride
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]

@@ -15,11 +15,12 @@ from scipy.optimize import brentq
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive, Shape, Triple
 from template_control.errors import GaitError
-from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
-from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Phase, Slot
+from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import VLO
+from template_control.slip.maps.section import VLO, section_of
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -315,3 +316,30 @@ def gait_from_energy(
     if not roots:
         raise GaitError(f"no walking gait with VLO height {height:g} m and energy {energy:g} J")
     return _gait(name, parameters, *roots[-1])
+
+
+@checked
+def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
+    """Share of a stride's duration in which no foot is on the ground.
+
+    Args:
+        gait: any whose stride returns to its state.
+        automaton: that its stride is of.
+    """
+    start = automaton.start(gait.stride).name
+    section = section_of(automaton.sections(start)[0])
+    stride = simulate_stride(
+        gait.parameters, start, section.state(gait.state), gait.controls, automaton=automaton
+    )
+    return flying(stride, automaton)
+
+
+def flying(stride: Stride, automaton: Automaton = AUTOMATON) -> float:
+    """Share of a simulated stride's duration in which no foot is on the ground.
+
+    Args:
+        stride: one that was completed.
+        automaton: that it is of.
+    """
+    flies = [node.phase is Phase.F for node in automaton.nodes]
+    return float(sum(row[1] for row in stride.meta if flies[int(row[2])]) / stride.duration)

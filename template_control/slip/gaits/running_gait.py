@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from template_control.checks.checked import checked
+from template_control.checks.fitting import inward
 from template_control.checks.ranges import Positive
-from template_control.checks.words import inward
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.flight import flying
+from template_control.slip.gaits.gait import flying
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters

@@ -1,24 +1,98 @@
-"""A gait's sideways step map, and the law that returns to its periodic motion."""
+"""A gait's sideways step map, the law that returns to its periodic motion, and that motion."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from template_control.checks.checked import checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Interval, NotNegative, Positive, Share
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.lateral.options import LateralOptions
-from template_control.slip.lateral.path import NEXT, lateral_path
-from template_control.slip.lateral.transition import transition
+from template_control.slip.lateral.path import NEXT, lateral_path, transition
 from template_control.slip.maps.section import section_of
-from template_control.slip.similarity import Scale, scaled
+from template_control.slip.similarity import (
+    LENGTH,
+    PER_LENGTH_SQUARED,
+    PER_SPEED_SQUARED,
+    SPEED,
+    TIME,
+    Scale,
+    scaled,
+    tuned,
+)
+
+
+@dataclass(frozen=True)
+class LateralLearningOptions(Checked):
+    """How fast the sideways motion is learnt, and how much is believed.
+
+    Attributes:
+        gain: share of a step's surprise that enters the offset of y and dy/dt.
+        one_sided: how far a step from one side teaches that side alone. At 0 the other side learns
+            the mirror image: a drift aside, which is the walk's own and no offset, is not learnt.
+        offset_bound: largest offsets of y and dy/dt [m, m/s].
+        surprise_bound: a larger surprise counts as this much: a push is no offset [m, m/s].
+        stretch_gain: share of a stance's surprise that enters the stretch.
+        stretch_bounds: of the stretch. A stance that is longer or shorter was disturbed.
+    """
+
+    gain: Share = tuned(0.2)
+    one_sided: Share = tuned(0.0)
+    offset_bound: tuple[NotNegative, NotNegative] = tuned((0.04, 0.15), LENGTH, SPEED)
+    surprise_bound: tuple[NotNegative, NotNegative] = tuned((0.02, 0.08), LENGTH, SPEED)
+    stretch_gain: Share = tuned(0.2)
+    stretch_bounds: Interval = tuned((0.9, 1.2))
+
+
+@dataclass(frozen=True)
+class LateralOptions(Checked):
+    """Tuning of the footholds' y.
+
+    Attributes:
+        state_cost: on y and dy/dt at a section, over those of the periodic gait
+            [1/m^2, s^2/m^2]: equal for both where dy/dt is measured by sqrt(g / l0).
+        step_cost: on the next foot's distance to the stance foot, over the gait's [1/m^2].
+        widths: least and largest distance aside between two footholds [m]: feet do not cross,
+            and legs open so far only.
+        reach: largest distance aside between CoM and foot at touchdown [m].
+        hold: a foothold is not changed so shortly before touchdown [s]: the foot cannot follow.
+        learning: how the robot's own part is learnt.
+    """
+
+    state_cost: tuple[NotNegative, NotNegative] = tuned(
+        (1.0, 0.102), PER_LENGTH_SQUARED, PER_SPEED_SQUARED
+    )
+    step_cost: Positive = tuned(0.02, PER_LENGTH_SQUARED)
+    widths: Interval = tuned((0.08, 0.6), LENGTH)
+    reach: Positive = tuned(0.4, LENGTH)
+    hold: NotNegative = tuned(0.042, TIME)
+    learning: LateralLearningOptions = field(default_factory=LateralLearningOptions)
+
+
+class Side(IntEnum):
+    """Of the body a foot is on; +1 is where y is positive."""
+
+    LEFT = 1
+    RIGHT = -1
+
+    @property
+    def other(self) -> Side:
+        """The other side."""
+        return Side(-self)
+
+    @property
+    def row(self) -> int:
+        """Place in arrays with a row for each side: left, right."""
+        return 0 if self is Side.LEFT else 1
+
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -99,3 +173,62 @@ def _cost_to_go(a: Array, b: Array, state_cost: Array, step_cost: float) -> Arra
             "no law brings the sideways motion of this gait back: choose another gait"
         ) from None
     return np.asarray(found)
+
+
+@dataclass(frozen=True)
+class LateralWish(Checked):
+    """What the feet are to do aside.
+
+    Attributes:
+        width: distance aside between left and right footholds [m].
+        aside: distance to the left that each step moves the walk [m].
+        turn: angle by which the heading turns to the left at each section [rad].
+    """
+
+    width: Positive
+    aside: float = 0.0
+    turn: float = 0.0
+
+
+@dataclass(frozen=True)
+class LateralCycle:
+    """The periodic motion of a wish, two steps long; rows are :attr:`Side.row`.
+
+    Attributes:
+        states: (2, 2) X at a section with the foot of that side as stance foot, before a turn.
+        steps: (2,) distance from that foot to the next foothold, to the left [m].
+    """
+
+    states: Array
+    steps: Array
+
+
+def lateral_cycle(
+    lateral: LateralGait, wish: LateralWish, offset: Array | None = None
+) -> LateralCycle:
+    """The periodic motion: from section to section the mirror image, where nothing is one-sided.
+
+    At a turn by psi the velocity turns in the heading frame: dy/dt changes by -v psi. The walk's
+    circle is the one that its mirror image in time goes along too: dy/dt is v psi / 2 before.
+
+    Args:
+        lateral: the step map.
+        wish: width, motion aside and turn.
+        offset: (2, 2) what the robot adds to X' after a step from the left and from the right
+            foot; None: nothing.
+    """
+    a, b, one = lateral.a, lateral.b, np.eye(2)
+    added = np.zeros((2, 2)) if offset is None else offset
+    mirrored = np.linalg.solve(one + a, wish.width * b - 0.5 * (added[0] - added[1]))
+    half = 0.5 * lateral.speed * wish.turn
+    to_left = one - a
+    turning, moved = np.linalg.solve(
+        np.column_stack((to_left[:, 0], -b)), -2.0 * half * a[:, 1] - half * to_left[:, 1]
+    )
+    aside = np.linalg.solve(to_left, wish.aside * b + 0.5 * (added[0] + added[1]))
+    aside += (turning, half)
+    step = wish.aside + moved
+    return LateralCycle(
+        states=np.array([aside + mirrored, aside - mirrored]),
+        steps=np.array([step - wish.width, step + wish.width]),
+    )

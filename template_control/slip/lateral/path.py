@@ -1,4 +1,4 @@
-"""What the sideways motion of the template depends on: its planar path, and who stands when.
+"""The template's sideways motion along its planar path, to the first order.
 
 Frame: x forward, y to the left, z up; the height that the planar template calls y is z here.
 In space each leg is a massless spring from its toe (x_i, y_i, 0) to the CoM (x, y, z), with the
@@ -27,7 +27,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import Leg, Reset
+from template_control.slip.dynamics.guards import SERIES, Path, sample
 from template_control.slip.dynamics.stride import Stride
 
 Array = NDArray[np.float64]
@@ -115,3 +117,125 @@ def _footholds(
     footholds[meta[:, 5:7] == 0.0] = IN_AIR  # NaN where both legs stand without springs
     first, beside = landings[0] if landings else (np.inf, 0)
     return footholds, first, beside
+
+
+COLUMNS = 2 + NEXT + 1
+"""y, dy/dt and the footholds 0, 1 and 2 that they depend on."""
+
+
+@compiled
+def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> None:
+    """Write c_i = f_i / (m l_i) of the rear and the front leg into ``out`` (2,) [1/s^2].
+
+    Args:
+        path: whose CoM and toes are known.
+        row: segment.
+        time: since its start [s].
+        com: (6,) overwritten with x, z and their first and second derivatives.
+        out: overwritten; 0 for a leg in the air. Legs do not pull.
+    """
+    coefficients, meta = path.coefficients, path.meta
+    sample(SERIES, Path(coefficients[0, row], coefficients[1, row]), time, com)
+    total = max(com[5] + path.gravity, 0.0) / com[1]
+    rear, front = path.footholds[row, 0] >= 0, path.footholds[row, 1] >= 0
+    share = 1.0 if front else 0.0
+    if rear and front:
+        apart = meta[row, 4] - meta[row, 3]
+        share = 0.5
+        if apart != 0.0 and total > 0.0:
+            share = (com[0] - com[4] / total - meta[row, 3]) / apart
+            share = min(max(share, 0.0), 1.0)
+    elif not rear and not front:
+        total = 0.0
+    out[0], out[1] = total * (1.0 - share), total * share
+
+
+@compiled
+def advance(path: LateralPath, start: float, end: float, stretch: float, motion: Array) -> None:
+    """Carry motions on along the path, by the classical Runge-Kutta method.
+
+    Args:
+        path: the planar path.
+        start, end: times on it [s]; ``end`` is at most its section.
+        stretch: single stance takes this times as long as on the path.
+        motion: (2, COLUMNS) overwritten: y and dy/dt at ``start`` and then at ``end``, per unit
+            of y, dy/dt and each foothold's y at some earlier time.
+    """
+    com, before, middle, after = np.empty(6), np.empty(2), np.empty(2), np.empty(2)
+    meta, footholds = path.meta, path.footholds
+    for row in range(meta.shape[0]):
+        begin, until = max(meta[row, 0], start), min(meta[row, 0] + meta[row, 1], end)
+        if until <= begin:
+            continue
+        steps = int(np.ceil((until - begin) / path.longest))
+        h = (until - begin) / steps
+        rear, front = footholds[row, 0], footholds[row, 1]
+        dt = h * stretch if (rear >= 0) != (front >= 0) else h
+        t = begin - meta[row, 0]
+        pulls(path, row, t, com, before)
+        for _ in range(steps):
+            pulls(path, row, t + 0.5 * h, com, middle)
+            pulls(path, row, t + h, com, after)
+            a, b, c = before[0] + before[1], middle[0] + middle[1], after[0] + after[1]
+            for j in range(motion.shape[1]):
+                fa = fb = fc = 0.0
+                if j >= 2:
+                    if rear == j - 2:
+                        fa, fb, fc = fa + before[0], fb + middle[0], fc + after[0]
+                    if front == j - 2:
+                        fa, fb, fc = fa + before[1], fb + middle[1], fc + after[1]
+                y, v = motion[0, j], motion[1, j]
+                k1 = a * y - fa
+                v2 = v + 0.5 * dt * k1
+                k2 = b * (y + 0.5 * dt * v) - fb
+                v3 = v + 0.5 * dt * k2
+                k3 = b * (y + 0.5 * dt * v2) - fb
+                v4 = v + dt * k3
+                k4 = c * (y + dt * v3) - fc
+                motion[0, j] = y + dt / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
+                motion[1, j] = v + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            before[0], before[1] = after[0], after[1]
+            t += h
+
+
+@compiled
+def transition(path: LateralPath, start: float, end: float, stretch: float) -> Array:
+    """The matrix of the motion between two times, (2, COLUMNS).
+
+    Args:
+        path: the planar path.
+        start, end: times on it [s]; ``end`` is at most its section.
+        stretch: single stance takes this times as long as on the path.
+
+    Returns:
+        M with (y, dy/dt)(end) = M (y, dy/dt, y_0, y_1, y_2), y_i the footholds' [m]. All moved
+        aside by one length move the end by it: M[:, 0] + M[:, 2:].sum(1) = (1, 0).
+    """
+    motion = np.zeros((2, COLUMNS))
+    motion[0, 0] = motion[1, 1] = 1.0
+    advance(path, start, end, stretch, motion)
+    return motion
+
+
+@compiled
+def acceleration(path: LateralPath, time: float, y: float, feet: Array) -> float:
+    """d2y/dt2 = sum_i c_i (y - y_i) of the template [m/s^2].
+
+    Args:
+        path: the planar path.
+        time: on it [s].
+        y: of the CoM [m].
+        feet: (3,) y of the footholds: of the feet that were rear and front at the start of the
+            path, and of the next one [m].
+    """
+    com, leg = np.empty(6), np.empty(2)
+    meta, row = path.meta, 0
+    while row + 1 < meta.shape[0] and meta[row + 1, 0] <= time:
+        row += 1
+    pulls(path, row, min(max(time - meta[row, 0], 0.0), meta[row, 1]), com, leg)
+    total = 0.0
+    for i in range(2):
+        foothold = path.footholds[row, i]
+        if 0 <= foothold < feet.shape[0]:
+            total += leg[i] * (y - feet[foothold])
+    return total

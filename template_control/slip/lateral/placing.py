@@ -1,22 +1,89 @@
-"""Where the next foot is put, to the left or right: asked at every tick."""
+"""Lateral foot placement, asked at every tick, and what it learns from step to step."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.slip.lateral.cycle import LateralCycle
-from template_control.slip.lateral.gait import LateralGait
-from template_control.slip.lateral.learnt import LateralLearnt
-from template_control.slip.lateral.options import LateralOptions
-from template_control.slip.lateral.path import NEXT, LateralPath
-from template_control.slip.lateral.side import Side
-from template_control.slip.lateral.transition import COLUMNS, advance
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.lateral.gait import (
+    LateralCycle,
+    LateralGait,
+    LateralLearningOptions,
+    LateralOptions,
+    Side,
+)
+from template_control.slip.lateral.path import (
+    COLUMNS,
+    NEXT,
+    LateralPath,
+    acceleration,
+    advance,
+    lateral_path,
+    transition,
+)
+from template_control.slip.maps.section import VLO
+from template_control.slip.parameters import SlipParameters
+from template_control.warm_up import Part
 
 Array = NDArray[np.float64]
+
+
+def _nothing() -> Array:
+    return np.zeros((len(Side), 2))
+
+
+@dataclass(frozen=True)
+class LateralLearnt:
+    """What has been learnt so far; each lesson gives a new one.
+
+    Attributes:
+        offset: (2, 2) what the robot adds to y and dy/dt at a section, in steps from the left and
+            from the right foot [m, m/s]; rows are :attr:`Side.row`.
+        stretch: duration of single stance over the template's.
+    """
+
+    offset: Array = field(default_factory=_nothing)
+    stretch: float = 1.0
+
+    def after_step(
+        self, stance: Side, surprise: Array, options: LateralLearningOptions
+    ) -> LateralLearnt:
+        """After the section of a nominal step; a step with a push teaches nothing.
+
+        Args:
+            stance: side of the foot that the step began on.
+            surprise: (2,) y from the stance foot and dy/dt over what was expected as the foot
+                landed [m, m/s].
+            options: scaled to the template.
+        """
+        limit, bound = np.array(options.surprise_bound), np.array(options.offset_bound)
+        lesson = 0.5 * options.gain * np.clip(surprise, -limit, limit)
+        offset = self.offset.copy()
+        offset[stance.row] += (1.0 + options.one_sided) * lesson
+        offset[stance.other.row] -= (1.0 - options.one_sided) * lesson
+        return replace(self, offset=np.clip(offset, -bound, bound))
+
+    def after_stance(
+        self, lasted: float, planned: float, options: LateralLearningOptions
+    ) -> LateralLearnt:
+        """After a piece of single stance, such as that from a section to the touchdown.
+
+        Args:
+            lasted: its duration [s].
+            planned: its duration on the path, without a stretch [s]; more than 0.
+            options: how fast, and how much.
+        """
+        low, high = options.stretch_bounds
+        seen = min(max(lasted / planned, low), high)
+        stretch = self.stretch + options.stretch_gain * (seen - self.stretch)
+        return replace(self, stretch=stretch)
+
 
 _FOOTHOLDS, _NEXT = 2, 2 + NEXT  # columns of a motion
 
@@ -157,3 +224,28 @@ def _left(path: LateralPath, time: float, stretch: float) -> float:
             single = (path.footholds[row, 0] >= 0) != (path.footholds[row, 1] >= 0)
             left += span * (stretch if single else 1.0)
     return left
+
+
+def sideways() -> None:
+    """A step's motion aside, and the foothold that is chosen on it."""
+    p = SlipParameters()
+    u = controls(1.152, p.leg_stiffness, p.leg_stiffness)
+    stride = simulate_stride(p, STRIDE_START["w"], VLO.state([1.1, 0.978, 0.0]), u)
+    path, two = lateral_path((stride,), p.gravity), np.zeros(2)
+    transition(path, 0.0, path.section, 1.0)
+    acceleration(path, 0.0, 0.0, np.zeros(NEXT + 1))
+    aim = LateralAim(
+        state=two,
+        step=0.1,
+        cost=np.eye(2),
+        step_cost=0.1,
+        offset=two,
+        steps=two,
+        reach=0.1,
+        stretch=1.0,
+    )
+    place(path, aim, 0.0, two, two)
+
+
+LATERAL = (Part(sideways, 2.0),)
+"""What a tick of a robot that is free in space calls, for :func:`~template_control.parts.ready`."""

@@ -9,11 +9,32 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.checked import checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import NotNegative
 from template_control.slip.maps.section import APEX, REST, VLO, Section
-from template_control.slip.scenario.paces import PaceOptions
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segment
+from template_control.slip.similarity import tuned
+
+
+@dataclass(frozen=True)
+class PaceOptions(Checked):
+    """When a walk of a scenario that stands changes its speed by a stride of its own.
+
+    All are speeds at VLO over sqrt(g l0).
+
+    Attributes:
+        stoppable: from which one step leads to rest.
+        slowed: to which a faster walk is slowed down first, so that its last step can be short.
+        alike: difference from the wanted speed with which a walk begins after a start.
+        behind: difference that the walking planner is left to make good.
+    """
+
+    stoppable: NotNegative = tuned(0.16)
+    slowed: NotNegative = tuned(0.11)
+    alike: NotNegative = tuned(0.012)
+    behind: NotNegative = tuned(0.03)
+
 
 Array = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WalkingGait, control_units, vlo_jacobians
 from template_control.slip.gaits.slope_gait import on_slope
-from template_control.slip.gaits.walking_family import WalkingFamily
+from template_control.slip.gaits.walking_by_speed import WalkingFamily
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import (

@@ -16,8 +16,8 @@ from template_control.slip.control.modified_walking import Aim, AngleSearch, sea
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WalkingGait, without_push_off
-from template_control.slip.gaits.walking_family import WalkingFamily
-from template_control.slip.maps.section_map import closed_form
+from template_control.slip.gaits.walking_by_speed import WalkingFamily
+from template_control.slip.maps.return_map import closed_form
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
-from template_control.slip.maps.section_map import one_stride
+from template_control.slip.maps.return_map import one_stride
 
 Array = NDArray[np.float64]
 

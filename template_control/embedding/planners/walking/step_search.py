@@ -24,7 +24,7 @@ from template_control.embedding.planners.walking.step_law import (
     strain,
 )
 from template_control.slip.dynamics.kernel import Scratch
-from template_control.slip.maps.section_map import RESULTS
+from template_control.slip.maps.return_map import RESULTS
 
 Array = NDArray[np.float64]
 

@@ -26,9 +26,8 @@ from template_control.robot.library import load_robot
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.model import stride_kernel
+from template_control.slip.dynamics.model import ORDER, stride_kernel
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.dynamics.taylor import ORDER
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters

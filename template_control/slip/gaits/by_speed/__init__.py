@@ -1,1 +1,0 @@
-"""Walking gaits that vary continuously with speed, and how they were made."""

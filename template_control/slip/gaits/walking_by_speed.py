@@ -1,0 +1,445 @@
+"""Walking gaits by speed: the library's dimensionless family, and that of the paper's steps."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+from template_control.checks.checked import checked
+from template_control.checks.ranges import Angle
+from template_control.errors import GaitError
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.gaits.gait import WalkingGait, find_gait_at, gait_at, root, with_push_off
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import PADDED, VLO
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+
+_HEIGHT, _RISE = 1, 2  # places in a VLO state
+_COLUMNS = np.array(
+    [PADDED + Slot.K_SC, PADDED + Slot.K_SD, PADDED + Slot.TOUCHDOWN_ANGLE, _HEIGHT]
+)
+NATURAL = np.array([0.1, 0.02, 0.005])
+"""Changes of ln k, alpha [rad] and y / l0 that count alike: what "nearest" means."""
+
+_STEPS = 40
+_REACH = 0.5  # of a natural change: a longer step may end on another branch
+_DONE = 1e-13  # of a natural change
+_SINGULAR = 1e-6  # one of both misses may say nothing that the other does not
+_RETURNED = 1e-9  # of the units of the state
+
+
+def nearest_gait(parameters: SlipParameters, vlo_speed: float, guess: Array) -> WalkingGait:
+    """The gait with a speed at VLO that is nearest a guess, in steps with push-off.
+
+    At the next VLO of a symmetric gait dy/dt is zero and the height the same. Of all changes of
+    the guess that make it so, the method takes the least, with exact derivatives. So it does not
+    mind where gaits of one stiffness and angle turn back, or where other strides cross them.
+
+    Args:
+        parameters: the template; its stiffness k0 counts for nothing, the gait has its own.
+        vlo_speed: dx/dt at VLO [m/s].
+        guess: (3,) ln of k l0 / (m g), alpha [rad], y / l0 at VLO.
+
+    Raises:
+        GaitError: if there is none near it.
+    """
+    p, step = parameters, ReturnMap(parameters)
+    unit, weight = p.speed_unit, p.mass * p.gravity / p.rest_length
+    x = np.array(guess, dtype=float)
+    for _ in range(_STEPS):
+        z, u = _stride(x, vlo_speed, weight, p.rest_length)
+        end, slopes, outcome = step.derivatives(z, u, _COLUMNS)
+        if outcome is not Outcome.SECTION:
+            break
+        k, kinds = u[Slot.K_SC], slopes[[_RISE, _HEIGHT]]
+        slope = np.column_stack((k * kinds[:, :2].sum(axis=1), kinds[:, 2], kinds[:, 3]))
+        slope[:, 2] *= p.rest_length
+        slope[1, 2] -= p.rest_length
+        units = np.array([unit, p.rest_length])
+        misses = np.array([end[_RISE], end[_HEIGHT] - z[_HEIGHT]]) / units
+        scaled = slope / units[:, None] * NATURAL
+        if not np.all(np.isfinite(scaled)):
+            break
+        change = -np.linalg.lstsq(scaled, misses, rcond=_SINGULAR)[0]
+        size = float(np.max(np.abs(change)))
+        x += NATURAL * change * min(1.0, _REACH / max(size, _DONE))
+        if size < _DONE:
+            break
+    z, u = _stride(x, vlo_speed, weight, p.rest_length)
+    stride = simulate_stride(p, STRIDE_START["w"], VLO.state(z), u)
+    missed = np.abs(VLO.of(stride.state) - z) / [unit, p.rest_length, unit]
+    if not stride.completed or np.max(missed) > _RETURNED:
+        raise GaitError(
+            f"no symmetric gait with {vlo_speed:g} m/s at VLO near"
+            f" {np.degrees(guess[1]):.4g} deg at touchdown: give another guess"
+        )
+    own = replace(p, leg_stiffness=float(u[Slot.K_SC]))
+    gait = WalkingGait("walk", own, z, u, float(stride.state[0]), stride.duration)
+    return with_push_off(gait)
+
+
+def coordinates(gait: WalkingGait) -> Array:
+    """(3,) ln of k l0 / (m g), alpha [rad] and y / l0 of a gait."""
+    p = gait.parameters
+    weight = p.mass * p.gravity / p.rest_length
+    angle = float(gait.controls[Slot.TOUCHDOWN_ANGLE])
+    return np.array([np.log(p.leg_stiffness / weight), angle, gait.vlo[1] / p.rest_length])
+
+
+def _stride(x: Array, vlo_speed: float, weight: float, length: float) -> tuple[Array, Array]:
+    """State and controls at coordinates ``x``; ``weight`` is m g / l0 [N/m]."""
+    k = float(np.exp(x[0])) * weight
+    return np.array([vlo_speed, x[2] * length, 0.0]), controls(float(x[1]), k, k)
+
+
+_FILE = "walking.json"
+_XTOL, _RTOL = 1e-13, 8.881784197001252e-16  # of dimensionless speeds; scipy's least
+_ROUNDING = 1e-6  # of a centimetre per second
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Gaits at knots; between them is the gait nearest the monotone (PCHIP) interpolation.
+
+    Units are l0, sqrt(l0 / g) and m g.
+
+    Attributes:
+        vlo_speed: (n,) dx/dt at VLO over sqrt(g l0), rising.
+        stiffness: (n,) k l0 / (m g).
+        touchdown_angle: (n,) alpha [rad].
+        height: (n,) y at VLO over l0.
+        mean_speed: (n,) of the whole step over sqrt(g l0), rising.
+    """
+
+    vlo_speed: Array
+    stiffness: Array
+    touchdown_angle: Array
+    height: Array
+    mean_speed: Array
+
+    @cached_property
+    def _curve(self) -> PchipInterpolator:
+        columns = (np.log(self.stiffness), self.touchdown_angle, self.height)
+        return PchipInterpolator(self.vlo_speed, np.column_stack(columns))
+
+    @cached_property
+    def _by_mean_speed(self) -> PchipInterpolator:
+        return PchipInterpolator(
+            self.mean_speed, np.column_stack((self.vlo_speed, self.height)), extrapolate=False
+        )
+
+    def vlo_at(self, mean_speed: float) -> tuple[float, float]:
+        """Speed and height at VLO for a mean speed, all without dimension; ends count beyond."""
+        at = np.clip(mean_speed, self.mean_speed[0], self.mean_speed[-1])
+        speed, height = self._by_mean_speed(at).tolist()
+        return speed, height
+
+    def gait(self, parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
+        """The gait with a speed at VLO; the nearest end's coordinates serve beyond it.
+
+        Args:
+            parameters: the template; its stiffness k0 counts for nothing, the gait has its own.
+            vlo_speed: dx/dt at VLO [m/s].
+
+        Raises:
+            GaitError: if there is none near the curve.
+        """
+        speed = np.clip(vlo_speed / parameters.speed_unit, self.vlo_speed[0], self.vlo_speed[-1])
+        return nearest_gait(parameters, vlo_speed, self._curve(speed))
+
+    def gait_for(self, parameters: SlipParameters, mean_speed: float) -> WalkingGait:
+        """The gait with a mean speed that lies between those of two knots.
+
+        Args:
+            parameters: the template; its stiffness k0 counts for nothing, the gait has its own.
+            mean_speed: step length over step duration [m/s].
+
+        Raises:
+            GaitError: if there is none near the curve.
+        """
+        p, unit = parameters, parameters.speed_unit
+        wanted = mean_speed / unit
+        knot = int(np.clip(np.searchsorted(self.mean_speed, wanted) - 1, 0, len(self.height) - 2))
+        ends = self.vlo_speed[[knot, knot + 1]]
+
+        def surplus(speed: float) -> float:
+            return self.gait(p, speed * unit).mean_speed / unit - wanted
+
+        misses = [surplus(float(end)) for end in ends]
+        if misses[0] * misses[1] >= 0.0:  # at a knot, to rounding
+            return self.gait(p, float(ends[np.argmin(np.abs(misses))]) * unit)
+        return self.gait(p, float(brentq(surplus, *ends, xtol=_XTOL, rtol=_RTOL)) * unit)
+
+
+@dataclass(frozen=True)
+class SpeedFamily:
+    """A walking gait for every mean speed of a range.
+
+    Attributes:
+        chains: from slow to fast; where two overlap, the slower one ends in the middle.
+    """
+
+    chains: tuple[Chain, ...]
+
+    @cached_property
+    def limits(self) -> Array:
+        """(chains + 1,) mean speeds over sqrt(g l0) at which the chains begin and end."""
+        starts = [chain.mean_speed[0] for chain in self.chains]
+        ends = [chain.mean_speed[-1] for chain in self.chains]
+        between = [0.5 * (a + b) for a, b in zip(ends[:-1], starts[1:], strict=True)]
+        return np.array([starts[0], *between, ends[-1]])
+
+    def range(self, parameters: SlipParameters) -> tuple[float, float]:
+        """Slowest and fastest mean speed of a template [m/s], to a centimetre per second."""
+        low, high = 100.0 * parameters.speed_unit * self.limits[[0, -1]]
+        return float(np.ceil(low - _ROUNDING)) / 100.0, float(np.floor(high + _ROUNDING)) / 100.0
+
+    def gait_for(self, parameters: SlipParameters, mean_speed: float) -> WalkingGait:
+        """The gait with a mean speed.
+
+        Args:
+            parameters: the template; its stiffness k0 counts for nothing, the gait has its own.
+            mean_speed: step length over step duration [m/s].
+
+        Raises:
+            GaitError: naming the range, if the speed is out of it.
+        """
+        slowest, fastest = self.range(parameters)
+        if not slowest <= mean_speed <= fastest:
+            raise GaitError(
+                f"no walking gait at a mean speed of {mean_speed:g} m/s: give one from"
+                f" {slowest:.2f} to {fastest:.2f} m/s"
+            )
+        return self._chain(parameters, mean_speed).gait_for(parameters, mean_speed)
+
+    def vlo_for(self, parameters: SlipParameters, mean_speed: float) -> tuple[float, float]:
+        """dx/dt and y at VLO of the gait with a mean speed, interpolated, without looking for it.
+
+        Args:
+            parameters: the template.
+            mean_speed: step length over step duration [m/s]; beyond the range its end counts.
+
+        Returns:
+            dx/dt [m/s], y [m].
+        """
+        chain, unit = self._chain(parameters, mean_speed), parameters.speed_unit
+        speed, height = chain.vlo_at(mean_speed / unit)
+        return speed * unit, height * parameters.rest_length
+
+    def chain_of(self, gait: WalkingGait) -> Chain:
+        """The chain that a gait is on, by its mean speed."""
+        return self._chain(gait.parameters, gait.mean_speed)
+
+    def _chain(self, parameters: SlipParameters, mean_speed: float) -> Chain:
+        inner = self.limits[1:-1]
+        return self.chains[int(np.searchsorted(inner, mean_speed / parameters.speed_unit))]
+
+
+def family_from(data: Mapping[str, Any]) -> SpeedFamily:
+    """The family that a file's ``data`` holds."""
+    chains = ({name: np.array(v) for name, v in chain.items()} for chain in data["chains"])
+    return SpeedFamily(tuple(Chain(**chain) for chain in chains))
+
+
+@cache
+def walking_by_speed() -> SpeedFamily:
+    """The library's family, as ``template-control gaits --family`` made it."""
+    return family_from(json.loads(files(__package__).joinpath(_FILE).read_text(encoding="utf-8")))
+
+
+def family_speeds(parameters: SlipParameters) -> tuple[float, float]:
+    """Slowest and fastest dx/dt at VLO of the library's family [m/s]."""
+    chains, unit = walking_by_speed().chains, parameters.speed_unit
+    return float(chains[0].vlo_speed[0]) * unit, float(chains[-1].vlo_speed[-1]) * unit
+
+
+_SPEEDS = (0.195, 0.225, 0.29, 0.35, 0.395)  # at VLO, over sqrt(g l0)
+_ANGLES = (70.0, 69.5, 68.0, 66.0, 66.0)  # [deg]
+_PAPER = ("w",)  # strides
+_SAME = 1e-9  # of sqrt(g l0): speeds that are one
+
+
+@checked
+def speed_range(parameters: SlipParameters) -> tuple[float, float]:
+    """Slowest and fastest dx/dt at VLO of the family [m/s]."""
+    unit = parameters.speed_unit
+    return float(_SPEEDS[0] * unit), float(_SPEEDS[-1] * unit)
+
+
+@checked
+def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
+    """The family's gait with this speed at VLO.
+
+    The touchdown angle falls with the speed, along a line inside the region of angles and
+    speeds at VLO in which symmetric gaits of the default stiffness exist.
+
+    Args:
+        parameters: the template, with k0 l0 / (m g) of the reference template.
+        vlo_speed: dx/dt at VLO [m/s].
+
+    Raises:
+        GaitError: naming the range, if the speed is out of it.
+    """
+    low, high = speed_range(parameters)
+    if not low <= vlo_speed <= high:
+        raise GaitError(
+            f"no walking gait has {vlo_speed:g} m/s at VLO: give a speed from {low:.3g} to"
+            f" {high:.3g} m/s"
+        )
+    unit = parameters.speed_unit
+    angle = np.radians(np.interp(vlo_speed / unit, _SPEEDS, _ANGLES))
+    return gait_at(parameters, float(angle), vlo_speed)
+
+
+def _others(gait: WalkingGait) -> tuple[float, float, Callable[..., WalkingGait]]:
+    """Range of speeds at VLO [m/s], and maker, of the gaits that ``gait`` may give way to.
+
+    The paper's steps keep the stiffness, with push-off they are the family's by speed.
+    """
+    if gait.stride in _PAPER:
+        return *speed_range(gait.parameters), walking_gait
+    chain = walking_by_speed().chain_of(gait)
+    unit = gait.parameters.speed_unit
+    return float(chain.vlo_speed[0] * unit), float(chain.vlo_speed[-1] * unit), chain.gait
+
+
+class WalkingFamily:
+    """The gaits that a planner's targets stand for.
+
+    With push-off they are those of the family by speed on the branch of the present gait.
+
+    Args:
+        gait: the planner's own; its target is its VLO state.
+    """
+
+    @checked
+    def __init__(self, gait: WalkingGait) -> None:
+        self._known = [gait]
+
+    def reset(self) -> WalkingGait:
+        """Forget all gaits but the planner's own, which is returned."""
+        del self._known[1:]
+        return self._known[0]
+
+    def towards(self, present: WalkingGait, target: Array | None) -> tuple[WalkingGait, bool]:
+        """The gait with the target's speed at VLO, or the nearest there is.
+
+        Args:
+            present: is kept where it has that speed.
+            target: (3,) dx/dt, y, dy/dt; None: the present gait's.
+
+        Returns:
+            The gait, and whether it has the target's speed.
+        """
+        if target is None:
+            return present, True
+        p = present.parameters
+        low, high, make = _others(present)
+        same = _SAME * p.speed_unit
+        wanted = float(target[0])
+        for gait in (present, *self._known):
+            if abs(gait.vlo[0] - wanted) <= same:
+                return gait, True
+        speed = float(np.clip(wanted, low, high))
+        gait = make(p, speed)
+        self._known.append(gait)
+        return gait, abs(speed - wanted) <= same
+
+
+_VLO_SPEEDS = np.linspace(0.2, 0.45, 26)  # over sqrt(g l0): where gaits are looked for
+_XTOL, _RTOL = 1e-10, 8.881784197001252e-16  # of speeds [m/s]; scipy's default
+
+
+@checked
+def mean_speed_range(
+    parameters: SlipParameters, touchdown_angle: float | None = None
+) -> tuple[float, float] | None:
+    """Slowest and fastest mean speed of :func:`gait_for_speed` [m/s], to a centimetre per second.
+
+    Args:
+        parameters: the template.
+        touchdown_angle: alpha of gaits with the template's stiffness k0 [rad]; None: the range of
+            the family by speed.
+
+    Returns:
+        Both speeds, or None if there is no gait at this angle.
+    """
+    if touchdown_angle is None:
+        return walking_by_speed().range(parameters)
+    unit = parameters.speed_unit
+    ends = []
+    for speeds in (_VLO_SPEEDS, _VLO_SPEEDS[::-1]):
+        means = (_mean_speed(parameters, touchdown_angle, unit * s) for s in speeds)
+        ends.append(next((mean for mean in means if np.isfinite(mean)), np.nan))
+    if not np.isfinite(ends).all():
+        return None
+    return float(np.ceil(100.0 * ends[0]) / 100.0), float(np.floor(100.0 * ends[1]) / 100.0)
+
+
+def _mean_speed(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float) -> float:
+    """Of the gait that :func:`find_gait_at` finds [m/s]; NaN if it finds none."""
+    gait = find_gait_at(parameters, touchdown_angle, vlo_speed)
+    return np.nan if gait is None else gait.mean_speed
+
+
+@checked
+def gait_for_speed(
+    parameters: SlipParameters,
+    mean_speed: float,
+    name: str = "walk",
+    touchdown_angle: Angle | None = None,
+) -> WalkingGait:
+    """The symmetric gait with a given mean forward speed.
+
+    Without an angle it is that of the library's family by speed, in steps with push-off: its
+    stiffness varies with the speed, and is that of its own ``parameters``. With an angle both legs
+    keep the template's stiffness k0, and the steps are the paper's.
+
+    Args:
+        parameters: the template.
+        mean_speed: step length over step duration [m/s].
+        name: of the gait.
+        touchdown_angle: alpha, from the ground to the leg [rad]; None: the family's.
+
+    Raises:
+        GaitError: naming the range, if there is none, or the speed is not positive.
+    """
+    p = parameters
+    if not (np.isfinite(mean_speed) and mean_speed > 0.0):
+        raise GaitError(f"speed is {mean_speed!r} m/s: give a positive number")
+    if touchdown_angle is None:
+        return replace(walking_by_speed().gait_for(p, mean_speed), name=name)
+    angle = touchdown_angle
+    unit = p.speed_unit
+
+    def surplus(vlo_speed: float) -> float:
+        return _mean_speed(p, angle, vlo_speed) - mean_speed
+
+    # The mean speed grows with the speed at VLO; find two neighbours around the wanted one.
+    speeds = unit * _VLO_SPEEDS
+    values = np.array([surplus(s) for s in speeds])
+    for lo, hi, f_lo, f_hi in zip(speeds, speeds[1:], values, values[1:], strict=False):
+        if f_lo <= 0.0 <= f_hi:
+            speed = root(surplus, (lo, hi), _XTOL, _RTOL)
+            if speed is not None:
+                return gait_at(p, angle, speed, name)
+    found = mean_speed_range(p, angle)
+    at = f" and {np.degrees(angle):g} deg at touchdown"
+    if found is not None and not found[0] <= mean_speed <= found[1]:
+        hint = f"give one from {found[0]:.2f} to {found[1]:.2f} m/s"
+    else:
+        hint = "give another angle, or none"
+    raise GaitError(f"no walking gait at a mean speed of {mean_speed:g} m/s{at}: {hint}")
