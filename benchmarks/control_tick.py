@@ -31,7 +31,7 @@ from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import state_at_vlo, state_in
-from template_control.run.kinds.free import Free
+from template_control.run.backends import FloatingBackend
 from template_control.run.options import SimulationOptions
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.gaits.gait import gait_at
@@ -89,7 +89,7 @@ def _running(robot: PlanarBiped, speed: float) -> tuple[EmbeddingController, Any
 
 def _free() -> tuple[EmbeddingController, Any, Any]:
     """As :func:`_walking`, of Bolt in space."""
-    kind = Free(load_floating_robot("bolt"))
+    kind = FloatingBackend(load_floating_robot("bolt"))
     gait = gait_at(template_for(kind.robot), np.radians(68.0), 0.6)
     route = SteadyRoute.of(gait)
     controller = kind.controller(LqrPlanner(gait), FreeOptions(), route, AUTOMATON)

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import template_control as tc
-from template_control.run import FreeRecord
+from template_control.run import FloatingRecord
 from template_control.view.figure_file import save_figure
 from template_control.view.free_figures import footholds
 
@@ -25,11 +25,11 @@ def main() -> None:
     bolt = tc.load_floating_robot("bolt")
     gait = tc.gait_for_speed(tc.template_for(bolt), chosen.speed)
     around = 2.0 * np.pi / chosen.rate
-    course = tc.Course(turning_rate=chosen.rate, turns=((around, -chosen.rate),))
+    course = tc.HeadingCommand(turning_rate=chosen.rate, turns=((around, -chosen.rate),))
     steps = chosen.steps or int(2.0 * around / gait.step_duration)
     options = tc.SimulationOptions(steps=steps, course=course, record_every=5)
     record = tc.simulate(bolt, tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER), options)
-    assert isinstance(record, FreeRecord)
+    assert isinstance(record, FloatingRecord)
     roll, pitch, yaw = np.abs(record.attitude).max(axis=0)
     print(f"{record.steps} of {steps} steps in {record.time[-1]:.1f} s, fell: {record.fell}")
     print(f"turned to {record.heading.max():.2f} rad and back to {record.heading[-1]:.2f} rad")

@@ -18,7 +18,7 @@ import numpy as np
 import template_control as tc
 from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
 from template_control.robustness.ladder import SETTLED, off_gait
-from template_control.run import FreeRecord
+from template_control.run import FloatingRecord
 from template_control.slip import Scale, WalkingGait
 
 IMPULSE, HEIGHT, DELAY, NOISE = 10.0, 0.01, 0.002, 1e-3
@@ -76,7 +76,7 @@ def main() -> None:
         if not name.startswith(options.only):
             continue
         record = tc.simulate(robot, planner, run)
-        assert isinstance(record, FreeRecord)  # of a free robot
+        assert isinstance(record, FloatingRecord)  # of a free robot
         count += 1
         if record.fell:
             print(f"{name}: {record.metadata['fall_reason']}", flush=True)

@@ -32,7 +32,7 @@ from .robot.library import load_floating_robot as load_floating_robot
 from .robot.library import load_robot as load_robot
 from .robot.planar_biped import PlanarBiped as PlanarBiped
 from .run.config import RunConfig as RunConfig
-from .run.options import Course as Course
+from .run.options import HeadingCommand as HeadingCommand
 from .run.options import Push as Push
 from .run.options import SimulationOptions as SimulationOptions
 from .run.record import Record as Record

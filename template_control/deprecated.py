@@ -9,9 +9,14 @@ from collections.abc import Callable
 import lazy_loader
 
 DEPRECATED = {
+    "template_control.Course": "template_control:HeadingCommand",
     "template_control.load_free_robot": "template_control:load_floating_robot",
     "template_control.robot.FREE_ROBOTS": "template_control.robot:FLOATING_ROBOTS",
     "template_control.robot.load_free_robot": "template_control.robot:load_floating_robot",
+    "template_control.run.Course": "template_control.run:HeadingCommand",
+    "template_control.run.FreeRecord": "template_control.run:FloatingRecord",
+    "template_control.run.GaitChoice": "template_control.run:GaitSpec",
+    "template_control.run.RobotChoice": "template_control.run:RobotSpec",
     "template_control.whole_body.Wanted": "template_control.whole_body:References",
 }
 """Old name -> new one, as "package:name" of a public package."""

@@ -164,7 +164,7 @@ def targets(folder):
         slip.RunningFamily: {"gait": RUN},
         tc.RunningPlanner: {"gait": RUN},
         embedding.Lean: {"speeds": (2.0, 3.0), "pitches": (0.3, 0.4)},
-        run.GaitChoice: {"name": "run"},
+        run.GaitSpec: {"name": "run"},
         tc.LqrPlanner: {"gait": GAIT},
         tc.ModifiedPlanner: {"gait": GAIT},
         tc.EmbeddingController: {"robot": ROBOT, "planners": PLANNER},

@@ -23,9 +23,9 @@ from template_control.robustness import (
     Trial,
     first_wrong,
 )
-from template_control.run.choices.robot import RobotChoice
 from template_control.run.config import RunConfig
 from template_control.run.record import Record
+from template_control.run.specs import RobotSpec
 from template_control.view.trials.campaign_figure import campaign_figure
 
 PAGE = (Path(__file__).parents[1] / "docs" / "campaign.md").read_text()
@@ -105,7 +105,7 @@ def test_a_trial_is_a_run_that_its_file_repeats(tmp_path):
 
 
 def test_a_small_robot_is_disturbed_as_a_small_one():
-    draw, conditions = Conditions().draw(0), Conditions(RobotChoice("bolt"))
+    draw, conditions = Conditions().draw(0), Conditions(RobotSpec("bolt"))
     config, ready = conditions.trial(0)
     p = ready.gait.parameters
     length, time = p.rest_length, np.sqrt(p.rest_length * 9.81 / p.gravity)
@@ -116,7 +116,7 @@ def test_a_small_robot_is_disturbed_as_a_small_one():
 
 
 def test_a_free_robot_is_pushed_from_all_sides(tmp_path):
-    conditions = Conditions(RobotChoice("bolt", free=True), mix=FREE_MIX, seed=2)
+    conditions = Conditions(RobotSpec("bolt", free=True), mix=FREE_MIX, seed=2)
     config, _ = conditions.trial(1)
     draw = conditions.draw(1)
     (push,) = config.simulation.pushes

@@ -15,11 +15,9 @@ import template_control as tc
 from template_control import settings
 from template_control.cli.main import main
 from template_control.cli.options.config import prepared
-from template_control.run.choices.gait import GaitChoice
-from template_control.run.choices.planner import OwnPlanner
-from template_control.run.choices.robot import RobotChoice
 from template_control.run.config import RunConfig
 from template_control.run.record import Record
+from template_control.run.specs import GaitSpec, OwnPlanner, RobotSpec
 from template_control.slip import Slot
 
 
@@ -112,7 +110,7 @@ def test_the_command_line_comes_before_the_file(parsed, tmp_path):
     )
     config, ready = parsed(f"--config {path} --steps 3 --friction 0.5")
     assert ready.robot.name == "rabbit"
-    assert config.gait == GaitChoice(speed=0.8)
+    assert config.gait == GaitSpec(speed=0.8)
     assert config.planner == tc.LqrOptions(offset_gain=0.1)
     assert config.simulation.steps == 3
     assert config.simulation.plant == tc.PlantOptions(friction=0.5, mass_scale=1.1)
@@ -181,7 +179,7 @@ def test_a_wrong_option_is_one_line(line, told, refused, tmp_path, monkeypatch):
 def test_angles_of_locked_joints_reach_the_robot():
     feet, joints = ("FL_FOOT", "FR_FOOT"), ("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE")
     path = str(tc.robot.robot_path("bolt"))
-    choice = RobotChoice(path, feet, joints, 0.016)
+    choice = RobotSpec(path, feet, joints, 0.016)
     assert choice.load().name == "bolt"
     with pytest.raises(tc.TemplateControlError, match="turns about"):
         replace(choice, locked={"FL_HAA": 0.5}).load()
@@ -257,7 +255,7 @@ def test_the_file_that_the_page_shows_is_understood(tmp_path):
     path = tmp_path / "shown.toml"
     path.write_text(shown)
     config = RunConfig.load(path)
-    assert config.robot == RobotChoice("rabbit")
+    assert config.robot == RobotSpec("rabbit")
     assert config.planner == tc.LqrOptions(offset_gain=0.15)
     assert config.simulation.pushes == (tc.Push(3.0, 2, 0.25),)
 

@@ -7,9 +7,14 @@ import pytest
 from template_control.deprecated import DEPRECATED
 
 OLD_NAMES = {
+    "template_control.Course",
     "template_control.load_free_robot",
     "template_control.robot.FREE_ROBOTS",
     "template_control.robot.load_free_robot",
+    "template_control.run.Course",
+    "template_control.run.FreeRecord",
+    "template_control.run.GaitChoice",
+    "template_control.run.RobotChoice",
     "template_control.whole_body.Wanted",
 }
 

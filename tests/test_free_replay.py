@@ -25,7 +25,7 @@ def record():
     """Three steps of the robot of human size, in a turn."""
     robot = tc.load_floating_robot("five-link-3d")
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 1.0), tc.embedding.FREE_PLANNER)
-    course = tc.Course(turning_rate=0.4)
+    course = tc.HeadingCommand(turning_rate=0.4)
     return tc.simulate(robot, planner, tc.SimulationOptions(steps=3, course=course))
 
 

@@ -13,7 +13,7 @@ from template_control.cli.report.run_table import in_space
 from template_control.errors import ParameterError
 from template_control.robot.library import load_floating_robot
 from template_control.run.data_frame import columns
-from template_control.run.kinds.any_record import load_record
+from template_control.run.record import load_record
 from template_control.run.summary import summarise
 
 STEPS = 12
@@ -22,7 +22,7 @@ STEPS = 12
 def walked(course=None, steps=STEPS):
     robot = load_floating_robot("bolt")
     gait = tc.gait_at(tc.template_for(robot), np.radians(68.0), 0.6)
-    options = tc.SimulationOptions(steps=steps, course=course or tc.Course())
+    options = tc.SimulationOptions(steps=steps, course=course or tc.HeadingCommand())
     return tc.simulate(robot, tc.LqrPlanner(gait), options), gait
 
 
@@ -60,7 +60,7 @@ def test_bolt_walks_slowly_too():
     robot = load_floating_robot("bolt")
     gait = tc.gait_for_speed(tc.template_for(robot), 0.4)
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
-    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=40, course=tc.Course()))
+    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=40, course=tc.HeadingCommand()))
     assert (record.steps, record.fell) == (40, False)
     assert record.metadata["summary"]["qp_failures"] == 0
     last = record.section_state[-10:].mean(axis=0) - gait.vlo
@@ -79,7 +79,7 @@ def test_the_planar_part_is_the_view_of_the_space(straight):
 def test_a_record_is_read_as_it_was_written(straight, tmp_path):
     record, _ = straight
     again = load_record(record.save(tmp_path / "run.npz"))
-    assert isinstance(again, tc.run.FreeRecord)
+    assert isinstance(again, tc.run.FloatingRecord)
     for name in ("q", "space_com", "attitude", "sway", "side_reference"):
         np.testing.assert_array_equal(getattr(again, name), getattr(record, name))
     table = columns(again)
@@ -92,7 +92,7 @@ def test_a_record_is_read_as_it_was_written(straight, tmp_path):
 @pytest.mark.slow(seconds=10)
 def test_bolt_turns():
     """The heading turns at each section, and the path with it."""
-    record, gait = walked(tc.Course(turning_rate=0.25))
+    record, gait = walked(tc.HeadingCommand(turning_rate=0.25))
     assert not record.fell, record.metadata["fall_reason"]
     per_step = 0.25 * gait.step_duration
     assert record.heading[-1] == pytest.approx(STEPS * per_step, abs=1.01 * per_step)
@@ -102,16 +102,16 @@ def test_bolt_turns():
 
 
 def test_a_course_turns_at_its_times():
-    course = tc.Course(turning_rate=0.3, turns=((2.0, -0.2), (5.0, 0.0)))
+    course = tc.HeadingCommand(turning_rate=0.3, turns=((2.0, -0.2), (5.0, 0.0)))
     assert [course.rate(t) for t in (0.0, 1.9, 2.0, 4.9, 5.0)] == [0.3, 0.3, -0.2, -0.2, 0.0]
     with pytest.raises(ParameterError, match="rising"):
-        tc.Course(turns=((2.0, 0.1), (1.0, 0.2)))
+        tc.HeadingCommand(turns=((2.0, 0.1), (1.0, 0.2)))
 
 
 def test_the_command_line_tells_a_course(refused, understood):
     line = "template-control walk --robot bolt --free --turn 0.3 --turn -0.2@2 --turn 0@5"
     wanted = simulation_choice(understood(line), tc.SimulationOptions(), ends=False).course
-    assert wanted == tc.Course(turning_rate=0.3, turns=((2.0, -0.2), (5.0, 0.0)))
+    assert wanted == tc.HeadingCommand(turning_rate=0.3, turns=((2.0, -0.2), (5.0, 0.0)))
     told = refused(["walk", "--robot", "bolt", "--free", "--turn", "left", "--steps", "1"])
     assert "--turn left: rate is 'left': give a number" in told
 

@@ -15,7 +15,7 @@ from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.run.choices.robot import RobotChoice
+from template_control.run.specs import RobotSpec
 
 DT = 1e-3  # [s]
 
@@ -137,13 +137,13 @@ def test_losses_change_a_run_and_lossless_leaves_them_out_to_the_last_bit(writte
 
 def test_the_option_of_the_command_leaves_them_out(written):
     path = str(written("five-link", 'damping="5" friction="2"'))
-    assert RobotChoice(path).load().joint_damping.tolist() == [5.0] * 4
-    assert RobotChoice(path).load().joint_friction.tolist() == [2.0] * 4
-    robot = RobotChoice(path, lossless=True).load()
+    assert RobotSpec(path).load().joint_damping.tolist() == [5.0] * 4
+    assert RobotSpec(path).load().joint_friction.tolist() == [2.0] * 4
+    robot = RobotSpec(path, lossless=True).load()
     assert not robot.joint_damping.any()
     assert not robot.joint_friction.any()
     with pytest.raises(ParameterError, match="lossless go with a URDF"):
-        RobotChoice(lossless=True).load()
+        RobotSpec(lossless=True).load()
 
 
 @pytest.mark.parametrize("value", ["-1", "nan", "inf", "much", ""])

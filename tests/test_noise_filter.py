@@ -10,9 +10,8 @@ import template_control as tc
 from template_control.embedding import FREE_PLANNER, FreeController, FreeOptions
 from template_control.estimation import NoiseFilter, NoiseFilterOptions
 from template_control.robustness.ladder import off_gait
-from template_control.run.kinds.free import Free
-from template_control.run.kinds.free_sensors import FilteredSensors
-from template_control.run.sensing import Sensors
+from template_control.run.backends import FloatingBackend
+from template_control.run.sensing import FilteredSensors, Sensors
 from template_control.slip.similarity import Scale
 
 DT = 1e-3
@@ -96,7 +95,7 @@ def test_a_jolt_of_the_joints_is_believed_at_a_touchdown_only(bolt):
 def senses(robot, sensors, tuning=None):
     gait = tc.robot_gait_for_speed(robot, 0.55)
     controller = FreeController(robot, tc.LqrPlanner(gait, FREE_PLANNER), tuning)
-    return Free(robot).senses(controller, tc.SimulationOptions(sensors=sensors))
+    return FloatingBackend(robot).senses(controller, tc.SimulationOptions(sensors=sensors))
 
 
 def test_only_noise_is_filtered(bolt):

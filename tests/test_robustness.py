@@ -22,9 +22,9 @@ from template_control.robustness.findings import Finding, Level, wilson_interval
 from template_control.robustness.ladder import SETTLED, measure, off_gait, trial
 from template_control.robustness.subject import ENGINES, Subject
 from template_control.robustness.template_limit import template_limit
-from template_control.run.choices.robot import RobotChoice
 from template_control.run.options import FallOptions
 from template_control.run.simulation import perturbed_start, simulate
+from template_control.run.specs import RobotSpec
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.maps.section import VLO
@@ -299,7 +299,7 @@ def test_a_free_robot_is_pushed_aside_too():
 
 @pytest.mark.slow(seconds=8)
 def test_trials_of_a_free_robot():
-    choice = settings.to_table(RobotChoice("bolt", free=True))
+    choice = settings.to_table(RobotSpec("bolt", free=True))
     found = robustness.trial(choice, "noise", 1e-3, 0, 0.55)
     assert not found["fell"]
     assert abs(found["speed_error"]) < 0.04

@@ -13,7 +13,7 @@ from template_control.cli.trials import robustness as command
 from template_control.robot.library import robot_path
 from template_control.robustness import disturbances, ladder
 from template_control.robustness.disturbances import DISTURBANCES
-from template_control.run.choices.robot import RobotChoice
+from template_control.run.specs import RobotSpec
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -106,7 +106,7 @@ def test_a_robot_of_ones_own_is_understood_as_walk_understands_it(
     monkeypatch.setattr(command, "measure", measured)
     assert main(["robustness", *words, "--output", str(tmp_path)]) == 130
     walked = understood(shlex.join(["template-control", "walk", *words]))
-    assert found[0].robot == robot_choice(walked, RobotChoice())
+    assert found[0].robot == robot_choice(walked, RobotSpec())
     assert found[0].robot.locked == {"FL_HAA": 0.0}
 
 

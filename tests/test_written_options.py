@@ -14,11 +14,10 @@ from template_control.errors import ParameterError
 from template_control.plant.plant import Plant
 from template_control.robustness.campaigns.campaign import Conditions
 from template_control.run import simulation
-from template_control.run.choices.gait import GaitChoice
-from template_control.run.choices.robot import RobotChoice
 from template_control.run.config import RunConfig
-from template_control.run.kinds.any_record import load_record
 from template_control.run.options import SimulationOptions
+from template_control.run.record import load_record
+from template_control.run.specs import GaitSpec, RobotSpec
 from template_control.slip.similarity import Scale, scaled
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -100,7 +99,7 @@ def test_the_file_holds_what_the_run_used_and_repeats_it(line, held, tmp_path):
 
 
 def test_the_default_is_the_robots_own_and_a_given_one_is_kept():
-    free = RobotChoice("bolt", free=True)
+    free = RobotSpec("bolt", free=True)
     assert RunConfig(free).resolved().planner == FREE_PLANNER
     assert RunConfig(free).resolved().simulation.embedding == FreeOptions()
     assert RunConfig().resolved().planner == LqrOptions()
@@ -111,7 +110,7 @@ def test_the_default_is_the_robots_own_and_a_given_one_is_kept():
     assert planner.options == scaled(LqrOptions(), Scale.of(planner.gait.parameters))
 
 
-@pytest.mark.parametrize("gait", [GaitChoice(), GaitChoice("run", 3.0)])
+@pytest.mark.parametrize("gait", [GaitSpec(), GaitSpec("run", 3.0)])
 def test_a_trial_is_written_with_the_planner_that_it_has(gait, tmp_path):
     config, ready = Conditions(gait=gait).trial(0)
     written = RunConfig.load(config.save(tmp_path / "trial.toml"))
@@ -120,7 +119,7 @@ def test_a_trial_is_written_with_the_planner_that_it_has(gait, tmp_path):
 
 
 def test_a_free_trial_is_written_with_the_planner_that_it_has(tmp_path):
-    conditions = Conditions(RobotChoice("bolt", free=True), GaitChoice(speed=0.6))
+    conditions = Conditions(RobotSpec("bolt", free=True), GaitSpec(speed=0.6))
     config, ready = conditions.trial(0)
     written = RunConfig.load(config.save(tmp_path / "trial.toml"))
     assert written.planner == FREE_PLANNER
@@ -132,8 +131,6 @@ def test_a_free_trial_is_written_with_the_planner_that_it_has(tmp_path):
 def test_tuning_of_the_other_kind_of_robot_is_refused(free):
     tuning = EmbeddingOptions() if free else FreeOptions()
     name, had = type(tuning).__name__, "walks free" if free else "is held in its plane"
-    config = RunConfig(
-        RobotChoice("bolt", free=free), simulation=SimulationOptions(embedding=tuning)
-    )
+    config = RunConfig(RobotSpec("bolt", free=free), simulation=SimulationOptions(embedding=tuning))
     with pytest.raises(ParameterError, match=f"{had}, and its embedding has {name}: give"):
         config.prepare().run(config.simulation)

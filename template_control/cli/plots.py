@@ -6,7 +6,7 @@ import argparse
 
 from template_control import view
 from template_control.checks import option_types as values
-from template_control.run.kinds.any_record import load_record
+from template_control.run.record import load_record
 from template_control.storage import writing
 
 

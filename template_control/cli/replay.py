@@ -11,8 +11,7 @@ from rich.text import Text
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
-from template_control.run.kinds.any_record import load_record
-from template_control.run.record import Record
+from template_control.run.record import Record, load_record
 from template_control.terminal import plain_console
 from template_control.view.replay.playback import FRAME_RATES, SPEEDS
 from template_control.view.replay.replay import (

@@ -14,8 +14,8 @@ from template_control.cli.options.world import (
     add_world_options,
 )
 from template_control.cli.walk import report
-from template_control.run.choices.gait import GaitChoice
 from template_control.run.config import RunConfig
+from template_control.run.specs import GaitSpec
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -38,5 +38,5 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run as told; returns 0, 1 after a fall, 130 after Ctrl-C."""
-    default = RunConfig(gait=GaitChoice("run"))
+    default = RunConfig(gait=GaitSpec("run"))
     return report(options, *prepared(options, default), "running")

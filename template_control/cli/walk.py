@@ -25,7 +25,7 @@ from template_control.cli.report.kept import run_and_keep
 from template_control.cli.report.output import INTERRUPTED
 from template_control.cli.report.run_table import print_table
 from template_control.errors import ScenarioError
-from template_control.run.config import Ready, RunConfig
+from template_control.run.config import PreparedRun, RunConfig
 from template_control.run.summary import summarise
 
 
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     return report(options, config, ready, "walking")
 
 
-def report(options: argparse.Namespace, config: RunConfig, ready: Ready, doing: str) -> int:
+def report(options: argparse.Namespace, config: RunConfig, ready: PreparedRun, doing: str) -> int:
     """Do a run, keep it and tell it.
 
     Args:

@@ -25,10 +25,10 @@ from template_control.robustness.findings import Finding, Level, Robustness
 from template_control.robustness.fingerprint import fingerprint
 from template_control.robustness.subject import Engine, Subject
 from template_control.robustness.template_limit import template_limit
-from template_control.run.choices.robot import RobotChoice
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
+from template_control.run.specs import RobotSpec
 from template_control.slip.gaits.gait import Gait
 from template_control.sweep.sweep import Item, SweepOptions, sweep
 
@@ -70,7 +70,7 @@ def trial(
     """One walk or run under one disturbance, as a sweep's worker runs it.
 
     Args:
-        robot: name or URDF path; or a :class:`RobotChoice` as a table.
+        robot: name or URDF path; or a :class:`RobotSpec` as a table.
         disturbance: name of the disturbance.
         level: the disturbance's size for this robot [SI].
         number: of the trial, from 0; trials of a level differ by it.
@@ -79,7 +79,7 @@ def trial(
     Returns:
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
     """
-    choice = RobotChoice(robot) if isinstance(robot, str) else _choice(robot)
+    choice = RobotSpec(robot) if isinstance(robot, str) else _choice(robot)
     where = Subject(choice, speed, plant).situation()
     options = _BY_NAME[disturbance].options(where, level, number)
     record = simulate(where.robot, where.planner, options)
@@ -93,13 +93,13 @@ def trial(
     }
 
 
-def _choice(table: dict[str, Any]) -> RobotChoice:
-    return settings.from_table(RobotChoice, table)
+def _choice(table: dict[str, Any]) -> RobotSpec:
+    return settings.from_table(RobotSpec, table)
 
 
 @checked
 def measure(
-    robot: str | RobotChoice | Subject,
+    robot: str | RobotSpec | Subject,
     names: Sequence[str] | None = None,
     folder: Path | None = None,
     executor: Executor | None = None,
@@ -135,7 +135,7 @@ def measure(
     undisturbed = _undisturbed(choice.model, where)
     chosen = [_shortened(d, quick) for name, d in known.items() if name in wanted]
     levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
-    called = choice.model if choice == RobotChoice(choice.model) else settings.to_table(choice)
+    called = choice.model if choice == RobotSpec(choice.model) else settings.to_table(choice)
     moving: Item = {} if subject.speed is None else {"speed": subject.speed}
     if subject.plant != Subject.plant:
         moving["plant"] = subject.plant
@@ -179,10 +179,10 @@ def measure(
     return Robustness(model.name, gait, *errors, findings, subject.plant)
 
 
-def _subject(robot: str | RobotChoice | Subject) -> Subject:
+def _subject(robot: str | RobotSpec | Subject) -> Subject:
     if isinstance(robot, Subject):
         return robot
-    return Subject(RobotChoice(robot) if isinstance(robot, str) else robot)
+    return Subject(RobotSpec(robot) if isinstance(robot, str) else robot)
 
 
 def _undisturbed(robot: str, where: Situation) -> Record:

@@ -9,9 +9,8 @@ from template_control.checks.checked import Checked
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robustness.disturbance import Situation
-from template_control.run.choices.gait import GaitChoice
-from template_control.run.choices.robot import RobotChoice
 from template_control.run.config import RunConfig
+from template_control.run.specs import GaitSpec, RobotSpec
 
 Engine = Literal["pybullet", "mujoco"]
 """A physics engine, by the ``kind`` of its options."""
@@ -31,7 +30,7 @@ class Subject(Checked):
         plant: the engine.
     """
 
-    robot: RobotChoice = field(default_factory=RobotChoice)
+    robot: RobotSpec = field(default_factory=RobotSpec)
     speed: float | None = None
     plant: Engine = "pybullet"
 
@@ -42,6 +41,6 @@ class Subject(Checked):
             TemplateControlError: if robot or gait is not to be had.
         """
         runs = self.speed is not None and not self.robot.free
-        ready = RunConfig(self.robot, GaitChoice("run" if runs else "walk", self.speed)).prepare()
+        ready = RunConfig(self.robot, GaitSpec("run" if runs else "walk", self.speed)).prepare()
         planner = ready.planners[ready.gait.stride]
         return Situation(ready.robot, ready.gait, planner, ENGINES[self.plant]())

@@ -26,12 +26,10 @@ from template_control.embedding.robot_route import robot_route
 from template_control.embedding.robot_template import check_apex
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
-from template_control.run.choices.gait import GaitChoice
-from template_control.run.choices.planner import OwnPlanner, PlannerChoice
-from template_control.run.choices.robot import RobotChoice
-from template_control.run.options import Course, SimulationOptions
+from template_control.run.options import HeadingCommand, SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import STEPS, simulate
+from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec, RobotSpec
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.slip.gaits.walking_by_speed import walking_gait
@@ -42,7 +40,7 @@ from template_control.warm_up import ready
 _STAND = 2.0  # a walk's first and last stand [s]
 
 
-class Ready(NamedTuple):
+class PreparedRun(NamedTuple):
     """What a run is made of, loaded.
 
     Attributes:
@@ -90,9 +88,9 @@ class RunConfig(Checked):
         ParameterError: if both a scenario and another gait are given.
     """
 
-    robot: RobotChoice = field(default_factory=RobotChoice)
-    gait: GaitChoice = field(default_factory=GaitChoice)
-    planner: PlannerChoice | None = None
+    robot: RobotSpec = field(default_factory=RobotSpec)
+    gait: GaitSpec = field(default_factory=GaitSpec)
+    planner: PlannerSpec | None = None
     simulation: SimulationOptions = field(default_factory=SimulationOptions)
     scenario: Scenario | None = None
 
@@ -100,13 +98,13 @@ class RunConfig(Checked):
         super().__post_init__()
         object.__setattr__(self, "simulation", self.simulation.for_robot(self.robot.free))
         if self.scenario is not None:
-            for f in fields(GaitChoice):
+            for f in fields(GaitSpec):
                 if getattr(self.gait, f.name) != f.default:
                     words = "gait" if f.name == "name" else f.name.replace("_", " ")
                     raise ParameterError(f"{words} does not go with a scenario: leave one out")
 
     @property
-    def chosen(self) -> PlannerChoice:
+    def chosen(self) -> PlannerSpec:
         """The planner, with its tuning."""
         if self.planner is not None:
             return self.planner
@@ -120,13 +118,13 @@ class RunConfig(Checked):
         """The same run with the planner that is used where none was given."""
         return replace(self, planner=self.chosen)
 
-    def prepare(self) -> Ready:
+    def prepare(self) -> PreparedRun:
         """Load the robot and make its gait, route and planner.
 
         Raises:
             TemplateControlError: if one of them is not to be had.
         """
-        if not self.robot.free and self.simulation.course != Course():
+        if not self.robot.free and self.simulation.course != HeadingCommand():
             raise ParameterError(
                 "a course, of turning rate or step width, is for a free robot: give --free, or"
                 " leave it out"
@@ -144,14 +142,14 @@ class RunConfig(Checked):
             gait = choice.of(robot, scale)
             planner = self._planner(gait)
             kept = planner.gait if isinstance(planner, AheadPlanner) else gait
-            return Ready(robot, kept, None, {kept.stride: planner})
+            return PreparedRun(robot, kept, None, {kept.stride: planner})
         if isinstance(self.chosen, AheadOptions):
             route = robot_route(robot, self.scenario, push_off=True)
             ahead = AheadPlanner(route.parameters, self.chosen, first_speed(route))
-            return Ready(robot, ahead.gait, route, default_planners(route, ahead))
+            return PreparedRun(robot, ahead.gait, route, default_planners(route, ahead))
         route = robot_route(robot, self.scenario, push_off=False)
         walk = walking_gait(route.parameters, first_speed(route))
-        return Ready(robot, walk, route, default_planners(route, self._planner(walk)))
+        return PreparedRun(robot, walk, route, default_planners(route, self._planner(walk)))
 
     def with_stands(self, before: bool, after: bool) -> RunConfig:
         """The same walk as a scenario that begins or ends in a stand.
@@ -188,7 +186,7 @@ class RunConfig(Checked):
             name=gait.name,
         )
         options = replace(self.simulation, steps=None)
-        return replace(self, gait=GaitChoice(), simulation=options, scenario=scenario)
+        return replace(self, gait=GaitSpec(), simulation=options, scenario=scenario)
 
     def _planner(self, gait: WalkingGait | RunningGait) -> Planner:
         chosen = self.chosen

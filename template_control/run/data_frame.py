@@ -33,12 +33,12 @@ class Column(NamedTuple):
 def columns(record: Any) -> dict[str, Column]:
     """Every quantity that a run has at each sample, by name.
 
-    A name is the field of :class:`~.run.Record`, then what its axes stand for:
+    A name is the field of :class:`~.record.Record`, then what its axes stand for:
     ``q_pitch``, ``torque_left_knee``, ``foot_right_foot_y``. ``node`` and ``rear`` hold the names
     of the automaton's node and of the rear stance foot.
 
     Args:
-        record: the run, a :class:`~.run.Record`; that class imports this function, so it
+        record: the run, a :class:`~.record.Record`; that class imports this function, so it
             cannot be named as the type here.
     """
     joints: list[str] = record.metadata["joints"]
@@ -84,7 +84,7 @@ def columns(record: Any) -> dict[str, Column]:
 
 
 def to_dataframe(record: Any) -> Any:
-    """A run as a pandas ``DataFrame``, see :meth:`.run.Record.to_dataframe`.
+    """A run as a pandas ``DataFrame``, see :meth:`.record.Record.to_dataframe`.
 
     Args:
         record: the run, as for :func:`columns`.

@@ -91,7 +91,7 @@ TurningRate = Annotated[float, Range(-2.0, 2.0)]
 
 
 @dataclass(frozen=True)
-class Course(Checked):
+class HeadingCommand(Checked):
     """Where a free robot goes, and how wide it steps.
 
     Attributes:
@@ -109,7 +109,7 @@ class Course(Checked):
         super().__post_init__()
         times = [time for time, _ in self.turns]
         if sorted(set(times)) != times:
-            raise ParameterError(f"Course.turns has the times {times}: give rising ones")
+            raise ParameterError(f"HeadingCommand.turns has the times {times}: give rising ones")
 
     def rate(self, time: float) -> float:
         """Turning rate at a time [rad/s].
@@ -160,7 +160,7 @@ class SimulationOptions(Checked):
     delay: NotNegative = 0.0
     record_every: Count = 1
     falls: FallOptions = field(default_factory=FallOptions)
-    course: Course = field(default_factory=Course)
+    course: HeadingCommand = field(default_factory=HeadingCommand)
 
     def __post_init__(self) -> None:
         check_world(self.plant)

@@ -1,4 +1,4 @@
-"""A recorded run: what it holds, how it is written and read.
+"""Recorded runs, and their files.
 
 ``run.npz`` holds one array a field of :class:`Record` and the metadata as JSON text.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from template_control.run.data_frame import to_dataframe
 
 Array = NDArray[np.float64]
 
-FORMAT = "template-control run 5"
 LAYOUT = storage.Layout(
     fields={
         "time": "T",
@@ -151,6 +150,7 @@ class Record:
     plan_seconds: Array
     metadata: dict[str, Any]
 
+    file_format: ClassVar[str] = "template-control run 5"
     layout: ClassVar[storage.Layout] = LAYOUT
 
     def check_shown(self) -> None:
@@ -242,17 +242,19 @@ class Record:
         Raises:
             RecordError: if the file cannot be written.
         """
-        return storage.save(self, path, FORMAT, quick=bool(self.metadata.get("interrupted")))
+        return storage.save(
+            self, path, self.file_format, quick=bool(self.metadata.get("interrupted"))
+        )
 
     @classmethod
     @checked
-    def load(cls, path: str | Path) -> Record:
+    def load(cls, path: str | Path) -> Self:
         """Read a run that :meth:`save` wrote.
 
         Raises:
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
-        return storage.load(cls, path, FORMAT, cls.layout)
+        return storage.load(cls, path, cls.file_format, cls.layout)
 
 
 class RunInterrupted(KeyboardInterrupt):
@@ -300,3 +302,73 @@ def recorded(error: BaseException) -> Record | None:
     """
     record = vars(error).get("record")
     return record if isinstance(record, Record) else None
+
+
+_FLOATING_LAYOUT = storage.Layout(
+    fields={
+        **LAYOUT.fields,
+        "q": "T nq",
+        "space_com": "T 3",
+        "space_foot": "T 2 3",
+        "space_force": "T 2 3",
+        "attitude": "T 3",
+        "heading": "T",
+        "sway": "T 2",
+        "side_reference": "T 2",
+    },
+    metadata=LAYOUT.metadata,
+)
+
+
+@dataclass(frozen=True, repr=False)
+class FloatingRecord(Record):
+    """A run of a robot that nothing holds.
+
+    The fields of :class:`~template_control.run.record.Record` are those of its view in the heading
+    frame: x there is the way walked, as the frame turns about the stance foot. ``q`` and ``v`` are
+    Pinocchio's of a free flyer.
+
+    Attributes:
+        space_com: (T, 3) of the CoM in the world, x, y to the left, z up [m].
+        space_foot: (T, 2, 3) lowest points of the feet in the world [m].
+        space_force: (T, 2, 3) the ground's force on each foot in the world [N].
+        attitude: (T, 3) roll, pitch and yaw of the trunk in the heading frame [rad].
+        heading: (T,) angle from the world's x to the heading frame's [rad].
+        sway: (T, 2) y of the CoM from the rear foot and dy/dt, in the heading frame; dy/dt has the
+            angular momentum about the CoM as ``section_state`` has it [m, m/s].
+        side_reference: (T, 2) y of each foot's reference in the heading frame, NaN where it has
+            none [m].
+    """
+
+    file_format: ClassVar[str] = "template-control free run 1"
+    layout: ClassVar[storage.Layout] = _FLOATING_LAYOUT
+
+    space_com: Array
+    space_foot: Array
+    space_force: Array
+    attitude: Array
+    heading: Array
+    sway: Array
+    side_reference: Array
+
+
+@checked
+def load_record(path: str | Path) -> Record:
+    """Read a run, of a planar robot or of a free one.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
+    """
+    return FloatingRecord.load(path) if _in_space(path) else Record.load(path)
+
+
+def _in_space(path: str | Path) -> bool:
+    """Whether the file has what only a run in space has; False where it cannot be read."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return "space_com" in data.files
+    except Exception:  # a damaged file has any of a dozen; its reader tells
+        return False

@@ -1,4 +1,4 @@
-"""What the controller gets to know of the state, and when its torques take effect."""
+"""Sensor models of a run, and the delay of its torques."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.imu import ImuOptions
+from template_control.estimation.noise_filter import NoiseFilter
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import Scale
 
@@ -192,3 +193,30 @@ class TorqueDelay:
         while len(self._line) < (self._line.maxlen or 0):
             self._line.append(self._line[0])
         return self._line[0]
+
+
+class FilteredSensors:
+    """Measures as :class:`~template_control.run.sensing.Sensors`, and filters the noise.
+
+    Args:
+        sensors: that measure, with noise.
+        noise_filter: of the robot.
+        time_step: from tick to tick [s].
+    """
+
+    exact = False
+
+    def __init__(self, sensors: Sensors, noise_filter: NoiseFilter, time_step: float) -> None:
+        self._sensors = sensors
+        self._filter = noise_filter
+        self._dt = time_step
+        self._expected: Array = np.zeros(1)
+
+    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """As :meth:`~template_control.run.sensing.Senses.measure`."""
+        measured = self._sensors.measure(q, v, contact)
+        return self._filter.update(measured, self._expected, contact, self._dt)
+
+    def expect(self, acceleration: Array) -> None:
+        """As :meth:`~template_control.run.sensing.Senses.expect`."""
+        self._expected = acceleration

@@ -1,12 +1,14 @@
-"""Run a robot: plant, controller and recorder in one loop."""
+"""Simulation of a robot: plant, controller and recorder in one loop."""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from math import copysign, cos, hypot, sin
+from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +26,8 @@ from template_control.plant.plant import Plant, plant_name
 from template_control.robot.biped import Biped
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.run.backends import FloatingBackend, PlanarBackend, RobotBackend
 from template_control.run.failures import QpFailures
-from template_control.run.in_use import in_use
-from template_control.run.kinds.free import Free
-from template_control.run.kinds.kind import Kind
-from template_control.run.kinds.planar import Planar
 from template_control.run.metadata import about, outcome
 from template_control.run.options import Push, SimulationOptions, check_pushes
 from template_control.run.record import Record, RunInterrupted, keep, one_line
@@ -45,6 +44,36 @@ from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 Array = NDArray[np.float64]
+
+_LOCK = Lock()
+_TAKEN: set[int] = set()
+
+
+@contextmanager
+def exclusive(*parts: Any) -> Iterator[None]:
+    """Keep a run's parts from other runs: each keeps the state of one run at a time.
+
+    Args:
+        parts: robot, route and planners.
+
+    Raises:
+        ParameterError: if another run, maybe of another thread, uses one of them.
+    """
+    keys = {id(part) for part in parts}
+    with _LOCK:
+        for part in parts:
+            if id(part) in _TAKEN:
+                raise ParameterError(
+                    f"this {type(part).__name__} is in use by another run: give each run that"
+                    " goes on at the same time its own"
+                )
+        _TAKEN.update(keys)
+    try:
+        yield
+    finally:
+        with _LOCK:
+            _TAKEN.difference_update(keys)
+
 
 _LOG = logging.getLogger(__name__)
 
@@ -85,7 +114,7 @@ def simulate(
 
     Ctrl-C ends the run, and the loop it stands in; so does an error of the route, of a planner or
     of a task. What was recorded until then is the attribute ``record`` of the exception
-    (:func:`~.run.recorded`).
+    (:func:`~.record.recorded`).
 
     Args:
         robot: model of the controller, and whose URDF the plant loads.
@@ -108,18 +137,18 @@ def simulate(
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
     """
-    kind, free = _kind(robot), isinstance(robot, FreeBiped)
+    backend, free = _backend(robot), isinstance(robot, FreeBiped)
     o = (options or SimulationOptions()).for_robot(free)
     if isinstance(route, Scenario):
         route = robot_route(robot, route)
-    controller = _controller(kind, route, planners, o.tuning(free), automaton)
-    recorder = kind.recorder(controller, o.record_every)
+    controller = _controller(backend, route, planners, o.tuning(free), automaton)
+    recorder = backend.recorder(controller, o.record_every)
     last = _last_step(controller, o)
     parts = (route, controller.planning.route, *controller.planning.planners.values())
-    with in_use(robot, *parts):
+    with exclusive(robot, *parts):
         _check_template(robot, controller.parameters)
-        q, v = kind.start(controller, o)
-        senses = kind.senses(controller, o)
+        q, v = backend.start(controller, o)
+        senses = backend.senses(controller, o)
         _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
         # Before the run, which would be lost if this failed after it.
         metadata = about(controller, o)
@@ -136,11 +165,21 @@ def simulate(
             _LOG.info("%r in %.2f s of wall-clock time", record, seconds)
             return record
 
-        with kind.plant(o.plant) as plant:
+        with backend.plant(o.plant) as plant:
             plant.reset(q, v)
             try:
-                world = (plant, kind, senses)
-                return ended(_loop(world, controller, recorder, o, (last, progress)))
+                return ended(
+                    _loop(
+                        plant,
+                        backend,
+                        senses,
+                        controller,
+                        recorder,
+                        o,
+                        last=last,
+                        progress=progress,
+                    )
+                )
             except KeyboardInterrupt as stop:
                 if not recorder.ticks:
                     raise
@@ -171,21 +210,21 @@ def _told(p: SlipParameters) -> str:
     return f"{p.mass:.4g} kg, l0 = {p.rest_length:.4g} m and g = {p.gravity:.4g} m/s^2"
 
 
-def _kind(robot: Biped) -> Kind:
+def _backend(robot: Biped) -> RobotBackend:
     """How the robot is run.
 
     Raises:
         ParameterError: if it is neither planar nor free.
     """
     if isinstance(robot, PlanarBiped):
-        return Planar(robot)
+        return PlanarBackend(robot)
     if isinstance(robot, FreeBiped):
-        return Free(robot)
+        return FloatingBackend(robot)
     raise ParameterError(f"{robot!r} is of no kind that can be run: give a planar or a free biped")
 
 
 def _controller(
-    kind: Kind,
+    backend: RobotBackend,
     route: Route | Planner,
     planners: Planners | None,
     options: EmbeddingOptions,
@@ -196,13 +235,13 @@ def _controller(
     if isinstance(route, Planner):
         steady = SteadyRoute.of(route.gait, automaton)
         if not catches or steady.section is not VLO:
-            return kind.controller(route, options, steady, automaton)
+            return backend.controller(route, options, steady, automaton)
         caught = CatchingRoute(steady)
-        return kind.controller(default_planners(caught, route), options, caught, automaton)
+        return backend.controller(default_planners(caught, route), options, caught, automaton)
     chosen = planners or default_planners(route)
     if catches and isinstance(route, ScenarioRoute) and chosen.keys() >= CATCHING_STRIDES:
         route = CatchingRoute(route)
-    return kind.controller(chosen, options, route, automaton)
+    return backend.controller(chosen, options, route, automaton)
 
 
 def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
@@ -220,19 +259,17 @@ def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
 
 
 def _loop(
-    world: tuple[Plant, Kind, Senses],
+    plant: Plant,
+    backend: RobotBackend,
+    senses: Senses,
     controller: EmbeddingController,
     recorder: Recorder,
     o: SimulationOptions,
-    until: tuple[float, Callable[[int], None] | None],
+    *,
+    last: float,
+    progress: Callable[[int], None] | None,
 ) -> str:
-    """Run until the steps are done ("") or the robot falls (why).
-
-    ``world`` holds the plant, how pushes act in it, and what is told of it; ``until`` the number
-    of steps, and what is called with those done.
-    """
-    plant, kind, senses = world
-    last, progress = until
+    """Run until the ``last`` step is done ("") or the robot falls (why)."""
     robot, planning = controller.robot, controller.planning
     dt = o.plant.time_step
     delay = TorqueDelay(o.delay_ticks)
@@ -263,8 +300,8 @@ def _loop(
         if len(begun) < len(controller.reports):
             # A step that changes into another stride keeps its pushes where they were.
             begun.append((controller.reports[-1].time, controller.planner.gait.step_duration))
-        along, aside = _push(o.pushes, begun, now)
-        size = copysign(hypot(along, aside), along)
+        along, lateral = _push(o.pushes, begun, now)
+        size = copysign(hypot(along, lateral), along)
         recorder.tick(Truth(now, q, v, forces, size), solution, seconds)
         reason = _fallen(plant, controller, q, o, now)
         if reason:
@@ -275,7 +312,7 @@ def _loop(
             if progress is not None:
                 progress(done)
         try:
-            plant.step(delay.pass_on(solution.torque), *kind.force(along, aside))
+            plant.step(delay.pass_on(solution.torque), *backend.force(along, lateral))
         except DivergedError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
@@ -313,7 +350,7 @@ def _push(
 
     ``begun`` holds when each step began, and the duration of its gait's steps [s].
     """
-    along = aside = 0.0
+    along = lateral = 0.0
     for push in pushes:
         if push.step < len(begun):
             time, duration = begun[push.step]
@@ -321,8 +358,8 @@ def _push(
             if begin <= now < begin + push.duration:
                 force = push.impulse / push.duration
                 along += force * cos(push.direction)
-                aside += force * sin(push.direction)
-    return along, aside
+                lateral += force * sin(push.direction)
+    return along, lateral
 
 
 def _fallen(

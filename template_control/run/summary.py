@@ -1,4 +1,4 @@
-"""The figures of a run that a table or ``--json`` shows."""
+"""Summary figures of a run, as a table or ``--json`` shows them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.run.kinds.free_record import FreeRecord
-from template_control.run.kinds.free_summary import in_space
-from template_control.run.record import Record
-from template_control.slip.automaton.vocabulary import Event
+from template_control.run.record import FloatingRecord, Record
+from template_control.slip.automaton.vocabulary import Event, Phase
 from template_control.slip.maps.section import section_of
 
 Array = NDArray[np.float64]
-
 
 STRIDES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
 """The kinds of stride in words."""
@@ -158,7 +155,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         plan_seconds (median, p99), real_time_factor, steps_not_nominal (plans that left the
         planner's own law),
         record; of a run in space also joint_angle (per joint least and most, and the range's lower
-        and upper [rad]) and what :func:`~template_control.run.kinds.free_summary.in_space` tells.
+        and upper [rad]) and what :func:`~floating_summary` tells.
     """
     m = record.metadata
     duration = m["duration"]
@@ -186,6 +183,54 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "plan_seconds": _quantiles(record.plan_seconds),
         "real_time_factor": duration / m["wall_seconds"],
         "steps_not_nominal": int(np.sum(~record.section_nominal)),
-        **(in_space(record) if isinstance(record, FreeRecord) else {}),
+        **(floating_summary(record) if isinstance(record, FloatingRecord) else {}),
         "record": path,
     }
+
+
+_ANGLES = ("roll", "pitch", "yaw")
+
+
+def floating_summary(record: FloatingRecord) -> dict[str, Any]:
+    """Summary figures of a floating-base run: attitude, heading, step width.
+
+    Args:
+        record: the run.
+
+    Returns:
+        attitude_rms and attitude_max (roll, pitch, yaw in the heading frame [rad]), turned
+        (of the heading [rad]), mean_yaw_drift (of the trunk's mean yaw in the heading frame, from
+        the first to the last quarter of the run, over 100 steps [rad]), step_width (mean, standard
+        deviation, least [m]; None without a double stance).
+    """
+    angles = record.attitude
+    rms, most = np.sqrt(np.mean(angles**2, axis=0)), np.abs(angles).max(axis=0)
+    quarter = max(len(angles) // 4, 1)
+    drift = float(np.mean(angles[-quarter:, 2]) - np.mean(angles[:quarter, 2]))
+    hundreds = 0.75 * max(record.steps, 1) / 100.0
+    widths = step_widths(record)
+    width = (
+        {"mean": widths.mean(), "deviation": widths.std(), "least": widths.min()}
+        if len(widths)
+        else None
+    )
+    return {
+        "attitude_rms": dict(zip(_ANGLES, rms.tolist(), strict=True)),
+        "attitude_max": dict(zip(_ANGLES, most.tolist(), strict=True)),
+        "turned": float(record.heading[-1] - record.heading[0]),
+        "mean_yaw_drift": drift / hundreds,
+        "step_width": None if width is None else {k: float(x) for k, x in width.items()},
+    }
+
+
+def step_widths(record: FloatingRecord) -> Array:
+    """(n,) distance aside between the feet in each double stance, left less right [m].
+
+    Args:
+        record: the run.
+    """
+    double = np.array([phase == Phase.DS.name for phase in record.metadata["phases"]])[record.node]
+    begun = np.flatnonzero(np.diff(double.astype(np.int8)) == 1) + 1
+    apart = record.space_foot[begun, 0, :2] - record.space_foot[begun, 1, :2]
+    angle = record.heading[begun]
+    return np.asarray(np.cos(angle) * apart[:, 1] - np.sin(angle) * apart[:, 0])

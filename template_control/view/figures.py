@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
-from template_control.run.kinds.free_record import FreeRecord
-from template_control.run.record import Record
+from template_control.run.record import FloatingRecord, Record
 from template_control.slip.automaton.vocabulary import Event
 from template_control.view.figure_file import save_figure
 from template_control.view.free_figures import FREE_FIGURES
@@ -202,7 +201,7 @@ def figures_of(record: Record) -> dict[str, Callable[..., Figure]]:
     Args:
         record: the run.
     """
-    if isinstance(record, FreeRecord):
+    if isinstance(record, FloatingRecord):
         return {**{name: FIGURES[name] for name in _OF_ANY}, **FREE_FIGURES}
     names = [record.metadata["sections"][i] for i in record.section]
     if (Event.APEX.name, Event.APEX.name) in pairwise(names):

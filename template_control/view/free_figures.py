@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.run.kinds.free_record import FreeRecord
+from template_control.run.record import FloatingRecord
 from template_control.view.style import (
     COM,
     LEFT,
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 _FEET = (("left foot", LEFT), ("right foot", RIGHT))
 
 
-def footholds(record: FreeRecord, foot: int) -> tuple[Array, Array]:
+def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
     """Where and when a foot stood.
 
     Args:
@@ -45,7 +45,7 @@ def footholds(record: FreeRecord, foot: int) -> tuple[Array, Array]:
     return record.space_foot[middle, foot, :2], record.time[middle]
 
 
-def from_above(record: FreeRecord, seconds: float = 4.0) -> Figure:
+def from_above(record: FloatingRecord, seconds: float = 4.0) -> Figure:
     """The CoM's path from above with the footholds: of the run, and of its end.
 
     Args:
@@ -69,7 +69,7 @@ def from_above(record: FreeRecord, seconds: float = 4.0) -> Figure:
     return figure
 
 
-def lateral_portrait(record: FreeRecord, seconds: float = 10.0) -> Figure:
+def lateral_portrait(record: FloatingRecord, seconds: float = 10.0) -> Figure:
     """Sway over its rate, from the foot that stands: left and right are mirror images.
 
     Args:
@@ -92,7 +92,7 @@ def lateral_portrait(record: FreeRecord, seconds: float = 10.0) -> Figure:
     return figure
 
 
-def attitude(record: FreeRecord, seconds: float = 4.0) -> Figure:
+def attitude(record: FloatingRecord, seconds: float = 4.0) -> Figure:
     """Roll, pitch and yaw of the trunk in the heading frame: over the run, and its end.
 
     Args:
@@ -119,7 +119,7 @@ def _line(axes: Axes, time: Array, angle: Array, name: str) -> None:
     axes.set_ylabel(name)
 
 
-FREE_FIGURES: dict[str, Callable[[FreeRecord], Figure]] = {
+FREE_FIGURES: dict[str, Callable[[FloatingRecord], Figure]] = {
     "from_above": from_above,
     "lateral_portrait": lateral_portrait,
     "attitude": attitude,

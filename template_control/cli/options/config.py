@@ -13,7 +13,7 @@ from template_control.embedding.ahead.planner import AheadPlanner
 from template_control.embedding.ahead.rehearsal import rehearse
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
-from template_control.run.config import Ready, RunConfig
+from template_control.run.config import PreparedRun, RunConfig
 from template_control.run.sensing import SensorOptions
 from template_control.run.simulation import perturbed_start
 from template_control.slip.similarity import Scale
@@ -54,7 +54,7 @@ def config_from(options: argparse.Namespace, default: RunConfig) -> RunConfig:
 
 def prepared(
     options: argparse.Namespace, default: RunConfig | None = None
-) -> tuple[RunConfig, Ready]:
+) -> tuple[RunConfig, PreparedRun]:
     """The run that was asked for, and what it is made of.
 
     Args:
@@ -92,7 +92,7 @@ def prepared(
     return replace(config, simulation=simulation), ready
 
 
-def _check_strictly(ready: Ready) -> None:
+def _check_strictly(ready: PreparedRun) -> None:
     """Refuse a walk that cannot be had as it is wanted.
 
     Raises:

@@ -12,8 +12,7 @@ from template_control.embedding.free.options import FREE_PLANNER
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.embedding.planners.walking.modified import ModifiedOptions
 from template_control.errors import ParameterError
-from template_control.run.choices.gait import GaitChoice
-from template_control.run.choices.planner import OwnPlanner, PlannerChoice
+from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.scenario.scenario_file import load_scenario
@@ -26,7 +25,7 @@ _GIVEN = {
     "touchdown_angle": "touchdown_angle",
     "apex_height": "apex",
 }
-"""By the field of a :class:`GaitChoice`, the option that sets it."""
+"""By the field of a :class:`GaitSpec`, the option that sets it."""
 
 
 def add_gait_options(parser: argparse.ArgumentParser) -> None:
@@ -114,7 +113,7 @@ def add_planner_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def gait_choice(options: argparse.Namespace, base: GaitChoice) -> GaitChoice:
+def gait_choice(options: argparse.Namespace, base: GaitSpec) -> GaitSpec:
     """The gait that was asked for.
 
     Args:
@@ -143,8 +142,8 @@ def scenario_choice(options: argparse.Namespace, base: Scenario | None) -> Scena
 
 
 def planner_choice(
-    options: argparse.Namespace, base: PlannerChoice | None, free: bool
-) -> PlannerChoice | None:
+    options: argparse.Namespace, base: PlannerSpec | None, free: bool
+) -> PlannerSpec | None:
     """The planner that was asked for.
 
     Args:

@@ -11,9 +11,9 @@ from template_control.checks import typed
 from template_control.checks.option_types import number
 from template_control.checks.ranges import Range
 from template_control.robot.library import FLOATING_ROBOTS, ROBOTS
-from template_control.run.choices.robot import RobotChoice
+from template_control.run.specs import RobotSpec
 
-_DEFAULT = RobotChoice().model
+_DEFAULT = RobotSpec().model
 _TURN = Range(-6.3, 6.3)  # [rad] about once around: degrees are not taken for it
 
 
@@ -74,7 +74,7 @@ def add_robot_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def robot_choice(options: argparse.Namespace, base: RobotChoice) -> RobotChoice:
+def robot_choice(options: argparse.Namespace, base: RobotSpec) -> RobotSpec:
     """The robot that was asked for.
 
     Args:
@@ -84,7 +84,7 @@ def robot_choice(options: argparse.Namespace, base: RobotChoice) -> RobotChoice:
     """
     given: dict[str, Any] = {}
     if options.robot is not None:
-        base = RobotChoice()
+        base = RobotSpec()
         given["model"] = _model(options.robot)
     for name in ("feet", "sagittal_joints", "foot_offset"):
         if getattr(options, name) is not None:

@@ -16,7 +16,7 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.terrain.spec import terrain_from
-from template_control.run.options import Course, Phase, Push, SimulationOptions, TurningRate
+from template_control.run.options import HeadingCommand, Phase, Push, SimulationOptions, TurningRate
 from template_control.run.simulation import STEPS
 
 _PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions, IdealOptions)}
@@ -192,7 +192,7 @@ def _plant(options: argparse.Namespace, base: SimulationOptions) -> PlantOptions
     return replace(plant, **_without_none(given))
 
 
-def _course(options: argparse.Namespace, base: Course) -> Course:
+def _course(options: argparse.Namespace, base: HeadingCommand) -> HeadingCommand:
     wanted: dict[str, Any] = {"step_width": getattr(options, "step_width", None)}
     turns = [_turn(text) for text in getattr(options, "turn", None) or ()]
     if turns:

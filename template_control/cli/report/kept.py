@@ -19,7 +19,7 @@ from template_control.cli.report.output import progress_bar
 from template_control.errors import TemplateControlError
 from template_control.plant.quiet import stdout_to_stderr
 from template_control.run import failures
-from template_control.run.config import Ready, RunConfig
+from template_control.run.config import PreparedRun, RunConfig
 from template_control.run.record import Record, RunInterrupted, one_line, recorded
 from template_control.storage import Files
 from template_control.terminal import plain_console
@@ -58,7 +58,7 @@ class Kept:
 def run_and_keep(
     options: argparse.Namespace,
     config: RunConfig,
-    ready: Ready,
+    ready: PreparedRun,
     doing: str,
     more: Callable[[Record, Path], Any] | None = None,
 ) -> Kept:

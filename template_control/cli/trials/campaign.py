@@ -31,8 +31,7 @@ from template_control.robustness.campaigns.campaign import (
     save_falls,
 )
 from template_control.robustness.campaigns.mix import FREE_MIX, Mix
-from template_control.run.choices.gait import GaitChoice
-from template_control.run.choices.robot import RobotChoice
+from template_control.run.specs import GaitSpec, RobotSpec
 from template_control.storage import Files, write_text, writing
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
@@ -90,12 +89,12 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         TemplateControlError: naming the option that is wrong.
     """
-    chosen = robot_choice(options, RobotChoice())
+    chosen = robot_choice(options, RobotSpec())
     default = FREE_MIX if chosen.free else Mix()
     mix = default if options.mix is None else settings.read(Mix, options.mix)
     conditions = Conditions(
         chosen,
-        GaitChoice(options.gait, options.speed),
+        GaitSpec(options.gait, options.speed),
         options.plant,
         mix.times(options.severity),
         options.seed,

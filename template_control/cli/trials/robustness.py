@@ -26,8 +26,7 @@ from template_control.robustness.disturbances import AFTER
 from template_control.robustness.findings import Finding, Robustness
 from template_control.robustness.ladder import SETTLED, measure
 from template_control.robustness.subject import Subject
-from template_control.run.choices.gait import GaitChoice
-from template_control.run.choices.robot import RobotChoice
+from template_control.run.specs import GaitSpec, RobotSpec
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writing
 from template_control.sweep.executor import workers
@@ -89,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
         ParameterError: if a walk is given a speed.
     """
     # Before a folder is made for it.
-    choice = robot_choice(options, RobotChoice())
+    choice = robot_choice(options, RobotSpec())
     speed, name = _speed(options, choice), Path(choice.model).stem
     name += "-free" * choice.free + "-run" * (options.gait == "run")
     name += f"-{options.plant}" * (options.plant != Subject.plant)
@@ -117,16 +116,16 @@ def _measure(options: argparse.Namespace, subject: Subject, folder: Path) -> int
     return 0
 
 
-def _speed(options: argparse.Namespace, choice: RobotChoice) -> float | None:
+def _speed(options: argparse.Namespace, choice: RobotSpec) -> float | None:
     """Of a run, dx/dt at apex; of a free walk, its mean; None: the robot walks its own gait."""
     robot = choice.load()
     if choice.free:
         if options.gait == "run":
             raise ParameterError(f"{choice.model} walks free, and does not run: leave --gait out")
-        GaitChoice(speed=options.speed).of(robot)  # which tells where there is none
+        GaitSpec(speed=options.speed).of(robot)  # which tells where there is none
         return None if options.speed is None else float(options.speed)
     if options.gait == "run":
-        gait = GaitChoice("run", options.speed).of(robot)
+        gait = GaitSpec("run", options.speed).of(robot)
         return float(gait.state[0])
     if options.speed is not None:
         raise ParameterError("--speed goes with --gait run: leave one out, or give both")

@@ -22,11 +22,10 @@ from template_control.robustness.findings import wilson_interval
 from template_control.robustness.fingerprint import fingerprint
 from template_control.robustness.ladder import off_gait
 from template_control.robustness.subject import ENGINES, Engine
-from template_control.run.choices.gait import GaitChoice
-from template_control.run.choices.robot import RobotChoice
-from template_control.run.config import Ready, RunConfig
+from template_control.run.config import PreparedRun, RunConfig
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.sensing import SensorOptions
+from template_control.run.specs import GaitSpec, RobotSpec
 from template_control.slip.similarity import Scale
 from template_control.sweep.sweep import Item, SweepOptions, item_seed, sweep
 
@@ -50,8 +49,8 @@ class Conditions(Checked):
             be pushed aside.
     """
 
-    robot: RobotChoice = field(default_factory=RobotChoice)
-    gait: GaitChoice = field(default_factory=GaitChoice)
+    robot: RobotSpec = field(default_factory=RobotSpec)
+    gait: GaitSpec = field(default_factory=GaitSpec)
     plant: Engine = "pybullet"
     mix: Mix = field(default_factory=Mix)
     seed: Index = 0
@@ -72,7 +71,7 @@ class Conditions(Checked):
         """
         return self.mix.draw(item_seed(self.seed, number))
 
-    def trial(self, number: Index) -> tuple[RunConfig, Ready]:
+    def trial(self, number: Index) -> tuple[RunConfig, PreparedRun]:
         """A trial as a run, and what the run is made of.
 
         Args:

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.run.kinds.free_record import FreeRecord
-from template_control.run.record import Record
+from template_control.run.record import FloatingRecord, Record
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 
@@ -71,7 +70,7 @@ def _limited(record: Record) -> NDArray[np.bool_]:
 def _slipped(record: Record) -> NDArray[np.bool_]:
     wrong = np.zeros(len(record.time), dtype=bool)
     for foot, bears in enumerate(_bears(record).T):
-        if isinstance(record, FreeRecord):
+        if isinstance(record, FloatingRecord):
             place = record.space_foot[:, foot, :2]
         else:
             place = record.foot[:, foot, :1]

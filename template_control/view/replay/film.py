@@ -11,7 +11,7 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
-from template_control.run.kinds.free_record import FreeRecord
+from template_control.run.record import FloatingRecord
 from template_control.storage import replacing
 from template_control.view.replay.film_picture import (
     LEGS,
@@ -127,7 +127,7 @@ def write_film(
     """
     writer = _writer(path, fps, len(playback.rows))
     with replacing(path) as place:
-        free = isinstance(playback.record, FreeRecord)
+        free = isinstance(playback.record, FloatingRecord)
         stage = SpaceStage(playback) if free else _Stage(playback)
         try:
             with writer.saving(stage.figure, str(place), dpi):

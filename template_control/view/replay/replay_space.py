@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.run.kinds.free_record import FreeRecord
-from template_control.run.record import Record
+from template_control.run.record import FloatingRecord, Record
 from template_control.view.replay.playback import (
     arrows_of,
     carrying,
@@ -50,7 +49,7 @@ def in_space(record: Record, sides: Array) -> Space:
         record: the run.
         sides: (2,) how far to the left a planar robot's feet are [m]; not asked of a free one.
     """
-    if isinstance(record, FreeRecord):
+    if isinstance(record, FloatingRecord):
         return _free(record)
     ground, aside = record.ground, np.array([0.0, 1.0, 0.0])
     found = footholds(record)
@@ -70,7 +69,7 @@ def in_space(record: Record, sides: Array) -> Space:
     )
 
 
-def _free(record: FreeRecord) -> Space:
+def _free(record: FloatingRecord) -> Space:
     away = record.template_com - record.com
     ahead = np.stack((np.cos(record.heading), np.sin(record.heading)), axis=1)
     template = record.space_com + np.column_stack((away[:, :1] * ahead, away[:, 1]))

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from template_control.errors import RecordError
 from template_control.robot.biped import foot_frame
-from template_control.run.kinds.free_record import FreeRecord
-from template_control.run.record import Record
+from template_control.run.record import FloatingRecord, Record
 from template_control.view.style import LEFT, RIGHT, TRUNK
 
 Array = NDArray[np.float64]
@@ -142,7 +141,7 @@ def model_of(record: Record) -> pin.Model:
         record: the run, which carries a URDF.
     """
     text = record.metadata["urdf"]
-    if isinstance(record, FreeRecord):
+    if isinstance(record, FloatingRecord):
         return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
     return pin.buildModelFromXML(text)
 

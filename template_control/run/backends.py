@@ -1,0 +1,349 @@
+"""Backends of a run: what differs between planar and floating-base robots."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager, nullcontext
+from math import atan2, cos, degrees, radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.free.controller import FreeController
+from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.free.sideways import SIDES
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.phases import phase_control
+from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.references.apex_pose import ApexStart, apex_pose
+from template_control.embedding.standing.pose import standing_pose
+from template_control.errors import ParameterError
+from template_control.estimation.delay import DelayCompensation
+from template_control.estimation.imu import ImuOptions, ImuSensors
+from template_control.estimation.noise_filter import NoiseFilter
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.plant.free.mujoco import FreeMujocoPlant
+from template_control.plant.mujoco import MujocoOptions
+from template_control.plant.plant import Plant, World, open_plant, plant_name
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.free.start import FreePose, free_state_in
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.start import Pose, state_at_vlo, state_in
+from template_control.run.options import HeadingCommand, SimulationOptions
+from template_control.run.recorder import FloatingRecorder, Recorder
+from template_control.run.sensing import (
+    FilteredSensors,
+    ForeseeingSensors,
+    Senses,
+    SensorOptions,
+    Sensors,
+)
+from template_control.slip.automaton.hybrid import Automaton, Node
+from template_control.slip.lateral.gait import LateralWish
+from template_control.slip.maps.section import APEX, REST, VLO
+from template_control.slip.scenario.route import Route
+from template_control.slip.similarity import Scale
+
+Array = NDArray[np.float64]
+
+
+class RobotBackend(ABC):
+    """Backend of one kind of robot; a robot comes with it."""
+
+    @abstractmethod
+    def controller(
+        self,
+        planners: Planners | Planner,
+        options: EmbeddingOptions,
+        route: Route,
+        automaton: Automaton,
+    ) -> EmbeddingController:
+        """The robot's controller.
+
+        Args:
+            planners: one for each kind of stride of the route, or one.
+            options: tuning.
+            route: which stride comes next.
+            automaton: of the route's strides.
+        """
+
+    @abstractmethod
+    def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
+        """Start the controller where the run begins, and tell (q, v) there.
+
+        Args:
+            controller: of the robot.
+            o: how the run goes.
+
+        Raises:
+            ParameterError: if it is not clear where the feet are.
+        """
+
+    @abstractmethod
+    def plant(self, world: World) -> AbstractContextManager[Plant]:
+        """The robot in a world.
+
+        Args:
+            world: options of a plant, or a plant.
+        """
+
+    @abstractmethod
+    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+        """What tells the controller the state.
+
+        Args:
+            controller: of the robot.
+            o: how the run goes.
+        """
+
+    @abstractmethod
+    def force(self, along: float, lateral: float) -> tuple[float, ...]:
+        """A push as the robot's plant takes it, after the torques.
+
+        Args:
+            along, lateral: forward, and to the left [N].
+        """
+
+    @abstractmethod
+    def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
+        """What records the run.
+
+        Args:
+            controller: of the robot.
+            every: keeps every n-th tick.
+        """
+
+
+# Of the ground that a walk starts on [rad]: steeper uphill the CoM does not come over the front
+# foot before the centre of pressure has left the rear one.
+_UPHILL = radians(4.1)
+
+
+class PlanarBackend(RobotBackend):
+    """See :class:`RobotBackend`.
+
+    Args:
+        robot: that is run.
+    """
+
+    def __init__(self, robot: PlanarBiped) -> None:
+        self.robot = robot
+
+    def controller(
+        self,
+        planners: Planners | Planner,
+        options: EmbeddingOptions,
+        route: Route,
+        automaton: Automaton,
+    ) -> EmbeddingController:
+        """See :meth:`RobotBackend.controller`.
+
+        Raises:
+            ParameterError: if the options are those of a free robot.
+        """
+        if isinstance(options, FreeOptions):
+            raise ParameterError(
+                f"{self.robot.name} is held in its plane, and its embedding has FreeOptions: give"
+                " EmbeddingOptions"
+            )
+        return EmbeddingController(self.robot, planners, options, route, automaton)
+
+    def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
+        """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns.
+
+        Raises:
+            ParameterError: as there, or if the options have a course or a push aside.
+        """
+        if o.course != HeadingCommand():
+            raise ParameterError(
+                f"{self.robot.name} is held in its plane and has no course: leave it out, or take"
+                " a free robot"
+            )
+        if any(push.direction for push in o.pushes):
+            raise ParameterError(
+                f"{self.robot.name} is held in its plane, and a push has a direction: leave it out,"
+                " or take a free robot"
+            )
+        robot, route, pose = self.robot, controller.planning.route, o.pose
+        first = planner, node = controller.planning.begin(route.section)
+        z = route.start if o.start is None else np.array(o.start)
+        if pose is None and route.section == APEX:
+            pose = self._apex_pose(controller, z[: APEX.dimension], planner, node)
+        if pose is None and route.section == REST:
+            pose = self._standing_pose(controller, o)
+        if pose is not None:
+            q, v = state_in(robot, pose)
+            controller.start(pose.rear, pose.swung, first=first)
+            return q, v
+        # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
+        shape = controller.swings.towards(controller.planning.first_goal())
+        swing = np.array([0.0, shape.clearance])
+        pitch = controller.first_pitch()
+        q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
+        controller.start(first=first)
+        return q, v
+
+    def _apex_pose(
+        self, controller: EmbeddingController, z: Array, planner: Planner, node: Node
+    ) -> Pose:
+        """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
+        o, pitch = controller.options, controller.first_pitch()
+        swing = phase_control(o.phases, node).swing or controller.swings.other
+        automaton = controller.planning.automaton
+        return apex_pose(self.robot, ApexStart(z, planner.gait, swing, pitch, automaton))
+
+    def _standing_pose(self, controller: EmbeddingController, o: SimulationOptions) -> Pose:
+        """At rest on the ground of the plant.
+
+        Raises:
+            ParameterError: if it is steeper than a start can be made on.
+        """
+        pose = standing_pose(controller.planning.route.parameters, ground=o.plant.ground_height)
+        (rear, low), (front, high) = pose.feet.tolist()
+        slope, believed = atan2(high - low, front - rear), controller.options.slope.steepest
+        if not -believed <= slope <= min(believed, _UPHILL):
+            raise ParameterError(
+                f"{self.robot.name} stands on ground of {degrees(slope):.1f} degrees: let the run"
+                f" begin where it is between {-degrees(believed):.1f} and {degrees(_UPHILL):.1f}"
+                " degrees"
+            )
+        return pose
+
+    def plant(self, world: World) -> AbstractContextManager[Plant]:
+        """See :meth:`RobotBackend.plant`."""
+        return open_plant(self.robot, world)
+
+    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+        """See :meth:`RobotBackend.senses`."""
+        parameters = controller.parameters
+        if isinstance(o.sensors, ImuOptions):
+            return ImuSensors(o.sensors, self.robot, Scale.of(parameters), o.plant.time_step)
+        delay = DelayCompensation(controller.options.delay, self.robot, o.plant.time_step)
+        sensors = Sensors(o.sensors, self.robot, parameters.rest_length)
+        return ForeseeingSensors(sensors, delay)
+
+    def force(self, along: float, lateral: float) -> tuple[float, ...]:
+        """See :meth:`RobotBackend.force`: what holds the robot bears the rest."""
+        return (along,)
+
+    def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
+        """See :meth:`RobotBackend.recorder`."""
+        return Recorder(controller, every)
+
+
+_REAR = 0  # the left foot stands where a run begins
+
+
+class FloatingBackend(RobotBackend):
+    """See :class:`RobotBackend`.
+
+    Args:
+        robot: that is run.
+    """
+
+    def __init__(self, robot: FreeBiped) -> None:
+        self.robot = robot
+
+    def controller(
+        self,
+        planners: Planners | Planner,
+        options: EmbeddingOptions,
+        route: Route,
+        automaton: Automaton,
+    ) -> FreeController:
+        """See :meth:`RobotBackend.controller`.
+
+        Raises:
+            ParameterError: if the options are those of a planar robot.
+        """
+        if not isinstance(options, FreeOptions):
+            raise ParameterError(
+                f"{self.robot.name} walks free, and its embedding has EmbeddingOptions: give"
+                " FreeOptions"
+            )
+        return FreeController(self.robot, planners, options, route, automaton)
+
+    def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
+        """See :meth:`RobotBackend.start`: at VLO, in the sideways motion of the gait.
+
+        Raises:
+            ParameterError: if the run begins elsewhere, or the options have a planar pose.
+        """
+        route = controller.planning.route
+        if o.pose is not None or route.section != VLO or not isinstance(controller, FreeController):
+            raise ParameterError(
+                f"{self.robot.name} walks free: its run begins at VLO, without a pose"
+            )
+        z = route.start if o.start is None else np.array(o.start)
+        planner, node = controller.planning.begin(VLO)
+        sideways, course = controller.sideways, o.course
+        sideways.wish = LateralWish(
+            course.step_width or sideways.wish.width,
+            turn=course.rate(0.0) * planner.gait.step_duration,
+        )
+        controller.turning = course.rate
+        sideways.reset(planner.gait)
+        away, drift = sideways.cycle.states[SIDES[_REAR].row]
+        width = sideways.wish.width
+        # Mid-swing: the other foot passes the stance foot at twice the CoM's speed.
+        pose = FreePose(
+            com=np.array([0.0, 0.5 * width + away, z[1]]),
+            com_velocity=np.array([z[0], drift, z[2]]),
+            feet=np.array(
+                [[0.0, 0.5 * width, 0.0], [0.0, -0.5 * width, controller.swings.other.clearance]]
+            ),
+            feet_velocity=np.array([[0.0, 0.0, 0.0], [2.0 * z[0], 0.0, 0.0]]),
+            rear=_REAR,
+            pitch=controller.first_pitch(),
+        )
+        q, v = free_state_in(self.robot, pose)
+        controller.start(_REAR, first=(planner, node))
+        return q, v
+
+    def plant(self, world: World) -> AbstractContextManager[Plant]:
+        """See :meth:`RobotBackend.plant`.
+
+        Raises:
+            ParameterError: if the world knows no free robot.
+        """
+        if isinstance(world, Plant) and not isinstance(world, PlantOptions):
+            return nullcontext(world)
+        if isinstance(world, MujocoOptions):
+            return FreeMujocoPlant(self.robot, world)
+        if isinstance(world, PlantOptions):
+            return FreeBulletPlant(self.robot, world)
+        raise ParameterError(
+            f"{self.robot.name} walks free in PyBullet and MuJoCo, and the plant is"
+            f" {plant_name(world)}: give PlantOptions or MujocoOptions"
+        )
+
+    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+        """See :meth:`RobotBackend.senses`; noise is filtered.
+
+        Raises:
+            ParameterError: if the state is to be estimated.
+        """
+        if not isinstance(o.sensors, SensorOptions):
+            raise ParameterError(
+                f"{self.robot.name} walks free, and the estimate is that of a planar robot: give"
+                " SensorOptions"
+            )
+        sensors = Sensors(o.sensors, self.robot, controller.parameters.rest_length)
+        tuning = controller.options.noise_filter if isinstance(controller, FreeController) else None
+        if sensors.exact or tuning is None:
+            return sensors
+        deviation = np.array([o.sensors.position_noise, o.sensors.velocity_noise])
+        return FilteredSensors(
+            sensors, NoiseFilter(self.robot, deviation, tuning), o.plant.time_step
+        )
+
+    def force(self, along: float, lateral: float) -> tuple[float, ...]:
+        """See :meth:`RobotBackend.force`: along the world's x and y; forward is the heading."""
+        cosine, sine = cos(self.robot.heading), sin(self.robot.heading)
+        return cosine * along - sine * lateral, sine * along + cosine * lateral
+
+    def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
+        """See :meth:`RobotBackend.recorder`."""
+        return FloatingRecorder(controller, every)

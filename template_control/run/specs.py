@@ -1,0 +1,218 @@
+"""Robot, gait and planner of a run, as data."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Degrees, Positive, Speed
+from template_control.embedding.ahead.options import AheadOptions
+from template_control.embedding.planners.planner import Planner
+from template_control.embedding.planners.running import RunningOptions
+from template_control.embedding.planners.walking.lqr_options import LqrOptions
+from template_control.embedding.planners.walking.modified import ModifiedOptions
+from template_control.embedding.robot_template import (
+    default_gait,
+    paper_gait,
+    robot_gait_for_speed,
+    template_for,
+)
+from template_control.errors import ParameterError
+from template_control.robot.biped import Biped
+from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.library import ROBOTS, load_floating_robot, load_robot
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.running_gait import RunningGait, running_gait
+from template_control.slip.gaits.walking_by_speed import gait_for_speed
+from template_control.slip.similarity import REFERENCE
+
+
+@dataclass(frozen=True)
+class RobotSpec(Checked):
+    """Which robot; what a URDF of one's own may need is as in :meth:`PlanarBiped.from_urdf`.
+
+    Attributes:
+        model: a shipped robot, or the path of a URDF.
+        feet: its foot links; None: left_foot and right_foot.
+        sagittal_joints: of a 3D URDF, hips and knees.
+        foot_radius: of the spheres put into the feet of a 3D URDF [m].
+        foot_offset: of their centres from the foot links' origins, in the links' axes [m].
+        locked: angle of each locked joint of a 3D URDF [rad]; in its plane a robot's other joints
+            are locked at 0.
+        lossless: whether damping and friction of a URDF's joints are left out.
+        free: whether nothing holds the robot; its URDF is a 3D one, and all joints that are not
+            locked move.
+    """
+
+    model: str = "five-link"
+    feet: tuple[str, str] | None = None
+    sagittal_joints: tuple[str, ...] = ()
+    foot_radius: float | None = None
+    locked: Mapping[str, float] = field(default_factory=dict)
+    free: bool = False
+    lossless: bool = False
+    foot_offset: tuple[float, float, float] | None = None
+
+    def load(self) -> Biped:
+        """The robot.
+
+        Raises:
+            RobotError: if there is none, or it is no such biped.
+            ParameterError: if a shipped robot comes with what only a URDF needs.
+        """
+        own = {
+            "feet": self.feet,
+            "sagittal_joints": self.sagittal_joints,
+            "foot_radius": self.foot_radius,
+            "foot_offset": self.foot_offset,
+            "locked": self.locked,
+            "lossless": self.lossless,
+        }
+        given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
+        if not given:
+            return load_floating_robot(self.model) if self.free else load_robot(self.model)
+        if self.model in ROBOTS:
+            names = ", ".join(name.replace("_", " ") for name in given)
+            raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")
+        if self.free:
+            if self.sagittal_joints:
+                raise ParameterError("sagittal joints hold a robot in its plane: leave them out")
+            return FreeBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
+        return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
+
+
+_GAIT_NUMBERS = {
+    "walk": ("speed", "touchdown_angle"),
+    "paper": (),
+    "run": ("speed", "apex_height"),
+}
+_RUN = 3.0 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length))
+
+
+@dataclass(frozen=True)
+class GaitSpec(Checked):
+    """Which gait of the robot's template.
+
+    Attributes:
+        name: "walk", the robot's own; "paper", the equilibrium of Section IV-D; or "run".
+        speed: of a walk the mean forward speed, instead of its own; of a run dx/dt at apex
+            [m/s]; None: 3 m/s for l0 = 1 m.
+        touchdown_angle: of a walk, from the ground to the leg, instead of its own [deg].
+        apex_height: of a run [m]; None: one that suits its speed.
+
+    Raises:
+        ParameterError: if a gait is given what it does not have.
+    """
+
+    name: Literal["walk", "paper", "run"] = "walk"
+    speed: Speed | None = None
+    touchdown_angle: Degrees | None = None
+    apex_height: Positive | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("speed", "touchdown_angle", "apex_height"):
+            if getattr(self, name) is not None and name not in _GAIT_NUMBERS[self.name]:
+                words = name.replace("_", " ")
+                raise ParameterError(f"{words} does not go with gait {self.name}: leave one out")
+
+    def of(self, robot: Biped, torque_scale: float = 1.0) -> WalkingGait | RunningGait:
+        """The gait on a robot's template.
+
+        Args:
+            robot: its last update is overwritten.
+            torque_scale: share of the URDF's torque limits that may be used.
+
+        Raises:
+            GaitError: if the template has no such gait, or it is too slow or fast for the robot.
+        """
+        if self.name == "run":
+            return running_gait(template_for(robot), self.run_speed(robot), self.apex_height)
+        if self.name == "paper":
+            return paper_gait(template_for(robot))
+        angle = None if self.touchdown_angle is None else float(np.radians(self.touchdown_angle))
+        if self.speed is not None and angle is None:
+            return robot_gait_for_speed(robot, self.speed, torque_scale)
+        if self.speed is not None:
+            return gait_for_speed(template_for(robot), self.speed, touchdown_angle=angle)
+        return default_gait(robot, angle)
+
+    def run_speed(self, robot: Biped) -> float:
+        """Of a run, dx/dt at apex [m/s].
+
+        Args:
+            robot: its last update is overwritten.
+        """
+        if self.speed is not None:
+            return self.speed
+        template = template_for(robot)
+        return _RUN * template.speed_unit
+
+
+_PLANNER_MEMBERS = ("gait", "offset", "reset", "decide", "observe")
+
+
+@dataclass(frozen=True)
+class OwnPlanner(Checked):
+    """A planner of the user's own.
+
+    Attributes:
+        path: "module:Class"; the class is called with the gait. The module is looked for in the
+            current folder too.
+    """
+
+    kind: ClassVar[str] = "own"
+
+    path: str
+
+    def make(self, gait: WalkingGait | RunningGait) -> Planner:
+        """The planner.
+
+        Args:
+            gait: that it is to lead to.
+
+        Raises:
+            ParameterError: if there is no such class, or what it makes is no planner.
+        """
+        module, _, name = self.path.partition(":")
+        if not (module and name):
+            raise ParameterError(f"planner {self.path!r}: give the name of one, or module:Class")
+        folder = os.getcwd()
+        if folder not in sys.path:
+            sys.path.insert(0, folder)
+        try:
+            chosen = getattr(importlib.import_module(module), name, None)
+        except ModuleNotFoundError as error:
+            raise ParameterError(
+                f"planner {self.path!r}: there is no module {error.name}; it is looked for in"
+                " the current folder and among the installed packages"
+            ) from None
+        except SyntaxError as error:
+            raise ParameterError(f"planner {self.path!r} is no Python: {error}") from None
+        if not isinstance(chosen, type):
+            raise ParameterError(f"planner {self.path!r}: module {module} has no class {name}")
+        try:
+            inspect.signature(chosen).bind(gait)
+        except TypeError as error:
+            raise ParameterError(f"planner {self.path!r} must take a gait alone: {error}") from None
+        made = chosen(gait)
+        if not isinstance(made, Planner):
+            lacking = [n for n in _PLANNER_MEMBERS if not hasattr(made, n)]
+            raise ParameterError(
+                f"planner {self.path!r} lacks {', '.join(lacking)}: docs/your_planner.md tells"
+                " what a planner has"
+            )
+        return made
+
+
+PlannerSpec = LqrOptions | AheadOptions | ModifiedOptions | RunningOptions | OwnPlanner
+"""Which planner, with its tuning."""
