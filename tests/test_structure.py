@@ -241,6 +241,25 @@ def many_positional(tree):
             yield f"{node.lineno}: {name} is called with {len(node.args)} positional arguments"
 
 
+# ---- other libraries
+
+_OURS = ("template_control", "__future__")
+
+
+def private_imports(tree):
+    """Imports of private modules or names of other libraries."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        for name in names:
+            if not name.startswith(_OURS) and re.search(r"(^|\.)_[a-z]", name, re.IGNORECASE):
+                yield f"{node.lineno}: imports {name}"
+
+
 # ---- gaits are data
 
 
@@ -352,8 +371,10 @@ def faults(rule, folder):
 @pytest.mark.parametrize(
     "folder", [LIBRARY, ROOT / "benchmarks", ROOT / "examples"], ids=lambda f: f.name
 )
-@pytest.mark.parametrize("rule", [many_parameters, many_positional], ids=lambda r: r.__name__)
-def test_few_parameters_and_arguments(rule, folder):
+@pytest.mark.parametrize(
+    "rule", [many_parameters, many_positional, private_imports], ids=lambda r: r.__name__
+)
+def test_every_file_keeps_the_rule(rule, folder):
     assert_none(faults(rule, folder))
 
 
@@ -369,6 +390,13 @@ def test_everything_public_is_documented(rule):
 @pytest.mark.parametrize(
     ("rule", "text", "count"),
     [
+        (private_imports, "import numpy._core\nfrom numba import _dynfunc", 2),
+        (private_imports, "from numba.core.caching import _CacheLocator", 1),
+        (
+            private_imports,
+            "from __future__ import annotations\nimport a.b_c",
+            0,
+        ),
         (many_parameters, "def f(a, b, c, d, e, f, g): ...", 0),
         (many_parameters, "def f(a, b, c, d, e, f, /, g, *, h): ...", 0),
         (many_parameters, "def f(a, b, c, d, e, f, /, g, h, *, i): ...", 1),
