@@ -1,5 +1,6 @@
 """The automaton's tables: Fig. 2 and Table I, whole and consistent."""
 
+import json
 import pickle
 from dataclasses import replace
 
@@ -19,11 +20,14 @@ from template_control.slip.automaton.vocabulary import (
     Phase,
     Reset,
     Slot,
+    StrideKind,
 )
 from template_control.slip.dynamics.stride import StrideSimulator, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.scenario import example_one
+from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 HOP = Automaton(
     (
@@ -274,3 +278,15 @@ def test_what_is_not_refused_can_be_followed(nodes, starts):
             ways = [e for e in node.edges if isinstance(e.target, str) and not e.section]
             assert all(automaton.node(e.target) in passed for e in ways)
             assert node.edges
+
+
+def test_the_kinds_of_stride_are_their_keys():
+    """Files and users' planners keep the keys; messages show them, and JSON holds them."""
+    assert set(StrideKind) == STRIDE_START.keys()
+    for kind in StrideKind:
+        key = kind.value
+        assert (kind, repr(kind), str(kind)) == (key, repr(key), key)
+        assert STRIDE_START[kind] == STRIDE_START[key]
+        assert json.loads(json.dumps({kind: kind})) == {key: key}
+    with pytest.raises(ParameterError, match=r"walks is 'x': give one of 'w', 'wp'$"):
+        ScenarioRoute(example_one(), walks="x")

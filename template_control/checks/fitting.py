@@ -59,7 +59,7 @@ def words_for(hint: Any) -> str:
     """What fits an annotation, for a message."""
     origin, args = get_origin(hint), get_args(hint)
     if origin is Literal:
-        return "one of " + ", ".join(repr(x) for x in args)
+        return "one of " + ", ".join(dict.fromkeys(repr(x) for x in args))
     if origin is Annotated:
         return next(
             (

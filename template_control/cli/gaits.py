@@ -21,7 +21,7 @@ from template_control.checks.fitting import check
 from template_control.checks.ranges import Degrees, Positive, Range
 from template_control.cli.report.family import make_family
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.automaton.vocabulary import MapKind, StrideKind
 from template_control.slip.control.controllers import (
     VARIED,
     ActiveRunning,
@@ -86,7 +86,7 @@ _COLUMNS = {
     "height": "y [m]",
     "speed": "dx/dt [m/s]",
 }
-_STRIDES = {"walk": "w", "run": "r"}
+_STRIDES = {"walk": StrideKind.WALK, "run": StrideKind.RUN}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER)}
 _TYPED = {
     **dict.fromkeys(QUANTITIES, Positive),

@@ -16,14 +16,19 @@ from template_control import view
 from template_control.checks import option_types as values
 from template_control.cli.go import NO_STANDS
 from template_control.cli.options.output import output_folder
-from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.automaton.vocabulary import MapKind, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario_file import load_scenario
 from template_control.storage import Files
 from template_control.terminal import plain_console
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}
-_NAMES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
+_NAMES = {
+    StrideKind.WALK: "walking",
+    StrideKind.WALK_TO_RUN: "walk to run",
+    StrideKind.RUN: "running",
+    StrideKind.RUN_TO_WALK: "run to walk",
+}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

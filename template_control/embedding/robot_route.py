@@ -16,6 +16,7 @@ from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.gaits.walking_by_speed import family_speeds, speed_range
 from template_control.slip.parameters import SlipParameters
@@ -66,7 +67,7 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
         own,
         lambda speed: suited_height(speed / unit) * p.rest_length,
         vlo_height=_family_height(p) if push_off else None,
-        walks="wp" if push_off else "w",
+        walks=StrideKind.WALK_PUSH_OFF if push_off else StrideKind.WALK,
     )
 
 

@@ -12,7 +12,7 @@ from template_control.plant.quiet import stdout_to_stderr
 from template_control.robot.library import load_robot
 from template_control.run.simulation import simulate
 from template_control.run.summary import summarise
-from template_control.slip.automaton.vocabulary import MapKind, Slot
+from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import example_one
 from template_control.view.route_figures import route_figures
@@ -27,13 +27,13 @@ def summary(record: ScenarioRecord) -> dict[str, Any]:
     """Figures of a run of Example I, SI units."""
     kinds = np.array(record.strides)
     error = record.section_state[1:, 0] - record.wanted_speed
-    running, walking = kinds == "r", kinds == "w"
+    running, walking = kinds == StrideKind.RUN, kinds == StrideKind.WALK
     phases = np.array([record.energy_phase(i) for i in range(len(kinds))])
     top = np.flatnonzero(running & (record.wanted_speed >= _TOP_SPEED))
-    first = int(np.flatnonzero(kinds != "w")[0])
+    first = int(np.flatnonzero(kinds != StrideKind.WALK)[0])
     step = record.during(first - 1)
     walked = record.state[step.stop, 0] - record.state[step.start, 0]
-    last_walk = kinds.size - 1 - int(np.argmax(kinds[::-1] != "w"))
+    last_walk = kinds.size - 1 - int(np.argmax(kinds[::-1] != StrideKind.WALK))
     return {
         "completed": record.completed,
         "strides": kinds.size,
@@ -42,8 +42,8 @@ def summary(record: ScenarioRecord) -> dict[str, Any]:
         "speed_error_rms_running": float(np.sqrt(np.mean(error[running] ** 2))),
         "speed_error_max": float(np.max(np.abs(error))),
         "stiffness_at_5": float(np.mean(record.controls[top[-1], [Slot.K_SC, Slot.K_SD]])),
-        "rwt_apex": record.section_state[kinds.tolist().index("rw"), :2].tolist(),
-        "rwt_vlo": record.section_state[kinds.tolist().index("rw") + 1].tolist(),
+        "rwt_apex": record.section_state[kinds.tolist().index(StrideKind.RUN_TO_WALK), :2].tolist(),
+        "rwt_vlo": record.section_state[kinds.tolist().index(StrideKind.RUN_TO_WALK) + 1].tolist(),
         "walking_steps_after": int(kinds.size - 1 - last_walk),
         "last_vlo": record.section_state[-1].tolist(),
         "energy_phase_walking": [float(phases[walking].min()), float(phases[walking].max())],
@@ -135,7 +135,7 @@ def fig10_on(robot_name: str) -> Reproduction:
         "fall_reason": figures["fall_reason"],
         "top_speed": float(record.section_state[:, 0].max()),
         "speed_error_rms": figures["speed_error_rms"],
-        "walking_steps_after": int(np.argmax([name != "w" for name in names[-2::-1]])),
+        "walking_steps_after": int(np.argmax([name != StrideKind.WALK for name in names[-2::-1]])),
         "joint_torque": torque,
         "joint_speed": speed,
         "saturated_share": figures["saturated_share"],

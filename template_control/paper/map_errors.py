@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.paper.reproduction import Reproduction
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot, StrideKind
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
@@ -112,7 +112,7 @@ def study(grid: Grid | None = None, parameters: SlipParameters | None = None) ->
     p = parameters or SlipParameters()
     z, u = (grid or Grid()).states(p)
     tried = len(z)
-    true = ReturnMap(p, "w")(z, u)
+    true = ReturnMap(p, StrideKind.WALK)(z, u)
     valid = (true.outcome == Outcome.SECTION) & _may_touch_down(p, z, u)
     z, u = z[valid], u[valid]
     state, advance = true.state[valid], true.advance[valid]
@@ -120,7 +120,7 @@ def study(grid: Grid | None = None, parameters: SlipParameters | None = None) ->
     speed = np.linalg.norm(velocity, axis=1)
     errors = {}
     for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.GEYER):
-        mapped = ReturnMap(p, "w", kind)(z, u)
+        mapped = ReturnMap(p, StrideKind.WALK, kind)(z, u)
         guess = np.column_stack((mapped.advance, mapped.state[:, 1]))
         e = np.linalg.norm(guess - position, axis=1) / np.linalg.norm(position, axis=1)
         ev = np.linalg.norm(mapped.state[:, [0, 2]] - velocity, axis=1) / np.ptp(speed)

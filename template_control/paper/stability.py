@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from template_control.paper.reproduction import Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, MapKind, Outcome, Slot
+from template_control.slip.automaton.vocabulary import (
+    NUM_SLOTS,
+    Event,
+    MapKind,
+    Outcome,
+    Slot,
+    StrideKind,
+)
 from template_control.slip.control.step_solver import StepProblem, Unknowns
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.basin import steps_to_fall, velocity_angle, vlo_state
@@ -66,7 +73,7 @@ def backward_set(
         for angle in np.radians(np.linspace(0.0, 90.0, counts[1] + 2)[1:-1]):
             u = np.zeros(NUM_SLOTS)
             u[[Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]] = angle, kappa, p.leg_stiffness
-            back = walk.run(STRIDE_START["w"], start, u)
+            back = walk.run(STRIDE_START[StrideKind.WALK], start, u)
             if not back.completed:
                 continue
             liftoff = next(e.state for e in back.events if e.event is Event.REAR_LIFTOFF)
@@ -98,7 +105,7 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
     unknowns = Unknowns(
         slots, np.array([0.0, 0.5 * k0]), np.array([0.5 * np.pi, 1.5 * k0]), np.array([1.0, k0])
     )
-    problem = StepProblem(ReturnMap(p, "w", kind), unknowns, evaluations=100)
+    problem = StepProblem(ReturnMap(p, StrideKind.WALK, kind), unknowns, evaluations=100)
     controls = np.array(
         [
             problem.solve(z, gait.vlo, [u]).controls
@@ -180,7 +187,7 @@ def equilibrium() -> WalkingGait:
 def branch(step: float = _COARSE) -> list[BranchPoint]:
     """Equilibria with VLO height 0.9818 m, over energy."""
     gait = equilibrium()
-    family = Family(P, "w", {"height": HEIGHT, "stiffness": P.leg_stiffness})
+    family = Family(P, StrideKind.WALK, {"height": HEIGHT, "stiffness": P.leg_stiffness})
     start = np.array([*gait.vlo, gait.controls[0], P.leg_stiffness])
     return family.trace(start, "energy", (815.0, 830.0), step=step, points=800)
 

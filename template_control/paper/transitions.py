@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from template_control.paper.map_errors import stride_figure
 from template_control.paper.reproduction import Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import MapKind, Slot
+from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.control.controllers import RunToWalk, WalkToRun
 from template_control.slip.control.step_solver import StepSolution
 from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
@@ -80,19 +80,19 @@ def _ends(stride: str, z: Array, u: Array) -> tuple[str, list[float]]:
 def table4() -> Reproduction:
     """Controls of both transitions from Table IV's states."""
     rows, data = [], {}
-    text, end = _ends("rw", RWT_STATE, RWT_CONTROLS)
+    text, end = _ends(StrideKind.RUN_TO_WALK, RWT_STATE, RWT_CONTROLS)
     rows.append(_rwt_row("Table IV", RWT_CONTROLS, text))
     data["rwt"] = {"published": {"controls": RWT_CONTROLS.tolist(), "exact_end": end}}
     for kind, solution in run_to_walk().items():
-        text, end = _ends("rw", RWT_STATE, solution.controls)
+        text, end = _ends(StrideKind.RUN_TO_WALK, RWT_STATE, solution.controls)
         rows.append(_rwt_row(f"{kind.name.lower()} map", solution.controls, text))
         data["rwt"][kind.name.lower()] = _solution(solution, end)
-    text, end = _ends("wr", WRT_STATE, WRT_CONTROLS)
+    text, end = _ends(StrideKind.WALK_TO_RUN, WRT_STATE, WRT_CONTROLS)
     rows.append(_wrt_row("Table IV", WRT_CONTROLS, text))
     data["wrt"] = {"published": {"controls": WRT_CONTROLS.tolist(), "exact_end": end}}
     target = np.array([end[0], APEX_HEIGHT])
     for kind, solution in walk_to_run(target).items():
-        text, end = _ends("wr", WRT_STATE, solution.controls)
+        text, end = _ends(StrideKind.WALK_TO_RUN, WRT_STATE, solution.controls)
         rows.append(_wrt_row(f"{kind.name.lower()} map", solution.controls, text))
         data["wrt"][kind.name.lower()] = _solution(solution, end)
     simplified = WalkToRun(P, MapKind.PAPER, simplified=True).solve(
@@ -181,12 +181,12 @@ def _stride_data(strides: list[tuple[str, Stride]]) -> dict[str, Any]:
 def fig6() -> Reproduction:
     """The WRT stride on the exact model, with Table IV's gains and with ours."""
     start = VLO.state(WRT_STATE)
-    published = simulate_stride(P, STRIDE_START["wr"], start, WRT_CONTROLS)
+    published = simulate_stride(P, STRIDE_START[StrideKind.WALK_TO_RUN], start, WRT_CONTROLS)
     target = np.array([published.state[2], APEX_HEIGHT])
     ours = walk_to_run(target)[MapKind.IMPROVED].controls
     strides = [
         ("Table IV's gains", published),
-        ("improved map", simulate_stride(P, STRIDE_START["wr"], start, ours)),
+        ("improved map", simulate_stride(P, STRIDE_START[StrideKind.WALK_TO_RUN], start, ours)),
     ]
     return Reproduction(
         title="Fig. 6: walk-to-run stride with Table IV's gains",
@@ -203,8 +203,11 @@ def fig7() -> Reproduction:
     start = APEX.state(RWT_STATE)
     ours = run_to_walk()[MapKind.IMPROVED].controls
     strides = [
-        ("Table IV's gains", simulate_stride(P, STRIDE_START["rw"], start, RWT_CONTROLS)),
-        ("improved map", simulate_stride(P, STRIDE_START["rw"], start, ours)),
+        (
+            "Table IV's gains",
+            simulate_stride(P, STRIDE_START[StrideKind.RUN_TO_WALK], start, RWT_CONTROLS),
+        ),
+        ("improved map", simulate_stride(P, STRIDE_START[StrideKind.RUN_TO_WALK], start, ours)),
     ]
     end = strides[0][1].state
     return Reproduction(

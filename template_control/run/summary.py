@@ -10,25 +10,30 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.run.record import FloatingRecord, Record
-from template_control.slip.automaton.vocabulary import Event, Phase
+from template_control.slip.automaton.vocabulary import Event, Phase, StrideKind
 from template_control.slip.maps.section import section_of
 
 Array = NDArray[np.float64]
 
-STRIDES = {"w": "walking", "wr": "walk to run", "r": "running", "rw": "run to walk"}
+STRIDES = {
+    StrideKind.WALK: "walking",
+    StrideKind.WALK_TO_RUN: "walk to run",
+    StrideKind.RUN: "running",
+    StrideKind.RUN_TO_WALK: "run to walk",
+}
 """The kinds of stride in words."""
 
 STANDING = {
-    "s": "standing",
-    "sw": "stand to walk",
-    "ws": "walk to stand",
-    "ww": "to another speed",
-    "sf": "step from a stand",
-    "sb": "step back from a stand",
+    StrideKind.STAND: "standing",
+    StrideKind.STAND_TO_WALK: "stand to walk",
+    StrideKind.WALK_TO_STAND: "walk to stand",
+    StrideKind.CHANGE_SPEED: "to another speed",
+    StrideKind.STEP_FORWARD: "step from a stand",
+    StrideKind.STEP_BACK: "step back from a stand",
 }
 """The kinds of stride of a scenario that stands."""
 
-OTHERS = {"wp": "walking with push-off", **STANDING}
+OTHERS = {StrideKind.WALK_PUSH_OFF: "walking with push-off", **STANDING}
 """The kinds of stride that only some runs have."""
 
 _STATE = ("speed", "height", "vertical_speed")

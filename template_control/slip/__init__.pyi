@@ -11,6 +11,7 @@ from .automaton.vocabulary import Outcome as Outcome
 from .automaton.vocabulary import Phase as Phase
 from .automaton.vocabulary import Reset as Reset
 from .automaton.vocabulary import Slot as Slot
+from .automaton.vocabulary import StrideKind as StrideKind
 from .control.controllers import ActiveRunning as ActiveRunning
 from .control.controllers import ActiveWalking as ActiveWalking
 from .control.controllers import ModifiedWalking as ModifiedWalking

@@ -18,24 +18,24 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from template_control.slip.automaton.hybrid import Automaton, Edge
-from template_control.slip.automaton.vocabulary import Event, Phase, Reset
+from template_control.slip.automaton.vocabulary import Event, Phase, Reset, StrideKind
 from template_control.view.automaton_layout import PAD, choices, gaits, layout, successions
 
 Array = NDArray[np.float64]
 
-GAIT_NAMES = {
-    "w": "walking",
-    "r": "running",
-    "wr": "walk-to-run",
-    "rw": "run-to-walk",
-    "wr*": "walk-to-run, simplified",
-    "s": "standing",
-    "sw": "start",
-    "ws": "stop",
-    "ww": "to another speed",
-    "wp": "walking with push-off",
-    "sf": "step from a stand",
-    "sb": "step back from a stand",
+GAIT_NAMES: dict[str, str] = {
+    StrideKind.WALK: "walking",
+    StrideKind.RUN: "running",
+    StrideKind.WALK_TO_RUN: "walk-to-run",
+    StrideKind.RUN_TO_WALK: "run-to-walk",
+    StrideKind.WALK_TO_RUN_SIMPLIFIED: "walk-to-run, simplified",
+    StrideKind.STAND: "standing",
+    StrideKind.STAND_TO_WALK: "start",
+    StrideKind.WALK_TO_STAND: "stop",
+    StrideKind.CHANGE_SPEED: "to another speed",
+    StrideKind.WALK_PUSH_OFF: "walking with push-off",
+    StrideKind.STEP_FORWARD: "step from a stand",
+    StrideKind.STEP_BACK: "step back from a stand",
 }
 """Gaits by the superscripts of Table I, and of standing."""
 

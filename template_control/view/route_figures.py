@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.run.record import Record
 from template_control.run.summary import STANDING
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.figure_file import save_figure
 from template_control.view.state_figures import template_energies
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 
 _WHOLE = slice(None)
 _AROUND = 1.2  # [s] shown on either side of a transition
-_TRANSITIONS = {"wr": "walk to run", "rw": "run to walk"}
+_TRANSITIONS = {StrideKind.WALK_TO_RUN: "walk to run", StrideKind.RUN_TO_WALK: "run to walk"}
 
 
 def _footholds(record: Record) -> Array:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.automaton.vocabulary import Slot, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.figure_file import save_figure
 from template_control.view.style import as_text
@@ -98,7 +98,11 @@ def scenario_figure(record: ScenarioRecord) -> Figure:
 
 def energy_figure(record: ScenarioRecord) -> Figure:
     """Energies around each transition (Fig. 10c, d)."""
-    transitions = [i for i, kind in enumerate(record.strides) if kind in ("wr", "rw")]
+    transitions = [
+        i
+        for i, kind in enumerate(record.strides)
+        if kind in (StrideKind.WALK_TO_RUN, StrideKind.RUN_TO_WALK)
+    ]
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     panels = np.atleast_1d(figure.subplots(1, max(len(transitions), 1), squeeze=True))
     energies = record.energies()
@@ -119,7 +123,7 @@ def energy_figure(record: ScenarioRecord) -> Figure:
             xlabel="time [s]",
             ylabel="energy less its first value [J]",
             xlim=(record.time[w][0], record.time[w][-1]),
-            title="walk to run" if record.strides[i] == "wr" else "run to walk",
+            title="walk to run" if record.strides[i] == StrideKind.WALK_TO_RUN else "run to walk",
         )
         axes.legend(loc="best")
     return figure
@@ -140,6 +144,6 @@ def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Pa
         RecordError: if a file cannot be written.
     """
     figures = {"scenario": scenario_figure(record)}
-    if {"wr", "rw"} & set(record.strides):
+    if {StrideKind.WALK_TO_RUN, StrideKind.RUN_TO_WALK} & set(record.strides):
         figures["energies"] = energy_figure(record)
     return [save_figure(figure, Path(folder) / f"{name}.png") for name, figure in figures.items()]

@@ -24,7 +24,7 @@ from template_control.embedding.ahead.gait_row import (
 )
 from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.planners.walking.lqr import settling_map
-from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.automaton.vocabulary import Slot, StrideKind
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.gait import WALKING_SLOTS
 from template_control.slip.gaits.walking_by_speed import Chain, walking_by_speed
@@ -34,7 +34,7 @@ from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
-STRIDE = "wp"
+STRIDE = StrideKind.WALK_PUSH_OFF
 """The steps of these gaits."""
 SLOTS = np.array([int(slot) for slot in WALKING_SLOTS[STRIDE]])
 """Their controls."""

@@ -15,6 +15,7 @@ from itertools import pairwise
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Share
 from template_control.errors import ParameterError
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import RATE, SPEED, tuned
 
@@ -58,9 +59,9 @@ class Lean(Checked):
 def _leans() -> dict[str, Lean]:
     # Running knees carry twice the weight on a leg that is far from straight.
     return {
-        "wr": Lean((1.2,), (0.33,)),
-        "r": Lean((2.0, 2.5, 3.0, 3.5, 4.0), (0.33, 0.34, 0.36, 0.40, 0.40), excess=0.1),
-        "rw": Lean((1.2,), (0.33,), excess=0.1),
+        StrideKind.WALK_TO_RUN: Lean((1.2,), (0.33,)),
+        StrideKind.RUN: Lean((2.0, 2.5, 3.0, 3.5, 4.0), (0.33, 0.34, 0.36, 0.40, 0.40), excess=0.1),
+        StrideKind.RUN_TO_WALK: Lean((1.2,), (0.33,), excess=0.1),
     }
 
 

@@ -22,6 +22,7 @@ from template_control.embedding.standing.default import (
     standing_planners,
 )
 from template_control.embedding.standing.options import StandingOptions
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_by_speed import walking_gait
@@ -99,7 +100,7 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
         return running_gait(p, min(max(speed, slowest), fastest))
 
     if route.section == APEX:
-        return {"r": RunningPlanner(runs(speed))}
+        return {StrideKind.RUN: RunningPlanner(runs(speed))}
     followed = _followed(route)
     scenario = followed.scenario if isinstance(followed, ScenarioRoute) else None
     standing = _standing(followed)
@@ -118,9 +119,9 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     run = RunningPlanner(runs(slowest), options)
     return {
         walk.gait.stride: walk,
-        "wr": TransitionPlanner("wr", walk, runs, WALK_TO_RUN),
-        "r": run,
-        "rw": TransitionPlanner("rw", run, walks, RUN_TO_WALK),
+        StrideKind.WALK_TO_RUN: TransitionPlanner(StrideKind.WALK_TO_RUN, walk, runs, WALK_TO_RUN),
+        StrideKind.RUN: run,
+        StrideKind.RUN_TO_WALK: TransitionPlanner(StrideKind.RUN_TO_WALK, run, walks, RUN_TO_WALK),
         **carrying_planners(walk, _CARRYING),
         **standing,
     }

@@ -16,6 +16,7 @@ from template_control.embedding.standing.planners import (
 )
 from template_control.embedding.standing.stepping import StepPlanner
 from template_control.embedding.standing.vaults import Family, Vaults
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.walking_by_speed import speed_range, walking_by_speed, walking_gait
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
@@ -47,10 +48,10 @@ def carrying_planners(walk: Planner, options: StandingOptions) -> dict[str, Plan
     if isinstance(walk, LandingPlanner):
         change = CarryingPlanner(vaults, walk)
     return {
-        "ww": change,
-        "ws": StopPlanner(vaults),
-        "sb": StepPlanner(vaults, "sb"),
-        "sw": StartPlanner(vaults),
+        StrideKind.CHANGE_SPEED: change,
+        StrideKind.WALK_TO_STAND: StopPlanner(vaults),
+        StrideKind.STEP_BACK: StepPlanner(vaults, StrideKind.STEP_BACK),
+        StrideKind.STAND_TO_WALK: StartPlanner(vaults),
     }
 
 
@@ -70,12 +71,12 @@ def standing_planners(
     """
     gaits = family or Family(partial(walking_gait, parameters), speed_range(parameters))
     vaults = Vaults(parameters, scaled(options or StandingOptions(), Scale.of(parameters)), gaits)
-    forward = StepPlanner(vaults, "sf")
+    forward = StepPlanner(vaults, StrideKind.STEP_FORWARD)
     return {
-        "s": StandPlanner(vaults),
-        "sw": StartPlanner(vaults),
-        "ws": StopPlanner(vaults),
-        "ww": ChangePlanner(vaults),
-        "sf": forward,
-        "sb": StepPlanner(vaults, "sb", forward.passes),
+        StrideKind.STAND: StandPlanner(vaults),
+        StrideKind.STAND_TO_WALK: StartPlanner(vaults),
+        StrideKind.WALK_TO_STAND: StopPlanner(vaults),
+        StrideKind.CHANGE_SPEED: ChangePlanner(vaults),
+        StrideKind.STEP_FORWARD: forward,
+        StrideKind.STEP_BACK: StepPlanner(vaults, StrideKind.STEP_BACK, forward.passes),
     }

@@ -14,7 +14,7 @@ from template_control.embedding.standing.options import StandingOptions
 from template_control.embedding.standing.vaults import Touchdown, Vault, Vaults
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, controls
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
@@ -45,7 +45,7 @@ class StandingGait:
     controls: Array
     step_duration: float
     step_length: float = 0.0
-    stride: str = "s"
+    stride: str = StrideKind.STAND
     name: str = "standing"
 
     @classmethod

@@ -17,7 +17,7 @@ from template_control.embedding.standing.curve_search import STAND
 from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.vocabulary import Event, Slot
+from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import VLO
@@ -97,7 +97,7 @@ class Vaults:
         self.parameters, self.options, self.family = parameters, options, family
         self._automaton = automaton
         self._simulator = StrideSimulator(parameters, automaton)
-        self._node = automaton.start("w").name
+        self._node = automaton.start(StrideKind.WALK).name
         self._known: dict[float, Vault] = {}
         self._ways: dict[float, Array] = {}
         unit = parameters.speed_unit

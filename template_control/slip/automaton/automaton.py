@@ -14,7 +14,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
+from template_control.slip.automaton.vocabulary import (
+    Event,
+    Outcome,
+    Phase,
+    Reset,
+    Slot,
+    StrideKind,
+)
 
 SINGLE_STANCE_FAILURES = (
     Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
@@ -370,12 +377,12 @@ def steps_from_a_stand() -> tuple[Node, ...]:
     """A step forward, and one back, whose foot lands behind the other: then they change roles."""
     return (
         *_stepping(
-            "sf",
+            StrideKind.STEP_FORWARD,
             Edge(Event.REAR_LIFTOFF, "SS_bt^sf", Reset.SHIFT, "G_l^sf"),
             Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^sf", section=True),
         ),
         *_stepping(
-            "sb",
+            StrideKind.STEP_BACK,
             Edge(Event.FRONT_LIFTOFF, "SS_bt^sb", Reset.NONE, "G_l^sb"),
             Edge(Event.REST, "DS_ar^s", Reset.SWAP, "G_r^sb", section=True),
         ),
@@ -384,28 +391,28 @@ def steps_from_a_stand() -> tuple[Node, ...]:
 
 AUTOMATON = Automaton(
     nodes=(
-        *walking("w", (Slot.K_SC, Slot.K_SD)),
+        *walking(StrideKind.WALK, (Slot.K_SC, Slot.K_SD)),
         *running(),
         *walk_to_run(),
         *run_to_walk(),
         *simplified_walk_to_run(),
         *standing(),
-        *walking("wp", (Slot.K_PUSH, Slot.K_PUSH)),
+        *walking(StrideKind.WALK_PUSH_OFF, (Slot.K_PUSH, Slot.K_PUSH)),
         *steps_from_a_stand(),
     ),
     starts={
-        "w": "SS_av^w",
-        "r": "F_aa^r",
-        "wr": "SS_av^wr",
-        "rw": "F_aa^rw",
-        "wr*": "SS_av^wr*",
-        "s": "DS_ar^s",
-        "sw": "DS_ar^sw",
-        "ws": "SS_av^ws",
-        "ww": "SS_av^ww",
-        "wp": "SS_av^wp",
-        "sf": "DS_al^sf",
-        "sb": "DS_al^sb",
+        StrideKind.WALK: "SS_av^w",
+        StrideKind.RUN: "F_aa^r",
+        StrideKind.WALK_TO_RUN: "SS_av^wr",
+        StrideKind.RUN_TO_WALK: "F_aa^rw",
+        StrideKind.WALK_TO_RUN_SIMPLIFIED: "SS_av^wr*",
+        StrideKind.STAND: "DS_ar^s",
+        StrideKind.STAND_TO_WALK: "DS_ar^sw",
+        StrideKind.WALK_TO_STAND: "SS_av^ws",
+        StrideKind.CHANGE_SPEED: "SS_av^ww",
+        StrideKind.WALK_PUSH_OFF: "SS_av^wp",
+        StrideKind.STEP_FORWARD: "DS_al^sf",
+        StrideKind.STEP_BACK: "DS_al^sb",
     },
 )
 """The one automaton of the library."""
@@ -434,10 +441,10 @@ _BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
 _BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
 
 BREAKS: Mapping[str, Mapping[str, str]] = {
-    "wr": RUN_ON,
-    "ww": dict.fromkeys(_BOTH_STAND, "DS_bl^ww"),
-    "ws": dict.fromkeys(_BOTH_STAND, "DS_br^ws"),
-    "sb": dict.fromkeys(_BEFORE_VLO, "SS_bt^sb"),
+    StrideKind.WALK_TO_RUN: RUN_ON,
+    StrideKind.CHANGE_SPEED: dict.fromkeys(_BOTH_STAND, "DS_bl^ww"),
+    StrideKind.WALK_TO_STAND: dict.fromkeys(_BOTH_STAND, "DS_br^ws"),
+    StrideKind.STEP_BACK: dict.fromkeys(_BEFORE_VLO, "SS_bt^sb"),
 }
 """By the kind of a stride that a walk can break into: from which nodes, and where it goes on.
 
@@ -446,8 +453,8 @@ CoM while both feet stand, on or to rest; the foot that is up is set down behind
 """
 
 STEP_OUT: Mapping[str, tuple[str, ...]] = {
-    "DS_ar^s": ("sf", "sb"),
-    "DS_br^ws": ("sf", "sb"),
-    "DS_br^sf": ("sf", "sb"),
+    "DS_ar^s": (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK),
+    "DS_br^ws": (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK),
+    "DS_br^sf": (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK),
 }
 """By a node in which both feet stand: strides with a step, where the CoM cannot come to rest."""

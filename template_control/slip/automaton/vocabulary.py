@@ -2,7 +2,36 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import IntEnum, StrEnum
+from typing import Literal
+
+
+class StrideKind(StrEnum):
+    """Kinds of stride of the library's automaton: the keys of its ``starts``, and of files.
+
+    A member equals its key, so that a key may be given wherever a kind of stride is asked for; an
+    automaton of one's own has keys of its own.
+    """
+
+    WALK = "w"
+    WALK_PUSH_OFF = "wp"
+    RUN = "r"
+    WALK_TO_RUN = "wr"
+    WALK_TO_RUN_SIMPLIFIED = "wr*"  # as the paper's controller sees it
+    RUN_TO_WALK = "rw"
+    STAND = "s"
+    STAND_TO_WALK = "sw"
+    WALK_TO_STAND = "ws"
+    CHANGE_SPEED = "ww"  # of a walk, by a curve in time
+    STEP_FORWARD = "sf"  # from a stand to a stand
+    STEP_BACK = "sb"
+
+    def __repr__(self) -> str:
+        return repr(self.value)
+
+
+WalkingStride = Literal[StrideKind.WALK, StrideKind.WALK_PUSH_OFF, "w", "wp"]
+"""Kind of a walking step, from VLO to VLO."""
 
 
 class Phase(IntEnum):

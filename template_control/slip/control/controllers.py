@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import MapKind, Slot
+from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.control.modified_walking import ModifiedMap
 from template_control.slip.control.step_solver import Step, StepProblem, StepSolution, Unknowns
 from template_control.slip.dynamics.stride import controls, finite
@@ -77,7 +77,7 @@ class Design:
 
 
 ACTIVE_RUNNING = Design(
-    stride="r",
+    stride=StrideKind.RUN,
     free=_LANDING,
     axes={
         (_ANGLE,): np.arange(52.0, 81.0, 4.0),
@@ -85,18 +85,18 @@ ACTIVE_RUNNING = Design(
     },
 )
 ACTIVE_WALKING = Design(
-    stride="w",
+    stride=StrideKind.WALK,
     free=_LANDING,
     axes={(_ANGLE,): np.arange(60.0, 79.0, 2.0), (_K_SD,): (0.8, 1.0, 1.2)},
 )
 MODIFIED_WALKING = Design(
-    stride="w",
+    stride=StrideKind.WALK,
     free=(_ANGLE,),
     axes={(_ANGLE,): np.arange(58.0, 81.0, 1.0)},
     dense=True,
 )
 WALK_TO_RUN = Design(
-    stride="wr",
+    stride=StrideKind.WALK_TO_RUN,
     free=(Slot.K_SC_WR, Slot.K_SD_WR),
     axes={
         (Slot.K_SC_WR,): (0.4, 0.6, 0.9, 1.2, 1.6, 2.2),
@@ -104,7 +104,7 @@ WALK_TO_RUN = Design(
     },
 )
 RUN_TO_WALK = Design(
-    stride="rw",
+    stride=StrideKind.RUN_TO_WALK,
     free=_LANDING,
     axes={
         (_ANGLE,): np.arange(60.0, 79.0, 3.0),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot, StrideKind
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, Model, model_of, stride_kernel
 from template_control.slip.maps.return_map import RESULTS, closed_form, one_stride
@@ -224,7 +224,7 @@ class ModifiedMap:
         self.parameters = parameters
         self.target = np.zeros(3)
         self._range = np.array(stiffness_range)
-        self._kernel = stride_kernel(parameters, "w"), closed_form(kind)
+        self._kernel = stride_kernel(parameters, StrideKind.WALK), closed_form(kind)
         self._scratch, self._complex_scratch = new_scratch(), new_scratch(complex)
 
     @property

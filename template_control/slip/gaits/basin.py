@@ -16,7 +16,7 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Range, Shape
 from template_control.compiled import compiled, inner
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, StrideKind
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.return_map import RESULTS, one_stride
@@ -165,7 +165,7 @@ def steps_to_fall(
     states = np.array(z, dtype=float)
     count = len(states)
     steps, converges = _many(
-        stride_kernel(parameters, "w"),
+        stride_kernel(parameters, StrideKind.WALK),
         states,
         _for_each("controls", controls, count),
         _for_each("goal", goal, count),

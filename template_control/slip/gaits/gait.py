@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,14 @@ from template_control.checks.ranges import Positive, Shape, Triple
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Phase, Slot
+from template_control.slip.automaton.vocabulary import (
+    NUM_SLOTS,
+    Outcome,
+    Phase,
+    Slot,
+    StrideKind,
+    WalkingStride,
+)
 from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO, section_of
@@ -25,9 +32,9 @@ from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
 
-WALKING_SLOTS = {
-    "w": (Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD),
-    "wp": (Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD, Slot.K_PUSH),
+WALKING_SLOTS: dict[str, tuple[Slot, ...]] = {
+    StrideKind.WALK: (Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD),
+    StrideKind.WALK_PUSH_OFF: (Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD, Slot.K_PUSH),
 }
 """Controls of each kind of walking step: alpha, kappa_1, kappa_2 and, with push-off, kappa_p."""
 
@@ -89,7 +96,7 @@ class WalkingGait(Checked):
     controls: Annotated[Array, Shape((NUM_SLOTS,))]
     step_length: float
     step_duration: Positive
-    stride: Literal["w", "wp"] = "w"
+    stride: WalkingStride = StrideKind.WALK
 
     def __repr__(self) -> str:
         angle = np.degrees(self.controls[Slot.TOUCHDOWN_ANGLE])
@@ -121,20 +128,20 @@ def with_push_off(gait: WalkingGait) -> WalkingGait:
     """
     u = gait.controls.copy()
     u[Slot.K_PUSH] = u[Slot.K_SC]
-    return replace(gait, controls=u, stride="wp")
+    return replace(gait, controls=u, stride=StrideKind.WALK_PUSH_OFF)
 
 
 def without_push_off(gait: WalkingGait) -> WalkingGait:
     """The same gait in the steps of the paper; itself, if it is in these."""
-    if gait.stride != "wp":
+    if gait.stride != StrideKind.WALK_PUSH_OFF:
         return gait
     u = gait.controls.copy()
     u[Slot.K_PUSH] = 0.0
-    return replace(gait, controls=u, stride="w")
+    return replace(gait, controls=u, stride=StrideKind.WALK)
 
 
 def _kind(gait: Gait) -> str:
-    return gait.stride if gait.stride in WALKING_SLOTS else "w"
+    return gait.stride if gait.stride in WALKING_SLOTS else StrideKind.WALK
 
 
 def control_units(gait: Gait) -> tuple[list[int], Array]:
@@ -160,7 +167,7 @@ def vlo_jacobians(gait: Gait) -> tuple[Array, Array]:
 
 
 def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingGait:
-    stride = simulate_stride(parameters, STRIDE_START["w"], VLO.state(z), u)
+    stride = simulate_stride(parameters, STRIDE_START[StrideKind.WALK], VLO.state(z), u)
     if not stride.completed or np.max(np.abs(VLO.of(stride.state) - z)) > 1e-6:
         raise GaitError(f"gait {name!r} does not return to its VLO state: {stride.outcome.reason}")
     return WalkingGait(name, parameters, z, u, float(stride.state[0]), stride.duration)

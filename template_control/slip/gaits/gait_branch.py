@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count, Vector
 from template_control.errors import GaitError, ParameterError
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.control.controllers import VARIED, TargetedPolicy
 from template_control.slip.gaits.branch import (
     QUANTITIES,
@@ -49,7 +49,7 @@ class Family(Branch):
 
     @checked
     def __init__(self, parameters: SlipParameters, stride: str, fixed: Mapping[str, float]) -> None:
-        if stride not in ("w", "r"):
+        if stride not in (StrideKind.WALK, StrideKind.RUN):
             raise ParameterError(f"stride is {stride!r}: periodic gaits are 'w' or 'r'")
         if len(fixed) != 2 or not set(fixed) <= set(QUANTITIES):
             raise ParameterError(
@@ -185,7 +185,7 @@ class ControlledFamily(Branch):
             raise ParameterError(
                 f"cannot vary the target's {varied!r}: give one of {', '.join(VARIED)}"
             )
-        if step.stride not in ("w", "r"):
+        if step.stride not in (StrideKind.WALK, StrideKind.RUN):
             raise ParameterError(f"stride is {step.stride!r}: periodic gaits are 'w' or 'r'")
         self.map, self.policy, self.varied = step, policy, varied
         self.n = step.dimensions[0]

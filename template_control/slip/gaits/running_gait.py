@@ -14,7 +14,7 @@ from template_control.checks.fitting import inward
 from template_control.checks.ranges import Positive
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.automaton.vocabulary import Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.gaits.gait import flying
 from template_control.slip.maps.return_map import ReturnMap
@@ -61,7 +61,7 @@ class RunningGait:
     @property
     def stride(self) -> str:
         """Kind of stride: from apex to apex."""
-        return "r"
+        return StrideKind.RUN
 
     @property
     def state(self) -> Array:
@@ -147,13 +147,13 @@ def running_gait(
             f" {leg_stiffness:g} N/m: give others, or neither"
         )
     u = controls(angle, leg_stiffness, leg_stiffness)
-    stride = simulate_stride(p, STRIDE_START["r"], APEX.state(z), u)
+    stride = simulate_stride(p, STRIDE_START[StrideKind.RUN], APEX.state(z), u)
     return RunningGait(name, p, z, u, float(stride.state[0]), stride.duration, flying(stride))
 
 
 def _symmetric_angle(parameters: SlipParameters, z: Array, stiffness: float) -> float | None:
     """The touchdown angle with which the apex returns [rad], None if there is none."""
-    step = ReturnMap(parameters, "r")
+    step = ReturnMap(parameters, StrideKind.RUN)
 
     def surplus(angle: float) -> float:
         z_next, outcome = step.step(z, controls(angle, stiffness, stiffness))

@@ -18,7 +18,7 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Angle
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.automaton.vocabulary import Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.gaits.gait import WalkingGait, find_gait_at, gait_at, root, with_push_off
 from template_control.slip.maps.return_map import ReturnMap
@@ -79,7 +79,7 @@ def nearest_gait(parameters: SlipParameters, vlo_speed: float, guess: Array) -> 
         if size < _DONE:
             break
     z, u = _stride(x, vlo_speed, weight, p.rest_length)
-    stride = simulate_stride(p, STRIDE_START["w"], VLO.state(z), u)
+    stride = simulate_stride(p, STRIDE_START[StrideKind.WALK], VLO.state(z), u)
     missed = np.abs(VLO.of(stride.state) - z) / [unit, p.rest_length, unit]
     if not stride.completed or np.max(missed) > _RETURNED:
         raise GaitError(
@@ -268,7 +268,7 @@ def family_speeds(parameters: SlipParameters) -> tuple[float, float]:
 
 _SPEEDS = (0.195, 0.225, 0.29, 0.35, 0.395)  # at VLO, over sqrt(g l0)
 _ANGLES = (70.0, 69.5, 68.0, 66.0, 66.0)  # [deg]
-_PAPER = ("w",)  # strides
+_PAPER = (StrideKind.WALK,)  # strides
 _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from template_control.compiled import compiled
 from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.lateral.gait import (
     LateralCycle,
@@ -230,7 +231,7 @@ def sideways() -> None:
     """A step's motion aside, and the foothold that is chosen on it."""
     p = SlipParameters()
     u = controls(1.152, p.leg_stiffness, p.leg_stiffness)
-    stride = simulate_stride(p, STRIDE_START["w"], VLO.state([1.1, 0.978, 0.0]), u)
+    stride = simulate_stride(p, STRIDE_START[StrideKind.WALK], VLO.state([1.1, 0.978, 0.0]), u)
     path, two = lateral_path((stride,), p.gravity), np.zeros(2)
     transition(path, 0.0, path.section, 1.0)
     acceleration(path, 0.0, 0.0, np.zeros(NEXT + 1))

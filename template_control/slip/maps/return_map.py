@@ -14,7 +14,7 @@ from template_control.compiled import compiled, inner, inner_by_type
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, StrideKind
 from template_control.slip.dynamics.closed_form import closed_form_stride
 from template_control.slip.dynamics.kernel import Scratch, new_scratch, run_stride
 from template_control.slip.dynamics.model import Kernel, stride_kernel
@@ -251,7 +251,7 @@ class ReturnMap:
     def __init__(
         self,
         parameters: SlipParameters,
-        stride: str = "w",
+        stride: str = StrideKind.WALK,
         kind: MapKind = MapKind.EXACT,
         automaton: Automaton = AUTOMATON,
     ) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.maps.section import APEX, REST, Section
 from template_control.slip.parameters import SlipParameters
@@ -23,12 +24,10 @@ from template_control.slip.similarity import REFERENCE, SPEED, Scale, scaled, tu
 
 Array = NDArray[np.float64]
 
-_WALKS = ("w", "wp")
-_BREAKS, _RUNS, _SLOWS = "wr", "r", "rw"
-_CARRIES, _STARTS = "ww", "sw"
-_STOPS = ("ws", "sb")
+_WALKS = (StrideKind.WALK, StrideKind.WALK_PUSH_OFF)
+_STOPS = (StrideKind.WALK_TO_STAND, StrideKind.STEP_BACK)
 
-CATCHING_STRIDES = frozenset((_BREAKS, _RUNS, _SLOWS))
+CATCHING_STRIDES = frozenset((StrideKind.WALK_TO_RUN, StrideKind.RUN, StrideKind.RUN_TO_WALK))
 """The strides of a run that catches a walk; each needs a planner."""
 
 
@@ -125,14 +124,14 @@ class CatchingRoute:
         slowest, fastest = running_speeds(self.parameters)
         o, at_vlo = self.options, float(goal.target[0]) + excess
         walk = goal.stride in _WALKS
-        carried = self._caught == goal.stride == _CARRIES
+        carried = self._caught == goal.stride == StrideKind.CHANGE_SPEED
         if (walk or carried) and speed <= goal.target[0] - o.lag:
             return self._slower(goal, goal.then if carried else goal.stride)
         fast = walk and (excess >= o.excess or at_vlo >= o.fast)
-        on = self._caught == goal.stride == _BREAKS
+        on = self._caught == goal.stride == StrideKind.WALK_TO_RUN
         if speed < slowest or not (fast or on):
             return ()
-        return (self._run(goal, _BREAKS, min(speed, fastest), _RUNS),)
+        return (self._run(goal, StrideKind.WALK_TO_RUN, min(speed, fastest), StrideKind.RUN),)
 
     def take(self, goal: StrideGoal) -> None:
         """See :meth:`BreakingRoute.take`."""
@@ -144,19 +143,19 @@ class CatchingRoute:
         if walk is None:
             return None
         if self._caught in _STOPS and section is REST:
-            return replace(walk, stride=_STARTS, then=walk.stride)
-        if self._caught != _BREAKS or section is not APEX:
+            return replace(walk, stride=StrideKind.STAND_TO_WALK, then=walk.stride)
+        if self._caught != StrideKind.WALK_TO_RUN or section is not APEX:
             return None
         if z[0] > self.options.walkable:
-            return self._run(walk, _RUNS, self.options.slow, _SLOWS)
-        return replace(walk, stride=_SLOWS, then=walk.stride)
+            return self._run(walk, StrideKind.RUN, self.options.slow, StrideKind.RUN_TO_WALK)
+        return replace(walk, stride=StrideKind.RUN_TO_WALK, then=walk.stride)
 
     def _slower(self, goal: StrideGoal, walk: str | None) -> Sequence[StrideGoal]:
         """On to the goal's target and the next stride of ``walk``, or to a stand."""
         height = STAND_HEIGHT / REFERENCE.rest_length * self.parameters.rest_length
-        rest = replace(goal, target=np.array([0.0, height, 0.0]), then=_STARTS)
+        rest = replace(goal, target=np.array([0.0, height, 0.0]), then=StrideKind.STAND_TO_WALK)
         stops = [replace(rest, stride=stop) for stop in _STOPS]
-        return replace(goal, stride=_CARRIES, then=walk), *stops
+        return replace(goal, stride=StrideKind.CHANGE_SPEED, then=walk), *stops
 
     def _run(self, walk: StrideGoal, stride: str, speed: float, then: str) -> StrideGoal:
         p = self.parameters

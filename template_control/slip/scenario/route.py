@@ -20,6 +20,7 @@ from template_control.checks.ranges import NotNegative, Positive, Speed
 from template_control.errors import ParameterError, ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.dynamics.stride import finite
 from template_control.slip.gaits.gait import Gait as PeriodicGait
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
@@ -280,7 +281,7 @@ class SpeedRoute:
         wanted = self._wanted(now + self._took)
         speed, height = self._family.vlo_for(self.parameters, wanted)
         beyond = wanted - min(max(wanted, self._range[0]), self._range[1])
-        return StrideGoal("wp", np.array([speed + beyond, height, 0.0]), wanted)
+        return StrideGoal(StrideKind.WALK_PUSH_OFF, np.array([speed + beyond, height, 0.0]), wanted)
 
     def _wanted(self, time: float) -> float:
         """The wanted mean speed [m/s].

@@ -15,7 +15,7 @@ from template_control import storage
 from template_control.checks.checked import checked
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.vocabulary import Event, Slot
+from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
 from template_control.slip.control.controllers import (
     ActiveRunning,
     ActiveWalking,
@@ -166,7 +166,7 @@ class ScenarioRecord:
 
 
 _SAMPLES = 40  # a stride
-_STRIDES = ("w", "wr", "r", "rw")
+_STRIDES = (StrideKind.WALK, StrideKind.WALK_TO_RUN, StrideKind.RUN, StrideKind.RUN_TO_WALK)
 
 
 @dataclass
@@ -211,26 +211,28 @@ class _Controllers:
         p, kind = scenario.parameters, scenario.map_kind
         walking = ModifiedWalking if scenario.walking == "modified" else ActiveWalking
         self._by_stride: dict[str, Controller] = {
-            "w": walking(p, kind),
-            "wr": WalkToRun(p, kind),
-            "r": ActiveRunning(p, kind),
-            "rw": RunToWalk(p, kind),
+            StrideKind.WALK: walking(p, kind),
+            StrideKind.WALK_TO_RUN: WalkToRun(p, kind),
+            StrideKind.RUN: ActiveRunning(p, kind),
+            StrideKind.RUN_TO_WALK: RunToWalk(p, kind),
         }
         k0 = p.leg_stiffness
         first = controls(np.radians(scenario.touchdown_angle), k0, k0)
-        self._guesses: dict[str, Array] = {"w": first}
+        self._guesses: dict[str, Array] = {StrideKind.WALK: first}
         self._walking_target = np.array([scenario.segments[0].speed or 0.0, *scenario.vlo])
 
     def solve(self, z: Array, goal: StrideGoal) -> StepSolution:
         """Controls of the stride from section state ``z`` (n,) that ``goal`` asks for."""
         kind = goal.stride
-        if kind == "wr":
+        if kind == StrideKind.WALK_TO_RUN:
             # The rear leg walks on: its controls are the walking controller's.
-            walk = self._by_stride["w"].solve(z, self._walking_target, self._guesses["w"])
+            walk = self._by_stride[StrideKind.WALK].solve(
+                z, self._walking_target, self._guesses[StrideKind.WALK]
+            )
             self._guesses[kind] = walk.controls
         solution = self._by_stride[kind].solve(z, goal.target, self._guesses.get(kind))
         self._guesses[kind] = solution.controls
-        if kind == "w":
+        if kind == StrideKind.WALK:
             self._walking_target = goal.target
         return solution
 

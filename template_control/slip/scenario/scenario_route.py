@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative
+from template_control.slip.automaton.vocabulary import StrideKind, WalkingStride
 from template_control.slip.maps.section import APEX, REST, VLO, Section
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segment
@@ -38,27 +38,33 @@ class PaceOptions(Checked):
 
 Array = NDArray[np.float64]
 
-_WALK, _CHANGE, _STOP, _CLOSE = "w", "ww", "ws", "sf"
 _STRIDES: dict[tuple[Section, Gait], str] = {
-    (VLO, "walk"): _WALK,
-    (VLO, "run"): "wr",
-    (APEX, "run"): "r",
-    (APEX, "walk"): "rw",
-    (REST, "stand"): "s",
-    (REST, "walk"): "sw",
-    (VLO, "stand"): _STOP,
+    (VLO, "walk"): StrideKind.WALK,
+    (VLO, "run"): StrideKind.WALK_TO_RUN,
+    (APEX, "run"): StrideKind.RUN,
+    (APEX, "walk"): StrideKind.RUN_TO_WALK,
+    (REST, "stand"): StrideKind.STAND,
+    (REST, "walk"): StrideKind.STAND_TO_WALK,
+    (VLO, "stand"): StrideKind.WALK_TO_STAND,
 }
-_TRANSITIONS = ("wr", "rw", "sw", _STOP, _CLOSE, _CHANGE)
+_TRANSITIONS = (
+    StrideKind.WALK_TO_RUN,
+    StrideKind.RUN_TO_WALK,
+    StrideKind.STAND_TO_WALK,
+    StrideKind.WALK_TO_STAND,
+    StrideKind.STEP_FORWARD,
+    StrideKind.CHANGE_SPEED,
+)
 _LEADS_TO: dict[str, tuple[Section, Gait]] = {
-    _WALK: (VLO, "walk"),
-    "wr": (APEX, "run"),
-    "r": (APEX, "run"),
-    "rw": (VLO, "walk"),
-    "s": (REST, "stand"),
-    "sw": (VLO, "walk"),
-    _STOP: (REST, "stand"),
-    _CLOSE: (REST, "stand"),
-    _CHANGE: (VLO, "walk"),
+    StrideKind.WALK: (VLO, "walk"),
+    StrideKind.WALK_TO_RUN: (APEX, "run"),
+    StrideKind.RUN: (APEX, "run"),
+    StrideKind.RUN_TO_WALK: (VLO, "walk"),
+    StrideKind.STAND: (REST, "stand"),
+    StrideKind.STAND_TO_WALK: (VLO, "walk"),
+    StrideKind.WALK_TO_STAND: (REST, "stand"),
+    StrideKind.STEP_FORWARD: (REST, "stand"),
+    StrideKind.CHANGE_SPEED: (VLO, "walk"),
 }
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
 _LONGEST = 2.0  # of that guess: what took longer was no stride alone, but one that a run caught
@@ -102,7 +108,7 @@ class _Progress:
         kind, left = self.last
         took = now - left if self.took is None else self.took
         here = replace(self, duration={**self.duration, kind: took}, last=None, took=None)
-        if kind in _TRANSITIONS and not (kind == _CHANGE and self.walking):
+        if kind in _TRANSITIONS and not (kind == StrideKind.CHANGE_SPEED and self.walking):
             # The transition leads to where the segment's profile begins.
             return replace(here, began=now)
         return replace(here, strides=self.strides + 1)
@@ -153,7 +159,7 @@ class ScenarioRoute:
         apex_height: Callable[[float], float] | None = None,
         paces: PaceOptions | None = None,
         vlo_height: Callable[[float], float] | None = None,
-        walks: Literal["w", "wp"] = "w",
+        walks: WalkingStride = StrideKind.WALK,
     ) -> None:
         self.scenario = scenario
         self.walks = walks
@@ -178,7 +184,7 @@ class ScenarioRoute:
     @property
     def pushes_off(self) -> bool:
         """Whether its walking steps have a push-off."""
-        return self.walks != _WALK
+        return self.walks != StrideKind.WALK
 
     def reset(self) -> None:
         """Back to the beginning."""
@@ -209,17 +215,17 @@ class ScenarioRoute:
         s = self.scenario
         segment = s.segments[here.index]
         kind = _STRIDES[section, segment.gait]
-        if section is REST and self._progress.kind == _STOP:
-            kind = _CLOSE  # the last step of a walk is a long one
-        if kind in (_STOP, _WALK):
+        if section is REST and self._progress.kind == StrideKind.WALK_TO_STAND:
+            kind = StrideKind.STEP_FORWARD  # the last step of a walk is a long one
+        if kind in (StrideKind.WALK_TO_STAND, StrideKind.WALK):
             here, kind = self._reached(here, kind, float(z[0]), now)
         # A transition aims at where the profile begins, the others at where they will end.
-        aims = kind not in _TRANSITIONS or (kind == _CHANGE and here.walking)
+        aims = kind not in _TRANSITIONS or (kind == StrideKind.CHANGE_SPEED and here.walking)
         took = min(here.duration.get(kind, self._guess), _LONGEST * self._guess)
         ahead = took if aims else 0.0
         speed = here.wanted(segment, now + ahead)
         if segment.gait == STAND:
-            speed = self.paces.slowed * self._unit if kind == _CHANGE else 0.0
+            speed = self.paces.slowed * self._unit if kind == StrideKind.CHANGE_SPEED else 0.0
         runs = segment.gait == "run"
         target = (
             (speed, self._apex_height(speed))
@@ -234,7 +240,7 @@ class ScenarioRoute:
 
     def _named(self, kind: str) -> str:
         """The kind of stride that a kind of the tables is made as."""
-        return self.walks if kind == _WALK else kind
+        return self.walks if kind == StrideKind.WALK else kind
 
     def _reached(
         self, here: _Progress, kind: str, speed: float, now: float
@@ -243,13 +249,13 @@ class ScenarioRoute:
         segment = self.scenario.segments[here.index]
         if segment.gait == STAND:
             slow = speed <= self.paces.stoppable * self._unit
-            return replace(here, walking=False), kind if slow else _CHANGE
+            return replace(here, walking=False), kind if slow else StrideKind.CHANGE_SPEED
         if not self.scenario.stands:
             return here, kind
         most = self.paces.behind if here.walking else self.paces.alike
         if abs(speed - here.wanted(segment, now)) <= most * self._unit:
             return replace(here, walking=True), kind
-        return here, _CHANGE
+        return here, StrideKind.CHANGE_SPEED
 
     def _then(self, kind: str, index: int) -> str | None:
         """The next kind of stride after those of ``kind`` in segment ``index``."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, NotNegative, Positive
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
+from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot, StrideKind
 from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
@@ -64,7 +64,7 @@ class ModifiedPlanner:
         self.offset: Array = np.zeros(3)
         self._family = WalkingFamily(gait)
         self._scratch = new_scratch()
-        self._kernel = stride_kernel(gait.parameters, "w")
+        self._kernel = stride_kernel(gait.parameters, StrideKind.WALK)
         k0 = gait.parameters.leg_stiffness
         self._stiffness = np.array(self.options.stiffness_range) * k0
 

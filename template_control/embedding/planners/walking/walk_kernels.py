@@ -24,7 +24,7 @@ from template_control.embedding.references.swing_foot import (
 from template_control.embedding.references.template_path import LOCATE
 from template_control.robot.library import load_robot
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.automaton.vocabulary import MapKind, StrideKind
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import ORDER, stride_kernel
 from template_control.slip.dynamics.stride import controls, simulate_stride
@@ -60,7 +60,7 @@ def derivatives() -> None:
 def exact_map() -> None:
     """The exact map, with which gaits are found and steps planned."""
     ReturnMap(_TEMPLATE).step(_STATE, _CONTROLS)
-    simulate_stride(_TEMPLATE, STRIDE_START["w"], VLO.state(_STATE), _CONTROLS)
+    simulate_stride(_TEMPLATE, STRIDE_START[StrideKind.WALK], VLO.state(_STATE), _CONTROLS)
 
 
 def whole_body() -> None:
@@ -103,7 +103,7 @@ def step_search() -> None:
         stiffness=_K0,
         softest=0.5,
         strain=Strain(1.1, 350.0, 1.0),
-        kernel=stride_kernel(_TEMPLATE, "w"),
+        kernel=stride_kernel(_TEMPLATE, StrideKind.WALK),
     )
     scratch, u, first = new_scratch(), np.ones(3), np.empty(3)
     grid = Grid(np.ones(3, np.int64), (2, 2), 1, 0.1, 0.1, 0.4)
