@@ -10,12 +10,11 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import BreakingPlanner, Free
-from template_control.embedding.planning.replan_options import ReplanOptions
+from template_control.embedding.replanning import free_controls
 from template_control.embedding.robot_route import robot_route
-from template_control.embedding.section_report import Learnt
-from template_control.embedding.sensing import Sensed
-from template_control.embedding.stride_planning import StridePlanning
-from template_control.embedding.touchdown import free_controls
+from template_control.embedding.rollout import ReplanOptions
+from template_control.embedding.state import Learnt, Sensed
+from template_control.embedding.supervisor import StridePlanning
 from template_control.slip.automaton.automaton import AUTOMATON, RUN_ON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride

@@ -93,11 +93,11 @@ def test_a_function_checks_its_arguments():
 OPTIONS = [
     tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
     tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
-    embedding.FrictionOptions, embedding.LoadOptions,
+    embedding.FrictionOptions,
     embedding.AheadOptions, embedding.RehearsalOptions,
-    embedding.ModifiedOptions, embedding.PathOptions, embedding.ReplanOptions,
+    embedding.ModifiedOptions, embedding.ReplanOptions,
     embedding.RunningOptions, TransitionOptions, run.GaitSpec,
-    embedding.SwingOptions, embedding.TrimOptions, embedding.UnloadOptions, run.FallOptions,
+    embedding.SwingOptions, run.FallOptions,
     sweep.SweepOptions, whole_body.ComTask, whole_body.FootTask, whole_body.MomentumTask,
     whole_body.PostureTask, whole_body.QpOptions,
 ]  # fmt: skip

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.guards import GuardOptions, RobotGuards
-from template_control.embedding.learners.load import LoadEstimate, LoadOptions
+from template_control.embedding.com_path import LOCATE, at_direction, join, sample
+from template_control.embedding.learners.momentum import LoadEstimate
+from template_control.embedding.leg_forces import leg_forces
+from template_control.embedding.modes import GuardOptions, RobotGuards
 from template_control.embedding.phases import Clock
-from template_control.embedding.references.leg_forces import leg_forces
-from template_control.embedding.references.template_path import LOCATE, at_direction, join, sample
-from template_control.embedding.sensing import Sensed
+from template_control.embedding.state import Sensed
 from template_control.errors import GaitError, RobotError
 from template_control.robot.start import state_at_vlo
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
@@ -141,7 +141,7 @@ def test_touchdown_is_the_placed_leg_s():
 
 
 def test_load_learns_a_constant_and_ignores_the_gait():
-    load = LoadEstimate(LoadOptions(), 9.81)
+    load = LoadEstimate(9.81)
     load.end_stride(True)
     for _ in range(10):
         load.observe(0.15, 0.5)  # within the dead zone

@@ -5,10 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from template_control.embedding.guards import GuardOptions, RobotGuards
+from template_control.embedding.modes import GuardOptions, RobotGuards
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.sensing import Sensed
+from template_control.embedding.state import Sensed
 from template_control.paper.example_two import (
     EARLIER,
     PLANNERS,

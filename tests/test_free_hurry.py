@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.free.hurry import HurryOptions, Outlook, hurried, outlook
+from template_control.embedding.free.lateral import STEEPER, Outlook, hurried, outlook
 from template_control.embedding.planners.planner import Decision
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
 from template_control.slip.lateral.placing import LateralAim, Placement
 
 ANGLE = 1.2
-OPTIONS = HurryOptions()
 
 
 def decision(angle, feasible=True):
@@ -25,13 +24,12 @@ def chosen(outlooks, feasible=(True, True, True)):
     """The touchdown angle over the first one, where steeper steps look so; whether nominal."""
     first = decision(ANGLE)
     seen = {ANGLE: outlooks[0]}
-    seen |= {ANGLE + more: out for more, out in zip(OPTIONS.steeper, outlooks[1:], strict=True)}
-    done = dict(zip((ANGLE + more for more in OPTIONS.steeper), feasible, strict=True))
+    seen |= {ANGLE + more: out for more, out in zip(STEEPER, outlooks[1:], strict=True)}
+    done = dict(zip((ANGLE + more for more in STEEPER), feasible, strict=True))
     best = hurried(
         first,
         lambda least: decision(least, done[least]),
         lambda d: Outlook(*seen[float(d.controls[Slot.TOUCHDOWN_ANGLE])]),
-        OPTIONS,
     )
     return round(float(best.controls[Slot.TOUCHDOWN_ANGLE]) - ANGLE, 6), best.nominal
 

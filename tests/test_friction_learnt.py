@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.learners.friction import FrictionEstimate, FrictionOptions
+from template_control.embedding.learners.friction import (
+    SLIDING_SPEED,
+    FrictionEstimate,
+    FrictionOptions,
+)
 from template_control.embedding.options import EmbeddingOptions
 from template_control.plant.bullet import PlantOptions
+from template_control.slip.similarity import Scale
 
 OPTIONS = FrictionOptions()
 DT, WEIGHT, TOLD, TRUE = 1e-3, 800.0, 0.7, 0.5
@@ -18,7 +23,9 @@ STANDS, SLIDES = 0.05, 0.03
 
 
 def estimate(**options):
-    return FrictionEstimate(replace(OPTIONS, **options), TOLD, WEIGHT)
+    return FrictionEstimate(
+        replace(OPTIONS, **options), TOLD, WEIGHT, Scale.of(tc.SlipParameters())
+    )
 
 
 def feel(friction, seconds, force, speed, standing=FIRST):
@@ -65,7 +72,7 @@ def test_a_foot_that_chatters_slides_on(standing, learns):
 @pytest.mark.parametrize(
     ("seconds", "force", "speed"),
     [
-        (SLIDES, (-0.3 * WEIGHT, WEIGHT), (0.8 * OPTIONS.speed, 0.0)),
+        (SLIDES, (-0.3 * WEIGHT, WEIGHT), (0.8 * SLIDING_SPEED, 0.0)),
         (SLIDES, (0.3 * WEIGHT, WEIGHT), (0.2, 0.0)),
         (SLIDES, (-0.3 * WEIGHT, WEIGHT), (0.0, 0.2)),
         (SLIDES, (-0.01 * WEIGHT, 0.03 * WEIGHT), (0.2, 0.0)),
@@ -108,7 +115,7 @@ def test_the_estimate_falls_to_the_lowest_and_never_rises():
 
 
 def test_a_robot_that_is_told_less_than_the_lowest_keeps_that():
-    friction = FrictionEstimate(OPTIONS, 0.2, WEIGHT)
+    friction = FrictionEstimate(OPTIONS, 0.2, WEIGHT, Scale.of(tc.SlipParameters()))
     feel(friction, STANDS, (0.0, WEIGHT), (0.0, 0.0))
     assert not feel(friction, SLIDES, (-0.1 * WEIGHT, WEIGHT), (0.2, 0.0))
     assert friction.coefficient == 0.2

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from template_control.embedding.guards import GuardOptions
+from template_control.embedding.modes import GuardOptions
 from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions

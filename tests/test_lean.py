@@ -3,10 +3,20 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.learners.lean import Lean, LeanOptions, TrunkLean
+from template_control.embedding.learners.lean import (
+    ERROR_BOUND,
+    GAIN,
+    LEAN_RATE,
+    Lean,
+    LeanOptions,
+    TrunkLean,
+)
+from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal
+from template_control.slip.similarity import Scale
 
 OPTIONS = LeanOptions({"r": Lean((2.0, 4.0), (0.2, 0.4), excess=0.1)})
+SCALE = Scale.of(SlipParameters())
 DT = 1e-3
 
 
@@ -25,20 +35,20 @@ def test_a_stride_before_another_kind_prepares_its_lean():
 
 
 def test_a_run_begins_with_its_lean_and_changes_it_slowly():
-    lean = TrunkLean(OPTIONS, 0.0)
+    lean = TrunkLean(OPTIONS, 0.0, SCALE)
     lean.aim(goal("r", 2.0))
     assert lean.advance(0.2, DT) == pytest.approx(0.3), "mean and excess"
     lean.aim(goal("r", 4.0))
     for _ in range(1000):
         lean.advance(0.2, DT)
-    assert lean.mean == pytest.approx(0.2 + OPTIONS.rate)
+    assert lean.mean == pytest.approx(0.2 + LEAN_RATE)
     for _ in range(2000):
         lean.advance(0.2, DT)
     assert lean.mean == pytest.approx(0.4)
 
 
 def test_the_mean_pitch_becomes_the_wanted_one():
-    lean = TrunkLean(OPTIONS, 0.0)
+    lean = TrunkLean(OPTIONS, 0.0, SCALE)
     lean.aim(goal("r", 2.0))
     for _ in range(60):
         pitch = 0.0
@@ -52,18 +62,18 @@ def test_the_mean_pitch_becomes_the_wanted_one():
 
 
 def test_a_disturbed_stride_teaches_nothing():
-    lean = TrunkLean(OPTIONS, 0.0)
+    lean = TrunkLean(OPTIONS, 0.0, SCALE)
     lean.aim(goal("r", 2.0))
     lean.advance(-0.5, DT)
     lean.end_stride(False)
     assert lean.correction == 0.1
     lean.advance(-0.5, DT)
     lean.end_stride(True)
-    assert lean.correction == pytest.approx(0.1 + OPTIONS.gain * OPTIONS.error_bound)
+    assert lean.correction == pytest.approx(0.1 + GAIN * ERROR_BOUND)
 
 
 def test_a_stride_without_a_lean_keeps_the_trunk_s_pitch():
-    lean = TrunkLean(OPTIONS, 0.05)
+    lean = TrunkLean(OPTIONS, 0.05, SCALE)
     lean.aim(goal("w", 1.0))
     for _ in range(10):
         assert lean.advance(0.3, DT) == 0.05

@@ -8,20 +8,17 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import template_control as tc
-from template_control.embedding.learners.momentum_trim import (
+from template_control.embedding.learners.momentum import (
     MomentumTrim,
-    TrimOptions,
     uncontrolled,
 )
 from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.embedding.planners.walking.modified import ModifiedPlanner
-from template_control.embedding.planning.replan_options import ReplanOptions
-from template_control.embedding.planning.route_planners import RoutePlanners
-from template_control.embedding.section_report import Learnt
-from template_control.embedding.sensing import Sensed
-from template_control.embedding.stride_planning import StridePlanning
-from template_control.embedding.touchdown import angle_later
+from template_control.embedding.replanning import AGILITY, SOONEST, SOONEST_SHARE, angle_later
+from template_control.embedding.rollout import ReplanOptions, RoutePlanners
+from template_control.embedding.state import Learnt, Sensed
+from template_control.embedding.supervisor import StridePlanning
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
@@ -142,7 +139,7 @@ def planned(gait, options=None):
 def test_a_walk_after_a_run_forgets_what_its_steps_added_to_the_speed(gait, before, speed_kept):
     planner = LqrPlanner(gait)
     route = SteadyRoute.of(gait)
-    planners = RoutePlanners(route, {"w": planner, "rw": planner}, ReplanOptions(), AUTOMATON)
+    planners = RoutePlanners(route, {"w": planner, "rw": planner}, AUTOMATON)
     report, *_ = planners.decide(VLO, gait.vlo, 0.0, NOTHING, [])
     planner.offset = np.array([0.02, -0.002, -0.05])
     goal = replace(report.goal, stride=before)
@@ -200,10 +197,10 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
     disturbed = simulate_stride(P, node.name, VLO.state(z), u)
     assume(later < disturbed.time_of(Event.TOUCHDOWN))
     sensed.state[:] = disturbed.sample(later)[0][:4]
-    o, left = ReplanOptions(), planning.due(Event.TOUCHDOWN) - later
-    change = o.agility * left**2
+    left = planning.due(Event.TOUCHDOWN) - later
+    change = AGILITY * left**2
     # The foot needs some time until it is down, if it had so much.
-    soonest = max(min(left, o.soonest, o.soonest_share * gait.step_duration), 0.002)
+    soonest = max(min(left, SOONEST, SOONEST_SHARE * gait.step_duration), 0.002)
     most = min(u[0] + change, angle_later(sensed, P, u[Slot.K_SC], soonest))
     planning.reconsider(node, sensed, later, later)
     expected = LqrPlanner(gait).decide(z, angles=(min(u[0] - change, most), most)).controls
@@ -329,7 +326,7 @@ def test_trim_goes_against_the_drift_that_no_control_takes_away(gait):
     sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
     planning.decide(VLO, sensed, 0.0, NOTHING)
     plan = planning.path
-    trim = MomentumTrim(P, TrimOptions())
+    trim = MomentumTrim(P)
     trim.end_stride(plan.section_state + 1.0, True)  # nothing was expected yet
     assert trim.acceleration == 0.0
     trim.expect(plan, gait)

@@ -5,7 +5,7 @@ import pytest
 
 import template_control as tc
 from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.references.rolling import rolled, unrolled
+from template_control.embedding.state import rolled, unrolled
 
 RADIUS = 0.045
 

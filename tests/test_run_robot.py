@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PHASES
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.references.apex_pose import ApexStart, apex_pose
-from template_control.embedding.sensing import Sensed
+from template_control.embedding.state import Sensed
 from template_control.errors import ParameterError
 from template_control.robot.start import state_in
 from template_control.robustness.disturbance import Situation

@@ -7,11 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import template_control as tc
-from template_control.embedding.learners.momentum_trim import uncontrolled
-from template_control.embedding.learners.slope import SlopeEstimate, SlopeOptions
-from template_control.embedding.references.leg_forces import leg_forces
-from template_control.embedding.references.slope_frame import SlopeFrame
-from template_control.embedding.sensing import Sensed
+from template_control.embedding.ground import SlopeEstimate, SlopeFrame
+from template_control.embedding.learners.momentum import uncontrolled
+from template_control.embedding.leg_forces import leg_forces
+from template_control.embedding.state import Sensed
 from template_control.errors import GaitError
 from template_control.slip import MapKind, ReturnMap, on_slope, simulate_stride, with_push_off
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
@@ -139,16 +138,14 @@ def walk_over(estimate, heights, length=0.64):
 
 def test_a_slope_is_known_after_its_second_foothold():
     rise = 0.64 * np.tan(0.07)
-    told = walk_over(
-        SlopeEstimate(SlopeOptions(), 1.0), [0.0, 0.0, 0.0, rise, 2.0 * rise, 3.0 * rise]
-    )
+    told = walk_over(SlopeEstimate(1.0), [0.0, 0.0, 0.0, rise, 2.0 * rise, 3.0 * rise])
     np.testing.assert_allclose(told[:2], 0.0)
     assert 0.02 < told[2] < 0.05
     np.testing.assert_allclose(told[3:], 0.07, atol=1e-12)
 
 
 def test_a_single_step_is_no_slope_for_long():
-    estimate = SlopeEstimate(SlopeOptions(), 1.0)
+    estimate = SlopeEstimate(1.0)
     told = walk_over(estimate, [0.0, 0.0, 0.03, 0.03, 0.03])
     assert abs(told).max() < 0.6 * np.arctan(0.03 / 0.64)
     assert told[-1] == 0.0
@@ -160,7 +157,7 @@ def test_a_single_step_is_no_slope_for_long():
 
 def test_level_ground_that_feet_press_into_is_level():
     draw = np.random.default_rng(1)
-    told = walk_over(SlopeEstimate(SlopeOptions(), 1.0), draw.uniform(-2e-4, 2e-4, 50))
+    told = walk_over(SlopeEstimate(1.0), draw.uniform(-2e-4, 2e-4, 50))
     np.testing.assert_array_equal(told, 0.0)
 
 

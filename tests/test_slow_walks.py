@@ -7,10 +7,9 @@ import pytest
 
 import template_control as tc
 from template_control.embedding.planners.default import default_planners
-from template_control.embedding.planning.replan_options import ReplanOptions
-from template_control.embedding.section_report import Learnt
-from template_control.embedding.sensing import Sensed
-from template_control.embedding.stride_planning import StridePlanning
+from template_control.embedding.rollout import ReplanOptions
+from template_control.embedding.state import Learnt, Sensed
+from template_control.embedding.supervisor import StridePlanning
 from template_control.slip.automaton.automaton import AUTOMATON, BREAKS
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.walking_by_speed import walking_gait

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.learners.slope import SlopeEstimate, SlopeOptions
-from template_control.embedding.references.leg_forces import leg_forces
+from template_control.embedding.ground import SlopeEstimate
+from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.standing.default import standing_planners
 from template_control.embedding.standing.pose import standing_pose
 from template_control.errors import ParameterError
@@ -86,7 +86,7 @@ def test_a_robot_stands_with_both_feet_on_the_ground(degrees):
 
 @pytest.mark.parametrize("slope", [-0.2, -0.05, 0.003, 0.07, 0.2])
 def test_two_feet_that_stand_tell_the_slope(slope):
-    estimate = SlopeEstimate(SlopeOptions(), 1.0)
+    estimate = SlopeEstimate(1.0)
     estimate.begin((0.3, 0.3 * np.tan(slope)))
     estimate.stand((0.0, 0.0), (0.3, 0.3 * np.tan(slope)))
     believed = 0.0 if abs(slope) < 0.004 else np.clip(slope, -0.12, 0.12)

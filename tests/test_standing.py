@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.embedding.com_path import derivatives, quintics
+from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.planner import CurvePlanner
-from template_control.embedding.references.leg_forces import leg_forces
-from template_control.embedding.references.timed import derivatives, quintics
 from template_control.embedding.standing.curves import BetweenFeet
 from template_control.embedding.standing.default import standing_planners
 from template_control.embedding.standing.options import StandingOptions

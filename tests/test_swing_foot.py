@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from template_control.embedding.following.feet_in_air import FeetInAir
-from template_control.embedding.references.feet import Feet
-from template_control.embedding.references.swing_choice import HIGH_SWING
-from template_control.embedding.references.swing_foot import (
+from template_control.embedding.controller import FeetInAir
+from template_control.embedding.swing import (
+    HIGH_SWING,
+    Feet,
     SwingFoot,
     SwingOptions,
     quintic_step,

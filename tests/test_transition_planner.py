@@ -16,11 +16,10 @@ from template_control.embedding.planners.transition import (
     TransitionPlanner,
 )
 from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.planning.replan_options import ReplanOptions
-from template_control.embedding.section_report import Learnt
-from template_control.embedding.sensing import Sensed
-from template_control.embedding.stride_planning import StridePlanning
-from template_control.embedding.touchdown import free_controls
+from template_control.embedding.replanning import free_controls
+from template_control.embedding.rollout import ReplanOptions
+from template_control.embedding.state import Learnt, Sensed
+from template_control.embedding.supervisor import StridePlanning
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator, simulate_stride

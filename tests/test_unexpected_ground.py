@@ -7,18 +7,21 @@ import pytest
 
 import template_control as tc
 from template_control.embedding import HIGH_SWING, GuardOptions, SwingOptions
-from template_control.embedding.guards import RobotGuards
+from template_control.embedding.modes import RobotGuards
 from template_control.embedding.planners.planner import Decision
-from template_control.embedding.planning.unexpected_ground import (
-    UnexpectedGroundOptions,
+from template_control.embedding.replanning import (
+    END_TOLERANCE,
     choose_legs,
 )
-from template_control.embedding.sensing import Sensed
+from template_control.embedding.state import Sensed
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import StrideGoal
+from template_control.slip.similarity import Scale
+
+SCALE = Scale.of(tc.SlipParameters())
 
 
 @pytest.mark.parametrize(
@@ -59,11 +62,11 @@ def test_legs_push_longer_after_a_step_up(gait):
     ahead = landing(gait, 0.03)
 
     def surprise(end):
-        return np.abs((end - gait.vlo) / UnexpectedGroundOptions().tolerance).max()
+        return np.abs((end - gait.vlo) / END_TOLERANCE).max()
 
     decision = Decision(gait.controls, gait.vlo, True, True, True)
     free = [Slot.K_SC, Slot.K_SD]
-    chosen = choose_legs(ahead, decision, gait.vlo, free, gait.controls, UnexpectedGroundOptions())
+    chosen = choose_legs(ahead, decision, gait.vlo, free, gait.controls, SCALE)
     before, _ = ahead(gait.controls)
     after, outcome = ahead(chosen.controls)
     assert outcome is Outcome.SECTION
@@ -77,11 +80,11 @@ def test_legs_push_longer_after_a_step_up(gait):
 def test_after_a_step_down_the_legs_lead_where_the_next_step_can_brake(gait):
     """The end that looks nearest to the gait is not the one from which a step brakes best."""
     ahead = landing(gait, -0.03)
-    planner, options = tc.LqrPlanner(gait), UnexpectedGroundOptions()
+    planner = tc.LqrPlanner(gait)
     decision = Decision(gait.controls, gait.vlo, True, True, True)
     free = [Slot.K_SC, Slot.K_SD]
-    near = choose_legs(ahead, decision, gait.vlo, free, gait.controls, options)
-    cheap = choose_legs(ahead, decision, gait.vlo, free, gait.controls, options, planner.price)
+    near = choose_legs(ahead, decision, gait.vlo, free, gait.controls, SCALE)
+    cheap = choose_legs(ahead, decision, gait.vlo, free, gait.controls, SCALE, planner.price)
     end, outcome = ahead(cheap.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(cheap.predicted, end)
@@ -91,12 +94,12 @@ def test_after_a_step_down_the_legs_lead_where_the_next_step_can_brake(gait):
 @pytest.mark.parametrize(("name", "high"), [("five-link", True), ("rabbit", False)])
 def test_light_legs_lift_their_feet_high_in_steady_walking(name, high):
     robot = tc.load_robot(name)
-    swings = tc.EmbeddingOptions().swings(robot)
+    swings = tc.EmbeddingOptions().swings(robot, SCALE)
     walk = StrideGoal("w", np.zeros(3), 1.1)
     assert (swings.towards(walk) == HIGH_SWING) is high
     assert swings.towards(replace(walk, then="wr")) == SwingOptions(), "a run comes"
     own = SwingOptions(clearance=0.07)
-    assert tc.EmbeddingOptions(swing=own).swings(robot).towards(walk) == own
+    assert tc.EmbeddingOptions(swing=own).swings(robot, SCALE).towards(walk) == own
 
 
 @pytest.mark.slow(seconds=20)

@@ -13,10 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import NotNegative, Positive
-from template_control.slip.similarity import SPEED, TIME, tuned
+from template_control.checks.ranges import NotNegative
+from template_control.slip.similarity import TIME, tuned
 
 Array = NDArray[np.float64]
+
+EARLY = 0.015
+"""A touchdown is due from this long before its time on the path [s, of the reference template].
+Undisturbed feet come up to 10 ms before it."""
+SINKING = 0.3
+"""A foot that still comes down faster than this is not due: it may graze an edge [m/s, of the
+reference template]. A walking swing ends with 0.2 m/s (``SwingOptions.landing_speed``)."""
+# A force whose horizontal part is more than this many times its vertical one comes from a wall:
+# from ground to stand on it is the friction coefficient's at most.
+_STEEPNESS = 1.0
+_FORCE = 0.02  # share of the weight that a wall's force has at least
 
 
 @dataclass(frozen=True)
@@ -24,24 +35,13 @@ class ContactOptions(Checked):
     """When a contact flag is believed, and when a foot has met a wall.
 
     Attributes:
-        early: a touchdown is due from this long before its time on the path [s]. Undisturbed feet
-            come up to 10 ms before it.
-        sinking: a foot that still comes down faster than this is not due: it may graze an edge
-            [m/s]. A walking swing ends with 0.2 m/s (``SwingOptions.landing_speed``).
         doubt: a flag that the path does not expect is believed after it has held for this long [s].
             A foot that bounces off an edge leaves it sooner; of wrong flags, 2 % at random, four
             ticks in a row are one case in six million.
-        steepness: a force whose horizontal part is more than this many times its vertical one
-            comes from a wall: from ground to stand on it is the friction coefficient's at most.
-        force: share of the weight that a wall's force has at least.
         linger: the wall counts for this long after its last force [s].
     """
 
-    early: NotNegative = tuned(0.015, TIME)
-    sinking: NotNegative = tuned(0.3, SPEED)
     doubt: NotNegative = tuned(0.004, TIME)
-    steepness: Positive = tuned(1.0)
-    force: NotNegative = tuned(0.02)
     linger: NotNegative = tuned(0.015, TIME)
 
 
@@ -62,7 +62,7 @@ class ContactMonitor:
 
     def __init__(self, options: ContactOptions, weight: float) -> None:
         self._options = options
-        self._least = options.force * weight
+        self._least = _FORCE * weight
         self.standing = np.zeros(2, dtype=bool)
         self.begin()
 
@@ -105,6 +105,6 @@ class ContactMonitor:
     def _presses(self, foot: int, force: list[float], dt: float) -> bool:
         """Whether a foot presses against a wall now; one before it counts for a while."""
         along, up = force[0], force[-1]
-        wall = abs(along) > max(self._least, self._options.steepness * up)
+        wall = abs(along) > max(self._least, _STEEPNESS * up)
         self._wall[foot] = self._options.linger if wall and along < 0.0 else self._wall[foot] - dt
         return wall

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from template_control.checks.checked import Checked
-from template_control.embedding.references.swing_foot import SwingOptions
+from template_control.embedding.swing import SwingOptions
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Leg, Phase

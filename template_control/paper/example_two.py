@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from template_control.embedding.guards import GuardOptions
+from template_control.embedding.modes import GuardOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.walking.lqr import LqrPlanner

@@ -9,14 +9,15 @@ from math import atan2, cos, degrees, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.controller import FreeController
+from template_control.embedding.free.lateral import SIDES
 from template_control.embedding.free.options import FreeOptions
-from template_control.embedding.free.sideways import SIDES
+from template_control.embedding.ground import STEEPEST
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.planner import Planner, Planners
-from template_control.embedding.references.apex_pose import ApexStart, apex_pose
 from template_control.embedding.standing.pose import standing_pose
 from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
@@ -202,7 +203,7 @@ class PlanarBackend(RobotBackend):
         """
         pose = standing_pose(controller.planning.route.parameters, ground=o.plant.ground_height)
         (rear, low), (front, high) = pose.feet.tolist()
-        slope, believed = atan2(high - low, front - rear), controller.options.slope.steepest
+        slope, believed = atan2(high - low, front - rear), STEEPEST
         if not -believed <= slope <= min(believed, _UPHILL):
             raise ParameterError(
                 f"{self.robot.name} stands on ground of {degrees(slope):.1f} degrees: let the run"

@@ -20,7 +20,7 @@ from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.robot_template import template_for
-from template_control.embedding.section_report import SectionReport
+from template_control.embedding.state import SectionReport
 from template_control.errors import DivergedError, ParameterError
 from template_control.plant.plant import Plant, plant_name
 from template_control.robot.biped import Biped

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.free.hurry import Outlook, hurried
 from template_control.embedding.free.kernels import FREE
+from template_control.embedding.free.lateral import BEYOND, SIDES, Outlook, Sideways, hurried
 from template_control.embedding.free.options import FreeOptions
-from template_control.embedding.free.sideways import SIDES, Sideways
 from template_control.embedding.planners.planner import Decision, Planner, Planners, decided
-from template_control.embedding.references.swing_foot import quintic_step
+from template_control.embedding.swing import quintic_step
 from template_control.robot.free.free_biped import FreeBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -29,6 +28,7 @@ from template_control.slip.automaton.vocabulary import Event, Leg
 from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import Route
+from template_control.slip.similarity import Scale
 from template_control.warm_up import ready
 from template_control.whole_body.solver import Solution, Stance
 
@@ -68,6 +68,7 @@ class FreeController(EmbeddingController):
         ready(FREE)
         wish = LateralWish(self.options.step_width)
         self.sideways = Sideways(self.parameters, unscaled.lateral, wish)
+        self._reach = BEYOND * Scale.of(self.parameters).length
         self.turning: Callable[[float], float] = lambda time: 0.0
 
     def start(
@@ -131,7 +132,7 @@ class FreeController(EmbeddingController):
             feet = np.array([self._foot_side(foot) for foot in planning.feet])
             return self.sideways.outlook(planning.path, 0.0, self.sway(), feet)
 
-        best = hurried(report.decision, decide, look, self.options.hurry)
+        best = hurried(report.decision, decide, look, self._reach)
         if best is not planning.reports[-1].decision:
             self._follow(best)
 

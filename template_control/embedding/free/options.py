@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from template_control.checks.ranges import Positive, Share
-from template_control.embedding.free.hurry import HurryOptions
 from template_control.embedding.free.phases import FREE_PHASES
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PhaseControl
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
-from template_control.embedding.references.swing_foot import SwingOptions
+from template_control.embedding.swing import SwingOptions
 from template_control.estimation.noise_filter import NoiseFilterOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.lateral.gait import LateralOptions
@@ -30,7 +29,6 @@ class FreeOptions(EmbeddingOptions):
         swing: shape of the swings. A foot has to move aside too, and is not asked to be high.
         catches: a free robot has no run to break into.
         lateral: how the feet are placed sideways.
-        hurry: when a step ends sooner, as its foothold is out of reach sideways.
         noise_filter: of a state that is measured with noise; None: it is taken as it is measured.
         step_width: distance aside between left and right footholds [m]. Wider, and the
             robot sways more than its slow steps bear; narrower, and a push leaves less room.
@@ -45,7 +43,6 @@ class FreeOptions(EmbeddingOptions):
     swing: SwingOptions | None = field(default_factory=SwingOptions)
     catches: bool = tuned(False)
     lateral: LateralOptions = field(default_factory=LateralOptions)
-    hurry: HurryOptions = field(default_factory=HurryOptions)
     noise_filter: NoiseFilterOptions | None = field(default_factory=NoiseFilterOptions)
     step_width: Positive = tuned(0.22, LENGTH)
     stop_share: Share = tuned(0.0)

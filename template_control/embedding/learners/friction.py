@@ -9,10 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import NotNegative, Positive, Share
-from template_control.slip.similarity import SPEED, TIME, tuned
+from template_control.checks.ranges import NotNegative, Positive
+from template_control.slip.similarity import TIME, Scale, tuned
 
 Array = NDArray[np.float64]
+
+
+# A foot on the ground that moves faster along it slides [m/s, of the reference template]. Speeds
+# of a foot that stands are noise; 0.5 mrad of it is about 0.02 m/s there, which never stays this
+# large, and against the force, for the duration.
+SLIDING_SPEED = 0.05
+# Share of the weight that a foot carries at least. A small force's direction is not known well.
+_LOAD = 0.05
+# Share by which the ground has to be more slippery than believed, to be learnt.
+_DOUBT = 0.03
 
 
 @dataclass(frozen=True)
@@ -20,23 +30,14 @@ class FrictionOptions(Checked):
     """Tuning of the friction's estimate.
 
     Attributes:
-        speed: a foot on the ground that moves faster along it slides [m/s]. Speeds of a foot that
-            stands are noise; 0.5 mrad of it is about 0.02 m/s there, which never stays this
-            large, and against the force, for ``duration``.
-        duration: a foot has to slide for so long to tell anything [s].
+        duration: a foot has to slide for so long to teach anything [s].
         settling: for so long after a touchdown nothing is learnt [s]. The force is the impact's.
-        load: share of the weight that a foot carries at least. Of a small force the direction is
-            not known well.
-        doubt: share by which the ground has to be more slippery than thought, to be believed.
         lowest: coefficient that is believed. On less no gait stands, and a smaller one would come
             from a fault.
     """
 
-    speed: Positive = tuned(0.05, SPEED)
     duration: NotNegative = tuned(0.008, TIME)
     settling: NotNegative = tuned(0.005, TIME)
-    load: Positive = tuned(0.05)
-    doubt: Share = tuned(0.03)
     lowest: Positive = tuned(0.3)
 
 
@@ -74,17 +75,21 @@ class FrictionEstimate:
 
     Args:
         options: what counts as sliding.
-        told: the coefficient before anything is learnt.
+        before: the coefficient before anything is learnt.
         weight: of the robot [N].
+        scale: units of the template.
 
     Attributes:
         coefficient: the estimate.
     """
 
-    def __init__(self, options: FrictionOptions, told: float, weight: float) -> None:
+    def __init__(
+        self, options: FrictionOptions, before: float, weight: float, scale: Scale
+    ) -> None:
         self.options = options
-        self.coefficient = told
-        self._least = options.load * weight
+        self.coefficient = before
+        self._least = _LOAD * weight
+        self._speed = SLIDING_SPEED * scale.speed
         self._slides = (_Slide(), _Slide())
 
     def feel(self, standing: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
@@ -121,15 +126,13 @@ class FrictionEstimate:
 
     def _slides_on(self, slide: _Slide, force: list[float], speed: list[float]) -> bool:
         """Whether a foot that stands slides, so that friction holds it back."""
-        o = self.options
-        if slide.standing < o.settling or hypot(*speed[:-1]) <= o.speed:
+        if slide.standing < self.options.settling or hypot(*speed[:-1]) <= self._speed:
             return False
         return sum(f * v for f, v in zip(force[:-1], speed[:-1], strict=True)) < 0.0
 
     def _learn(self, slide: _Slide) -> None:
-        o = self.options
-        if slide.time < o.duration:
+        if slide.time < self.options.duration:
             return
-        ratio = max(slide.along / slide.normal, o.lowest)
-        if ratio < (1.0 - o.doubt) * self.coefficient:
+        ratio = max(slide.along / slide.normal, self.options.lowest)
+        if ratio < (1.0 - _DOUBT) * self.coefficient:
             self.coefficient = ratio

@@ -13,11 +13,19 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import NotNegative, Share
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.scenario.route import StrideGoal
-from template_control.slip.similarity import RATE, SPEED, tuned
+from template_control.slip.similarity import RATE, SPEED, Scale, tuned
+
+LEAN_RATE = 0.1
+"""Rate at which the lean changes at most [rad/s, of the reference template]."""
+GAIN = 0.2
+"""Share of a stride's mean error that changes the reference."""
+ERROR_BOUND = 0.05
+"""A larger mean error counts as this much [rad]: a push is no drift."""
+CORRECTION_BOUND = 0.25
+"""Of what the reference adds to the wanted mean [rad]."""
 
 
 @dataclass(frozen=True)
@@ -67,22 +75,14 @@ def _leans() -> dict[str, Lean]:
 
 @dataclass(frozen=True)
 class LeanOptions(Checked):
-    """How the trunk's lean is chosen and regulated.
+    """Lean of the trunk.
 
     Attributes:
         strides: the lean of each kind of stride; a kind that is missing keeps the controller's
             ``trunk_pitch``, and its mean pitch is not regulated.
-        rate: at which the lean changes at most [rad/s].
-        gain: share of a stride's mean error that changes the reference.
-        error_bound: a larger mean error counts as this much [rad]: a push is no drift.
-        bound: of the correction [rad].
     """
 
     strides: Mapping[str, Lean] = field(default_factory=_leans)
-    rate: NotNegative = tuned(0.1, RATE)
-    gain: Share = tuned(0.2)
-    error_bound: NotNegative = tuned(0.05)
-    bound: NotNegative = tuned(0.25)
 
     def of(self, goal: StrideGoal) -> Lean | None:
         """The lean of a stride; one without a lean of its own prepares that of the next kind."""
@@ -105,15 +105,17 @@ class TrunkLean:
     Args:
         options: by kind of stride and speed.
         upright: reference of the strides without a lean of their own [rad].
+        scale: units of the template.
 
     Attributes:
         mean: the mean pitch that is wanted now [rad].
         correction: what the reference adds to it [rad].
     """
 
-    def __init__(self, options: LeanOptions, upright: float) -> None:
+    def __init__(self, options: LeanOptions, upright: float, scale: Scale) -> None:
         self.options = options
         self._upright = upright
+        self._rate = LEAN_RATE * scale.factor(RATE)
         self.reset()
 
     def reset(self) -> None:
@@ -145,7 +147,7 @@ class TrunkLean:
             pitch: of the trunk [rad].
             dt: duration of the tick [s].
         """
-        most = self.options.rate * dt
+        most = self._rate * dt
         self.mean += min(max(self._goal - self.mean, -most), most)
         self._sum += (self.mean - pitch) * dt
         self._time += dt
@@ -158,7 +160,7 @@ class TrunkLean:
             nominal: whether the stride went near the gait. Another one teaches nothing.
         """
         if nominal and self._lean is not None and self._time > 0.0:
-            o = self.options
-            error = min(max(self._sum / self._time, -o.error_bound), o.error_bound)
-            self.correction = min(max(self.correction + o.gain * error, -o.bound), o.bound)
+            error = min(max(self._sum / self._time, -ERROR_BOUND), ERROR_BOUND)
+            correction = self.correction + GAIN * error
+            self.correction = min(max(correction, -CORRECTION_BOUND), CORRECTION_BOUND)
         self._sum = self._time = 0.0

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from template_control.embedding.learners.friction import FrictionEstimate
 from template_control.embedding.learners.lean import TrunkLean
-from template_control.embedding.learners.load import LoadEstimate
-from template_control.embedding.learners.momentum_trim import MomentumTrim
+from template_control.embedding.learners.momentum import LoadEstimate, MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.section_report import Learnt
-from template_control.embedding.stride_planning import StridePlanning
+from template_control.embedding.state import Learnt
+from template_control.embedding.supervisor import StridePlanning
 from template_control.robot.biped import Biped
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
 
@@ -35,11 +35,13 @@ class Learners:
     """
 
     def __init__(self, options: EmbeddingOptions, parameters: SlipParameters, robot: Biped) -> None:
-        self.load = LoadEstimate(options.load, robot.gravity)
-        self.trim = MomentumTrim(parameters, options.trim)
-        self.lean = TrunkLean(options.lean, options.trunk_pitch)
+        self.load = LoadEstimate(robot.gravity)
+        self.trim = MomentumTrim(parameters)
+        self.lean = TrunkLean(options.lean, options.trunk_pitch, Scale.of(parameters))
         weight = robot.mass * robot.gravity
-        self.friction = FrictionEstimate(options.slides, options.friction, weight)
+        self.friction = FrictionEstimate(
+            options.slides, options.friction, weight, Scale.of(parameters)
+        )
 
     @property
     def learnt(self) -> Learnt:

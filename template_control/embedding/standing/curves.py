@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.references.timed import TERMS, Quintic, quintics
+from template_control.embedding.com_path import TERMS, Quintic, quintics
 from template_control.embedding.standing.curve_search import Rules, best_quintic
 from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.parameters import SlipParameters

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.com_path import Quintic, chained, timed_stride
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.embedding.references.timed import Quintic, chained, timed_stride
 from template_control.embedding.standing.curves import BetweenFeet, Found
 from template_control.embedding.standing.options import StandingOptions
 from template_control.embedding.standing.vaults import Touchdown, Vault, Vaults

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.com_path import TERMS, Quintic, chained, timed_stride
 from template_control.embedding.planners.planner import Decision
-from template_control.embedding.references.timed import TERMS, Quintic, chained, timed_stride
 from template_control.embedding.standing.curves import BetweenFeet, Found
 from template_control.embedding.standing.passes import Pass, Passes
 from template_control.embedding.standing.planners import Curves, StandingGait

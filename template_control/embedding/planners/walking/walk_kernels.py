@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from template_control.embedding.com_path import LOCATE
+from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.gauss_newton import improve
 from template_control.embedding.planners.running_limits import (
     RunningLimits,
@@ -15,13 +17,11 @@ from template_control.embedding.planners.running_limits import (
 )
 from template_control.embedding.planners.walking.step_law import Law, Strain
 from template_control.embedding.planners.walking.step_search import Grid, Trust, choose
-from template_control.embedding.references.leg_forces import leg_forces
-from template_control.embedding.references.swing_foot import (
+from template_control.embedding.swing import (
     SwingOptions,
     quintic_step,
     swing_step,
 )
-from template_control.embedding.references.template_path import LOCATE
 from template_control.robot.library import load_robot
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, StrideKind

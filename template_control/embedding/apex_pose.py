@@ -1,4 +1,4 @@
-"""Where the feet are at the apex of a gait whose legs take turns, and how they move.
+"""Feet and trunk at the apex of a gait whose legs take turns, and their velocities.
 
 The trunk turns against the legs, so that the robot flies without angular momentum. Joint
 velocities that do not fit the gait cost a start far more torque than the gait itself.
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Pair
-from template_control.embedding.references.swing_foot import SwingFoot, SwingOptions
+from template_control.embedding.swing import SwingFoot, SwingOptions
 from template_control.errors import ParameterError
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, state_in

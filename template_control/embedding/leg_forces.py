@@ -2,40 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.checked import Checked
-from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
-from template_control.slip.similarity import tuned
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class UnloadOptions(Checked):
-    """Largest normal force of a foot that is about to lift off: near the template's.
+# Largest normal force of a foot that is about to lift off, over the template's. It is over 1, as
+# the robot's forces are not exactly the template's.
+_UNLOADED = 1.3
+_FLOOR = 0.025  # of the weight: it leaves a foot no load to lift off with, and the QP some room
 
-    Attributes:
-        share: of the template's force. It is over 1, as the robot's forces are not exactly the
-            template's.
-        floor: of the weight. It leaves a foot no load to lift off with, and the QP some room.
+
+def unload_cap(template_force: float, weight: float) -> float:
+    """Largest normal force of a foot that is about to lift off [N]: near the template's.
+
+    Args:
+        template_force: vertical force of the template's leg at this phase [N].
+        weight: of the robot, m g [N].
     """
-
-    share: NotNegative = tuned(1.3)
-    floor: NotNegative = tuned(0.025)
-
-    def cap(self, template_force: float, weight: float) -> float:
-        """Largest normal force that the foot may carry [N].
-
-        Args:
-            template_force: vertical force of the template's leg at this phase [N].
-            weight: of the robot, m g [N].
-        """
-        return self.share * max(template_force, 0.0) + self.floor * weight
+    return _UNLOADED * max(template_force, 0.0) + _FLOOR * weight
 
 
 @compiled

@@ -1,20 +1,50 @@
-"""The robot's state in the template's terms."""
+"""The robot's state in the template's terms, and the report of a section."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import isfinite
+from math import atan2, isfinite, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.references.feet import Feet
-from template_control.embedding.references.rolling import unrolled
+from template_control.embedding.planners.planner import Decision
+from template_control.embedding.swing import Feet
 from template_control.errors import DivergedError
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Leg
+from template_control.slip.maps.section import Section
+from template_control.slip.scenario.route import StrideGoal
 
 Array = NDArray[np.float64]
+
+
+def unrolled(lowest: float, state: Array, radius: float) -> float:
+    """The place that a rolling foot has its lowest point in as the CoM is over it.
+
+    That point moves on by the radius times the angle that the leg turns by. So the phase would go
+    on more slowly than the CoM, and the step would end later and slower than planned.
+
+    Args:
+        lowest: x of the foot's lowest point [m].
+        state: (4,) x, y, dx/dt, dy/dt of the CoM.
+        radius: of the foot [m].
+
+    Returns:
+        x of the template's toe [m].
+    """
+    return float(lowest - radius * atan2(state[0] - lowest, state[1]))
+
+
+def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
+    """Where the lowest point of a foot lands whose toe is to be at ``toe``: :func:`unrolled` back.
+
+    Args:
+        toe: x of the template's toe [m].
+        touchdown_angle: from the ground to the leg [rad].
+        radius: of the foot [m].
+    """
+    return toe - radius * (0.5 * pi - touchdown_angle)
 
 
 @dataclass
@@ -161,3 +191,51 @@ class Sensing:
 
     def _height(self, foot: int) -> float:
         return float(self._robot.foot_position[foot, 1])
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What the controller's learners know at a section.
+
+    Attributes:
+        load: the load factor.
+        trim: the momentum trim [m/s^2].
+        lean: what the trunk's reference adds to the wanted mean pitch [rad].
+    """
+
+    load: float
+    trim: float
+    lean: float
+
+
+@dataclass(frozen=True)
+class SectionReport:
+    """What the controller knew and chose at a section.
+
+    Attributes:
+        time: at which the section was reached [s].
+        section: VLO or APEX.
+        state: (3,) dx/dt (as the phase before senses it), y, dy/dt [m/s, m, m/s].
+        goal: the stride that begins, and where it is to lead.
+        target: (3,) dx/dt, y, dy/dt where it is to lead.
+        decision: the planner's choice for it.
+        offset: (3,) the planner's offset estimate.
+        learnt: what the learners knew.
+        plan_seconds: wall-clock time of the plan.
+    """
+
+    time: float
+    section: Section
+    state: Array
+    goal: StrideGoal
+    target: Array
+    decision: Decision
+    offset: Array
+    learnt: Learnt
+    plan_seconds: float
+
+    @property
+    def accepted(self) -> float:
+        """dx/dt that the planner took for the target's [m/s]."""
+        taken = self.decision.accepted
+        return float(self.target[0]) if taken is None else taken

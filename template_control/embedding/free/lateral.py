@@ -1,12 +1,23 @@
-"""Where the next foot lands to the left or right: asked at every tick, learnt at every step."""
+"""Lateral half of a walk: footholds to the left or right, found at every tick.
+
+Next to the stance foot the CoM falls away from it all the time: after t its distance has grown by
+about exp(t sqrt(g / z)). After a lateral push the next foothold may be wanted further away than
+the legs reach, or on the other side of the stance foot. A steeper touchdown angle puts the foot
+down earlier, while it still is in reach.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.free.hurry import Outlook, outlook
-from template_control.embedding.references.template_path import TemplatePath
+from template_control.embedding.com_path import TemplatePath
+from template_control.embedding.planners.planner import Decision
+from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.lateral.gait import (
     LateralCycle,
@@ -29,6 +40,70 @@ from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
 
 Array = NDArray[np.float64]
+
+
+BEYOND = 0.03
+"""A foothold that is wanted further than this beyond its bounds is out of reach [m, of the
+reference template]."""
+STEEPER = (0.02, 0.04, 0.06)
+"""Touchdown angles that are tried, over the one decided, in turn [rad]."""
+_GAIN = 0.8  # share that a steeper angle must leave of the error's price to be taken
+
+
+class Outlook(NamedTuple):
+    """What is expected of a step sideways.
+
+    Attributes:
+        beyond: how far the wanted foothold is beyond its bounds [m]; NaN where none is known.
+        price: of the error that is left at the section after the foothold.
+    """
+
+    beyond: float
+    price: float
+
+
+def outlook(found: Placement, aim: LateralAim) -> Outlook:
+    """What is expected of a foothold.
+
+    Args:
+        found: the foothold.
+        aim: what it was chosen for.
+    """
+    error = found.state(found.y) - aim.state
+    return Outlook(abs(found.wanted - found.y), float(error @ aim.cost @ error))
+
+
+def hurried(
+    decision: Decision,
+    decide: Callable[[float], Decision],
+    look: Callable[[Decision], Outlook],
+    reach: float = BEYOND,
+) -> Decision:
+    """The decision for a step, with a steeper touchdown where the foothold is out of reach.
+
+    Args:
+        decision: for the step as it would be.
+        decide: the step with a touchdown angle of at least so much [rad].
+        look: what is expected of a decision sideways.
+        reach: a foothold that is wanted further than this beyond its bounds is out of it [m].
+
+    Returns:
+        ``decision`` itself where its foothold is in reach, or no steeper step helps; else the step
+        that leaves the least error. It is not nominal.
+    """
+    best, now = decision, look(decision)
+    if not now.beyond > reach:
+        return decision
+    angle, bar = float(decision.controls[Slot.TOUCHDOWN_ANGLE]), _GAIN * now.price
+    for more in STEEPER:
+        steeper = decide(angle + more)
+        if not steeper.feasible:
+            break
+        then = look(steeper)
+        if then.price < bar:
+            best, bar = replace(steeper, nominal=False), then.price
+    return best
+
 
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of each foot, in the order of the robot's ``feet``."""

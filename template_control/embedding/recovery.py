@@ -1,43 +1,47 @@
-"""Breaking into another stride where the present one cannot go on."""
+"""Recovery: another stride where the present one cannot go on, a step where no curve rests."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from template_control.checks.fitting import asked
-from template_control.embedding.planners.planner import BreakingPlanner, Decision, Free, decided
-from template_control.embedding.planning.rest_of_stride import RestOfStride
-from template_control.embedding.section_report import SectionReport
-from template_control.embedding.sensing import Sensed
-from template_control.embedding.touchdown import free_controls
-from template_control.slip.automaton.automaton import BREAKS
+from template_control.embedding.planners.planner import (
+    BreakingPlanner,
+    CurvePlanner,
+    Decision,
+    Free,
+    decided,
+)
+from template_control.embedding.replanning import free_controls
+from template_control.embedding.rollout import RestOfStride
+from template_control.embedding.state import SectionReport, Sensed
+from template_control.slip.automaton.automaton import BREAKS, STEP_OUT
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
+from template_control.slip.dynamics.stride import Stride
 from template_control.slip.maps.section import REST, section_of
 from template_control.slip.scenario.catching import BreakingRoute
 from template_control.slip.scenario.route import StrideGoal
 
+Array = NDArray[np.float64]
 
-@dataclass(frozen=True)
-class Break:
-    """A stride that the robot breaks into.
 
-    Attributes:
-        node: that the robot is in then.
-        goal: the stride.
-        report: of the present section, with this stride in it.
-    """
-
-    node: Node
-    goal: StrideGoal
-    report: SectionReport
+# Stiffnesses over k0 with which a slow walk is tried before the robot comes to a stand.
+_LEGS = (0.4, 0.6, 0.8, 1.1)
 
 
 def find_break(
-    rest: RestOfStride, node: Node, report: SectionReport, sensed: Sensed, gap: tuple[float, float]
-) -> Break | None:
+    rest: RestOfStride,
+    node: Node,
+    report: SectionReport,
+    sensed: Sensed,
+    *,
+    excess: float,
+    turn: float,
+) -> tuple[Node, SectionReport] | None:
     """Another stride from here.
 
     Args:
@@ -45,14 +49,14 @@ def find_break(
         node: of the automaton, the robot's.
         report: of the present stride.
         sensed: the robot's state.
-        gap: how far off the robot's speed is [m/s], and how far the touchdown angle can still be
-            changed [rad].
+        excess: how far off the robot's speed is [m/s].
+        turn: how far the touchdown angle can still be changed [rad].
 
     Returns:
-        None where the route knows no other stride, or the template does not complete it.
+        The node that the robot is in then, and the report with the new stride in it; None where
+        the route knows no other stride, or the template does not complete it.
     """
     route, automaton = rest.planners.route, rest.automaton
-    excess, turn = gap
     if not isinstance(route, BreakingRoute):
         return None
     for goal in asked(route.instead, report.goal, float(sensed.state[2]), excess):
@@ -68,7 +72,8 @@ def find_break(
         decision = _decision(rest, other, replace(report, goal=goal), sensed, turn)
         if decision is not None and decision.feasible:
             target = end.padded(goal.target)
-            return Break(other, goal, replace(report, goal=goal, target=target, decision=decision))
+            asked(route.take, goal)
+            return other, replace(report, goal=goal, target=target, decision=decision)
     return None
 
 
@@ -77,7 +82,7 @@ def _goes_on(rest: RestOfStride, node: Node, report: SectionReport, sensed: Sens
     ahead, u = rest.ahead(node, sensed), report.decision.controls
     legs = [u]
     free = free_controls(rest.automaton, node)
-    for share in rest.planners.options.legs:
+    for share in _LEGS:
         other = u.copy()
         other[free] = share * rest.ground.leg_stiffness
         legs.append(other)
@@ -115,3 +120,35 @@ def _along_curve(
     planner = rest.planners.of(goal)
     decision, stride = rest.curve(node.name, sensed, sensed.state, planner, begun)
     return replace(decision, feasible=decision.feasible and stride.completed, lasting=True)
+
+
+def follow_curve(
+    rest: RestOfStride, node: str, sensed: Sensed, state: Array, report: SectionReport
+) -> tuple[SectionReport, Stride]:
+    """The curve of the stride's planner from here, or else the first step that leads to rest.
+
+    Args:
+        rest: of the present stride.
+        node: of the automaton, where a curve carries the robot.
+        sensed: the robot, for its toes and the acceleration wanted so far.
+        state: (4,) x, y, dx/dt, dy/dt.
+        report: of the present stride.
+
+    Returns:
+        The report with what holds from now on, and the stride from here. Its first node is
+        another one where a step is made instead.
+    """
+    planner = rest.planners.of(report.goal)
+    decision, stride = rest.curve(node, sensed, state, planner, report.decision)
+    if not decision.feasible:
+        for kind in STEP_OUT.get(node, ()):
+            other = rest.planners.planners.get(kind)
+            if not isinstance(other, CurvePlanner):
+                continue
+            start = rest.automaton.starts[kind]
+            first = decided(other.decide, REST.of(state))
+            instead, step = rest.curve(start, sensed, state, other, first)
+            if instead.feasible:
+                goal = replace(report.goal, stride=kind)
+                return replace(report, goal=goal, decision=instead), step
+    return replace(report, decision=decision), stride

@@ -1,0 +1,258 @@
+"""Slope of the ground, as the feet feel it, and the axes that are turned with it.
+
+In those axes a slope is level, and gravity is not vertical. Template, planners, references and QP
+live in them; only here is the world known.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import combinations
+from math import atan, cos, sin, tan
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.state import Sensing
+from template_control.embedding.supervisor import StridePlanning
+from template_control.robot.biped import Biped
+from template_control.robot.planar_biped import PlanarBiped
+
+Array = NDArray[np.float64]
+
+
+# Footholds that the slope's estimate looks back to. More of them make it slower on a slope that
+# begins, and surer where each foothold is a little off.
+_FOOTHOLDS = 3
+# Change of the estimate up to which the one before is kept [rad]. Nothing is learnt from a step in
+# which it changes. With 0.5 mrad of noise level ground looks 0.001 steep; what a slope this gentle
+# does, a planner's offset learns.
+_SLOPE_CHANGE = 0.004
+STEEPEST = 0.12
+"""Slope that is believed [rad]."""
+_SHORTEST = 0.1  # distance of two footholds that show a slope, over l0
+
+
+class SlopeEstimate:
+    """The median of the slopes between any two of the last footholds (Theil and Sen).
+
+    A single foothold that is off moves it little. Before a run the ground is taken to be level.
+
+    Args:
+        length: l0 of the template [m].
+
+    Attributes:
+        slope: the estimate, uphill positive [rad].
+        last: from the last foothold but one to the last [rad].
+    """
+
+    def __init__(self, length: float) -> None:
+        self._length = length
+        self._places: deque[tuple[float, float]] = deque(maxlen=_FOOTHOLDS)
+        self.slope = self.last = 0.0
+
+    def begin(self, place: tuple[float, float]) -> None:
+        """Forget an earlier run.
+
+        Args:
+            place: x and height of the foot that stands [m].
+        """
+        x, height = place
+        before = range(_FOOTHOLDS - 1, -1, -1)
+        self._places.extend((x - 0.5 * i * self._length, height) for i in before)
+        self.slope = self.last = 0.0
+
+    def stand(self, rear: tuple[float, float], front: tuple[float, float]) -> None:
+        """Both feet stand where a run begins: as if the ground before had been such.
+
+        Args:
+            rear, front: x and height of the feet in the world [m].
+        """
+        (x, height), (ahead, above) = rear, front
+        slope = atan((above - height) / (ahead - x))
+        if abs(slope) <= _SLOPE_CHANGE:
+            return
+        self.slope = self.last = min(max(slope, -STEEPEST), STEEPEST)
+        rise, last = tan(self.slope), self._places[-1]
+        before = range(len(self._places) - 1, -1, -1)
+        away = 0.5 * self._length
+        self._places.extend([(last[0] - i * away, last[1] - i * away * rise) for i in before])
+
+    def land(self, place: tuple[float, float], other: tuple[float, float]) -> None:
+        """A foot has landed.
+
+        Args:
+            place: its x and height in the world [m].
+            other: those of the other foot, which may have slid off an edge since it landed.
+        """
+        (x, height), (before, below) = place, other
+        if abs(x - before) > _SHORTEST * self._length:
+            last = atan((height - below) / (x - before))
+            self.last = min(max(last, -STEEPEST), STEEPEST)
+        self._places[-1] = other
+        self._places.append(place)
+        slopes = [
+            (far[1] - near[1]) / (far[0] - near[0])
+            for near, far in combinations(self._places, 2)
+            if abs(far[0] - near[0]) > _SHORTEST * self._length
+        ]
+        found = atan(median(slopes)) if slopes else self.slope
+        found = min(max(found, -STEEPEST), STEEPEST)
+        if abs(found - self.slope) > _SLOPE_CHANGE:
+            self.slope = found
+
+
+_BASE = 2  # the first coordinates are the base's place
+
+
+class SlopeFrame:
+    """Turns states into the ground's axes and what comes of them back into the world's.
+
+    Args:
+        robot: the model, whose gravity is turned as well; a free one stays in the world's axes.
+
+    Attributes:
+        angle: of the ground, uphill positive [rad].
+    """
+
+    def __init__(self, robot: Biped) -> None:
+        self._planar = robot if isinstance(robot, PlanarBiped) else None
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the world's axes."""
+        self.angle = 0.0
+        self._turn = np.eye(_BASE)
+        self._shift = np.zeros(_BASE)
+        self._level = True  # these are the world's axes
+        if self._planar is not None:
+            self._planar.turn_gravity(0.0)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the robot's kind can be looked at in other axes."""
+        return self._planar is not None
+
+    def lean(self, angle: float, place: Array) -> None:
+        """Take other axes.
+
+        Args:
+            angle: of the ground [rad].
+            place: (2,) a point in the present axes that keeps its coordinates [m].
+        """
+        if self._planar is None or angle == self.angle:
+            return
+        fixed = self.world(place)
+        self.angle = angle
+        c, s = cos(angle), sin(angle)
+        self._turn = np.array([[c, s], [-s, c]])
+        self._shift = place - self._turn @ fixed
+        self._level = angle == 0.0 and not self._shift.any()
+        self._planar.turn_gravity(angle)
+
+    def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """A robot's state in these axes; the arrays that are given stay as they are.
+
+        Args:
+            q: (nq,) configuration in the world.
+            v: (nv,) velocity in the world.
+        """
+        if self._level:
+            return q, v
+        inside, speed = q.copy(), v.copy()
+        inside[:_BASE] = self._turn @ q[:_BASE] + self._shift
+        inside[_BASE] += self.angle
+        speed[:_BASE] = self._turn @ v[:_BASE]
+        return inside, speed
+
+    def inward(self, vector: Array) -> Array:
+        """(..., 2) vectors in these axes, from the world's."""
+        return vector if self.angle == 0.0 else vector @ self._turn.T
+
+    def world(self, place: Array) -> Array:
+        """(..., 2) places in the world, from these axes [m]."""
+        return place if self._level else (place - self._shift) @ self._turn
+
+    def point(self, x: float, y: float) -> tuple[float, float]:
+        """As :meth:`world`, of one place."""
+        if not self._level:
+            x, y = self.world(np.array([x, y])).tolist()
+        return x, y
+
+    def outward(self, vector: Array) -> Array:
+        """(..., n) vectors in the world's axes; their first two numbers are turned."""
+        if self.angle == 0.0:
+            return vector
+        turned = vector.copy()
+        turned[..., :_BASE] = vector[..., :_BASE] @ self._turn
+        return turned
+
+
+class SlopingGround:
+    """Learns how steep the ground is, and turns the axes as far as the planner knows slopes.
+
+    Args:
+        robot: the model; every tick updates it, in these axes.
+        length: l0 of the template [m].
+
+    Attributes:
+        frame: the axes.
+        slope: the estimate.
+        told: the robot's configuration and velocity in the world, as they were measured last.
+    """
+
+    told: tuple[Array, Array]
+
+    def __init__(self, robot: Biped, length: float) -> None:
+        self._robot = robot
+        self.frame = SlopeFrame(robot)
+        self.slope = SlopeEstimate(length)
+
+    def begin(self, foot: int) -> None:
+        """Forget an earlier run; ``foot`` stands."""
+        self.slope.begin(self._foothold(foot))
+
+    def stand(self, foot: int, other: int) -> None:
+        """Both feet stand: the ground is as steep as the line through them.
+
+        Args:
+            foot, other: the rear and the front one.
+        """
+        self.slope.stand(self._foothold(foot), self._foothold(other))
+
+    def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """As :meth:`.SlopeFrame.enter`; what is told is kept."""
+        self.told = q, v
+        return self.frame.enter(q, v)
+
+    def land(self, foot: int) -> None:
+        """A foot has landed: learn the slope."""
+        self.slope.land(self._foothold(foot), self._foothold(1 - foot))
+
+    def lean(self, slope: float, foot: int, planning: StridePlanning, sensing: Sensing) -> bool:
+        """Turn the axes about a foot, and read the robot's model in them.
+
+        Args:
+            slope: of the ground [rad].
+            foot: that keeps its coordinates.
+            planning: which is asked what slope it plans for.
+            sensing: whose state has to be read again if the axes have turned.
+
+        Returns:
+            Whether they turned.
+        """
+        robot, frame = self._robot, self.frame
+        slope = planning.on_slope(slope) if frame.turns else 0.0
+        if slope == frame.angle:
+            return False
+        unhit = frame.outward(sensing.unhit)
+        frame.lean(slope, robot.foot_position[foot].copy())
+        sensing.unhit[:] = frame.inward(unhit)
+        robot.update(*frame.enter(*self.told))
+        return True
+
+    def _foothold(self, foot: int) -> tuple[float, float]:
+        """x and height of a foot in the world [m]."""
+        x, y = self._robot.foot_position[foot].tolist()
+        return self.frame.point(x, y)

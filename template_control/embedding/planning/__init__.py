@@ -1,1 +1,0 @@
-"""What happens between two sections: the decision, the path that follows it, and plans anew."""

@@ -1,0 +1,371 @@
+"""Decisions of a route's planners at the sections, and the template's strides from there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence, Set
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import Checked
+from template_control.checks.fitting import asked, check, name_of, shown
+from template_control.checks.ranges import NotNegative, Range, Shape, Triple
+from template_control.embedding.planners.planner import (
+    Ahead,
+    CurvePlanner,
+    Decision,
+    ForgettingPlanner,
+    Planner,
+    Planners,
+    curved,
+    decided,
+)
+from template_control.embedding.state import Learnt, SectionReport, Sensed
+from template_control.errors import ParameterError
+from template_control.slip.automaton.hybrid import Automaton, Node
+from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.dynamics.stride import Stride, StrideSimulator
+from template_control.slip.maps.section import Section, section_of
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import Route, StrideGoal
+from template_control.slip.similarity import SPEED, TIME, Scale, tuned
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ReplanOptions(Checked):
+    """When a stride is planned anew between two sections.
+
+    Attributes:
+        speed: deviation of the forward speed from the path's [m/s].
+        interval: shortest time between such plans [s].
+        patience: a touchdown that is later than this [s] is not waited for on the same path.
+    """
+
+    speed: Annotated[float, Range(0.0, endless=True)] = tuned(0.05, SPEED)
+    interval: NotNegative = tuned(0.02, TIME)
+    patience: Annotated[float, Range(0.0, endless=True)] = tuned(0.01, TIME)
+
+
+# Shares of dy/dt, tried in turn, of the states that a path starts from where the template cannot
+# go on from the robot's: its leg cannot pull, the robot's can.
+_CALMER = (0.5, 0.0)
+_HIGHEST = 0.99  # of l0: above this height no such path starts
+_TARGETS = {size: Annotated[Array, Shape((size,))] for size in (2, 3)}
+
+
+class RoutePlanners:
+    """Decides at the sections of a route.
+
+    Args:
+        route: which stride comes next, and towards which state.
+        planners: one for each kind of stride of the route.
+        automaton: of the strides.
+    """
+
+    def __init__(self, route: Route, planners: Planners, automaton: Automaton) -> None:
+        self.route = route
+        self.planners = planners
+        self.automaton = automaton
+
+    def reset(self) -> None:
+        """Forget an earlier run."""
+        asked(self.route.reset)
+        for planner in self.planners.values():
+            asked(planner.reset)
+
+    def first_goal(self) -> StrideGoal:
+        """The stride that the route begins with.
+
+        Raises:
+            ParameterError: if the route is empty.
+        """
+        goal = self.ahead(self.route.section, self.route.start, 0.0)
+        if goal is None:
+            raise ParameterError("the route ends where it begins: give one with a stride")
+        return goal
+
+    def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """As :meth:`~template_control.slip.scenario.route.Route.next`, checked.
+
+        Args:
+            section: where the robot is.
+            z: (n,) its state there.
+            now: time [s].
+
+        Raises:
+            ParameterError: naming the route's class, if it asks for no stride that there is.
+        """
+        return self._goal(self.route.next, section, z, now)
+
+    def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """As :meth:`~template_control.slip.scenario.route.Route.ahead`, checked as :meth:`next`.
+
+        Arguments as for :meth:`next`.
+        """
+        return self._goal(self.route.ahead, section, z, now)
+
+    def _goal(
+        self, method: Callable[[Section, Array, float], StrideGoal | None], *where: Any
+    ) -> StrideGoal | None:
+        goal = asked(method, *where)
+        if goal is None:
+            return None
+        if not isinstance(goal, StrideGoal):
+            raise ParameterError(
+                f"{name_of(method)} returned {shown(goal)}: return a StrideGoal, or None at the end"
+            )
+        if goal.stride not in self.automaton.starts:
+            raise ParameterError(
+                f"{name_of(method)} asks for a stride {goal.stride!r}: give one of"
+                f" {', '.join(self.automaton.starts)}"
+            )
+        end = section_of(self.automaton.sections(self.automaton.starts[goal.stride])[1])
+        check(f"{name_of(method)}: the target", goal.target, _TARGETS[end.dimension])
+        return goal
+
+    def of(self, goal: StrideGoal) -> Planner:
+        """The planner of a goal's stride.
+
+        Raises:
+            ParameterError: if there is none.
+        """
+        if goal.stride not in self.planners:
+            raise ParameterError(
+                f"the route asks for a stride {goal.stride!r}, and there are planners for"
+                f" {', '.join(self.planners)}: give one for it too, or another route"
+            )
+        return self.planners[goal.stride]
+
+    def decide(
+        self,
+        section: Section,
+        z: Array,
+        now: float,
+        learnt: Learnt,
+        reports: Sequence[SectionReport],
+    ) -> tuple[SectionReport, Array, bool]:
+        """Learn from the stride that ended, ask the route for the next one, and plan it.
+
+        Args:
+            section: that was reached.
+            z: (n,) state there.
+            now: time [s].
+            learnt: what the controller has learnt, for the report.
+            reports: of the strides so far; none at the start.
+
+        Returns:
+            What was decided, the section state from which its path starts, and whether the route
+            goes on.
+        """
+        begin = time.perf_counter()
+        if reports:
+            last = reports[-1]
+            asked(self.of(last.goal).observe, last.decision, z)
+        wanted = self.next(section, z, now)
+        # The last stride goes on until whoever drives the robot ends the run.
+        goal = reports[-1].goal if wanted is None else wanted
+        planner = self.of(goal)
+        other = reports and reports[-1].goal.stride != goal.stride
+        if other and isinstance(planner, ForgettingPlanner):
+            asked(planner.forget)
+        decision, start = self.plan(section, z, goal)
+        seconds = time.perf_counter() - begin
+        end = section_of(self.automaton.sections(self.automaton.start(goal.stride).name)[1])
+        report = SectionReport(
+            time=now,
+            section=section,
+            state=section.padded(z),
+            goal=goal,
+            target=end.padded(goal.target),
+            decision=decision,
+            offset=check(f"{type(planner).__name__}.offset", planner.offset, Triple).copy(),
+            learnt=learnt,
+            plan_seconds=seconds,
+        )
+        return report, start, wanted is not None
+
+    def plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
+        """A decision at ``z``, and the section state from which its path starts.
+
+        The template's leg ends at l0, cannot pull, and pushes as its spring does; the robot's
+        need not. Where the template would leave the ground or come to no second stride, the
+        path starts from a state that does, and the robot is let down or pushed up to it.
+
+        Args:
+            section: that was reached.
+            z: (n,) state there.
+            goal: the stride that begins.
+        """
+        planner = self.of(goal)
+        decision = decided(planner.decide, z, goal.target)
+        if decision.lasting:
+            return decision, z
+        for share in _CALMER:
+            start = section.calmer(z, share, _HIGHEST * self.route.parameters.rest_length)
+            calmer = decided(planner.decide, start, goal.target)
+            if calmer.lasting:  # from there; from here a run may be the better way
+                feasible = decision.feasible
+                return replace(calmer, feasible=feasible, lasting=False, nominal=False), start
+        return decision, z
+
+
+class RestOfStride:
+    """Runs the template from the robot's state.
+
+    Args:
+        planners: of the route.
+        automaton: of the strides.
+        curved: nodes in which the planner's curve is followed, not the template's springs.
+
+    Attributes:
+        scale: units of the template, by which tuned numbers are multiplied.
+    """
+
+    def __init__(self, planners: RoutePlanners, automaton: Automaton, curved: Set[str]) -> None:
+        self.planners = planners
+        self.automaton = automaton
+        self.curved = curved
+        self._parameters = planners.route.parameters
+        self.scale = Scale.of(self._parameters)
+        self._simulator = self._mirrored = StrideSimulator(self._parameters, automaton)
+
+    def stand_on(self, ground: SlipParameters) -> bool:
+        """Run the template on other ground.
+
+        Args:
+            ground: whose slope and assist count.
+
+        Returns:
+            Whether it is other ground.
+        """
+        p = replace(self._parameters, slope=ground.slope, assist=ground.assist)
+        if p == self._simulator.parameters:
+            return False
+        self._simulator = StrideSimulator(p, self.automaton)
+        # Uphill is downhill for one who walks back.
+        self._mirrored = StrideSimulator(replace(p, slope=-p.slope), self.automaton)
+        return True
+
+    @property
+    def ground(self) -> SlipParameters:
+        """The template on its present ground."""
+        return self._simulator.parameters
+
+    def onward(self, node: str, sensed: Sensed, state: Array, u: Array) -> Stride:
+        """The template's stride from ``node`` on.
+
+        Args:
+            node: of the automaton, where its springs carry it.
+            sensed: the robot, for its toes.
+            state: (4,) x, y, dx/dt, dy/dt.
+            u: controls by Slot.
+        """
+        return self._simulator.run(node, state, u, _toes(sensed))
+
+    def curve(
+        self, node: str, sensed: Sensed, state: Array, planner: Planner, decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """The planner's curve from here; what it decides on the way holds from now on.
+
+        Args:
+            node: of the automaton, where a curve carries the robot.
+            sensed: the robot, for its toes and the acceleration wanted so far.
+            state: (4,) x, y, dx/dt, dy/dt.
+            planner: of the stride.
+            decision: what holds so far.
+
+        Raises:
+            ParameterError: if the planner has none.
+        """
+        if not isinstance(planner, CurvePlanner):
+            raise ParameterError(
+                f"{type(planner).__name__} plans no curve for node {node}: give it a method curve"
+            )
+        start = np.column_stack((state[:2], state[2:4], sensed.acceleration))
+        return curved(planner.curve, node, start, _toes(sensed), decision)
+
+    def strides(
+        self, node: Node, first: Stride, goal: StrideGoal, now: float
+    ) -> tuple[list[Stride], bool]:
+        """A stride and those after it whose footholds must be known.
+
+        The next foothold must be known when the swing begins, before the next section. Where
+        no foot stands, the second one's is still further.
+
+        Args:
+            node: that the first stride begins in.
+            first: the first stride.
+            goal: of strides after the route's end.
+            now: time at which the first stride begins [s].
+
+        Returns:
+            The strides, and whether the template completes them all and lasts.
+        """
+        strides, whole, start, at = [first], True, node.name, now
+        more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
+        while more and strides[-1].completed:
+            last = strides[-1]
+            at += last.duration
+            section = section_of(self.automaton.sections(start)[1])
+            z = section.of(last.state)
+            then = self.planners.ahead(section, z, at) or goal
+            ahead = decided(self.planners.of(then).decide, z, then.target)
+            whole = whole and ahead.lasting
+            start = self.automaton.start(then.stride).name
+            if start in self.curved:
+                break  # both feet stand: there is no foothold to know
+            toes = (float(last.toes[0]), float(last.toes[1]))
+            strides.append(self._simulator.run(start, last.state, ahead.controls, toes))
+            more -= 1
+        return strides, whole and all(stride.completed for stride in strides)
+
+    def ahead(self, node: Node, sensed: Sensed) -> Ahead:
+        """Where the present stride ends from here, by its controls.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+        """
+        toes, state = _toes(sensed), sensed.state.copy()
+        end = section_of(self.automaton.sections(node.name)[1])
+
+        def ahead(u: Array) -> tuple[Array, Outcome]:
+            stride = self._simulator.run(node.name, state, u, toes)
+            return end.of(stride.state), stride.outcome
+
+        return ahead
+
+    def back_to_section(self, node: Node, controls: Array, sensed: Sensed) -> Array | None:
+        """The section state from which the template would have come to where the robot is.
+
+        The template's dynamics are the same forward and backward: its past is the mirror
+        image of the future of the mirrored state.
+
+        Args:
+            node: of the automaton, the robot's.
+            controls: (NUM_SLOTS,) that the stride so far had.
+            sensed: the robot's state.
+
+        Returns:
+            None where the template cannot have come from there.
+        """
+        x, y, dx, dy = sensed.state.tolist()
+        before = self.automaton.before(node.name)
+        u = controls.copy()
+        if before.rear is not None and node.rear is not None:
+            u[before.rear] = u[node.rear]
+        mirrored = [float(sensed.toes[0]) - x, y, dx, -dy]
+        past = self._mirrored.run(before.name, mirrored, u)
+        if not past.completed:
+            return None
+        section = section_of(self.automaton.sections(before.name)[1])
+        return section.mirror(section.of(past.state))
+
+
+def _toes(sensed: Sensed) -> tuple[float, float]:
+    return float(sensed.toes[0]), float(sensed.toes[1])

@@ -1,0 +1,391 @@
+"""Supervision of a stride: decision at its section, the template's path, new plans on the way.
+
+The path is planned at a section, again where a foot has landed, and again when a disturbance has
+carried the robot away from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.fitting import answered
+from template_control.embedding.com_path import Landing, TemplatePath, join
+from template_control.embedding.planners.planner import (
+    BreakingPlanner,
+    CurvePlanner,
+    Decision,
+    Planner,
+    Planners,
+    PricingPlanner,
+    SlopePlanner,
+)
+from template_control.embedding.recovery import find_break, follow_curve
+from template_control.embedding.replanning import (
+    HEIGHT_ERROR,
+    all_controls,
+    choose_after_touchdown,
+    choose_on_unexpected_ground,
+    reachable_angles,
+    reachable_turn,
+    steady,
+    stiffnesses,
+)
+from template_control.embedding.rollout import ReplanOptions, RestOfStride, RoutePlanners
+from template_control.embedding.state import Learnt, SectionReport, Sensed
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.hybrid import Automaton, Node
+from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot
+from template_control.slip.maps.section import Section
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import Route, StrideGoal
+
+Array = NDArray[np.float64]
+
+
+_TOUCHDOWN = int(Event.TOUCHDOWN)
+_ANGLE_DROP = 0.15  # [rad] by which the touchdown angle of an overdue touchdown is taken lower
+
+
+class StridePlanning:
+    """Decides at the sections, keeps the decision and the path, and plans again on the way.
+
+    Args:
+        route: which stride comes next, and towards which state.
+        planners: one for each kind of stride of the route.
+        options: when to plan again.
+        automaton: of the strides.
+        curved: nodes in which the planner's curve is followed, not the template's springs.
+
+    Attributes:
+        reports: one a section, the start's included.
+        path: the template's, from the last plan on.
+        dues: time on the path at which each :class:`Event` comes next [s], inf if it does not.
+        feet: that were the rear and the front leg's where the path starts.
+        reaching: the swing foot is overdue, and the path goes on without it.
+        arrived: the route has ended.
+        height_error: of the ground under a foot that has landed, from which on it is unexpected
+            [m].
+    """
+
+    path: TemplatePath
+
+    def __init__(
+        self,
+        route: Route,
+        planners: Planners,
+        options: ReplanOptions,
+        automaton: Automaton = AUTOMATON,
+        curved: Set[str] = frozenset(),
+    ) -> None:
+        self.route = route
+        self.planners = planners
+        self.options = options
+        self.automaton = automaton
+        self.curved = curved
+        self.parameters: SlipParameters = route.parameters
+        self.reports: list[SectionReport] = []
+        self.dues = [np.inf] * NUM_EVENTS
+        self.feet = (0, 1)
+        self.reaching = False
+        self.arrived = False
+        self._passed = 0  # so many of the path's events are over
+        self._planned_at = 0.0
+        self._whole = True  # the template completes the path's strides, and goes on
+        self._broken = False  # into the present stride
+        self._excess = 0.0  # speed at the stride's section less the wanted, and what came on top
+        self._planners = RoutePlanners(route, planners, automaton)
+        self._rest = RestOfStride(self._planners, automaton, curved)
+        self.height_error = HEIGHT_ERROR * self._rest.scale.length
+
+    def begin(self, section: Section) -> tuple[Planner, Node]:
+        """Planner and first node of the stride that the route begins with, at ``section``.
+
+        Everything of an earlier run is forgotten.
+
+        Raises:
+            ParameterError: if the route is empty, or there is no planner for that stride.
+        """
+        self._planners.reset()
+        self._rest.stand_on(self.parameters)
+        self.reports.clear()
+        self.arrived = False
+        goal = self.first_goal()
+        return self._planners.of(goal), self.automaton.start(goal.stride)
+
+    def first_goal(self) -> StrideGoal:
+        """The stride that the route begins with.
+
+        Raises:
+            ParameterError: if the route is empty.
+        """
+        return self._planners.first_goal()
+
+    @property
+    def planner(self) -> Planner:
+        """The planner of the present stride."""
+        return self._planners.of(self.reports[-1].goal)
+
+    # -- decisions ----
+
+    def decide(self, section: Section, sensed: Sensed, now: float, learnt: Learnt) -> Node:
+        """At a section: learn from the stride that ended, choose the next one's controls.
+
+        Args:
+            section: that was reached.
+            sensed: the robot's state.
+            now: time [s].
+            learnt: what the controller has learnt, for the report.
+
+        Returns:
+            The node that the stride begins in.
+        """
+        z = section.of(sensed.state)
+        report, start, goes_on = self._planners.decide(section, z, now, learnt, self.reports)
+        self.arrived = self.arrived or not goes_on
+        self._broken = False
+        self._excess = float(z[0] - report.goal.target[0])
+        self.reports.append(report)
+        node = self.automaton.start(report.goal.stride)
+        state = sensed.state.copy()
+        if start is not z:
+            state[:4] = section.state(start, state[0])
+        node = self._follow(node, state, sensed, now)
+        if not report.decision.lasting and not self.arrived:
+            return self._break(node, sensed, 0.0, now) or node
+        return node
+
+    def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node | None:
+        """Break into another stride where the present one cannot go on.
+
+        Arguments as for :meth:`reconsider`.
+
+        Returns:
+            The node that the robot is in then, with the path from there; None where the route
+            knows no other stride, or the template does not complete it.
+        """
+        rest, report = self._rest, self.reports[-1]
+        turn = reachable_turn(rest.scale, self.due(Event.TOUCHDOWN) - phase_time)
+        found = find_break(rest, node, report, sensed, excess=self._excess, turn=turn)
+        if found is None:
+            return None
+        node, self.reports[-1] = found
+        self._broken = True
+        return self.follow(node, sensed, now)
+
+    def overdue(self, node: Node, phase_time: float) -> bool:
+        """Whether the swing foot should have found the ground by now.
+
+        Args:
+            node: of the automaton, the robot's.
+            phase_time: time along the path [s].
+        """
+        late = phase_time > self.dues[_TOUCHDOWN] + self.options.patience
+        return late and not self.reaching and node.edge(Event.TOUCHDOWN) is not None
+
+    def reach_on(self, node: Node, sensed: Sensed, now: float) -> None:
+        """The ground is lower than was thought: the template goes on without a touchdown.
+
+        Arguments as for :meth:`follow`.
+        """
+        self.follow(node, sensed, now, _ANGLE_DROP)
+
+    def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
+        """Whether a disturbance has carried the robot away from its path.
+
+        A path that leads nowhere is one as well, where the robot has broken into its stride, no
+        stride went on, or the planner may find another way.
+
+        Args:
+            deviation: of the forward speed from the path's [m/s].
+            phase_time: time along the path [s].
+            now: time [s].
+        """
+        o = self.options
+        if self.reaching or now - self._planned_at <= o.interval:
+            return False
+        if abs(deviation) > o.speed and phase_time > o.interval:
+            self._excess += deviation
+            return True
+        return not self._whole and (self._broken or self._gave_up())
+
+    def _gave_up(self) -> bool:
+        """Whether no stride went on, or the planner knows what the next ones are worth.
+
+        Such a planner may find another way. One along a curve is left to it.
+        """
+        if isinstance(self.planner, CurvePlanner):
+            return False
+        return not self.reports[-1].decision.feasible or isinstance(self.planner, PricingPlanner)
+
+    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
+        """Plan again from here; until a leg lands, the stride's controls are still free.
+
+        From then on the stiffnesses of what is left are, to a planner that has ``land``.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            phase_time: time along the path [s].
+            now: time [s].
+
+        Returns:
+            The node that the robot is in then.
+        """
+        rest, report = self._rest, self.reports[-1]
+        if self._broken:
+            other = self._break(node, sensed, phase_time, now)
+            if other is not None:
+                return other
+            if not isinstance(self.planner, BreakingPlanner):
+                self.hold(stiffnesses(rest, node, sensed, report))
+            return self.follow(node, sensed, now)
+        lasting = True
+        if node.name != self.automaton.starts[report.goal.stride] or node.name in self.curved:
+            self.hold(stiffnesses(rest, node, sensed, report))
+        else:
+            to_go = self.due(Event.TOUCHDOWN) - phase_time
+            angles = reachable_angles(rest, node, sensed, report, to_go)
+            decision = all_controls(rest, node, sensed, report, angles)
+            self.hold(decision)
+            lasting = decision is None or decision.lasting
+        node = self.follow(node, sensed, now)
+        if lasting and self._whole:
+            return node
+        return self._break(node, sensed, 0.0, now) or node
+
+    def replan_after_touchdown(
+        self, node: Node, sensed: Sensed, now: float, height_error: float, *, choose: bool
+    ) -> Node:
+        """Plan from where a foot has landed.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            now: time [s].
+            height_error: height of the ground over the other foot's [m].
+            choose: whether the stiffnesses that are still free are chosen again in any case, and
+                not only where the ground is higher or lower than expected.
+
+        Returns:
+            As :meth:`follow`.
+        """
+        rest, report = self._rest, self.reports[-1]
+        if choose:
+            self.hold(choose_after_touchdown(rest, node, sensed, report))
+        elif abs(height_error) > self.height_error and node.name not in self.curved:
+            self.hold(choose_on_unexpected_ground(rest, node, sensed, report, height_error))
+        return self.follow(node, sensed, now)
+
+    def hold(self, decision: Decision | None) -> None:
+        """From now on this decision holds for the present stride, if it is one.
+
+        Args:
+            decision: for it; None: the one so far.
+        """
+        if decision is not None:
+            self.reports[-1] = replace(self.reports[-1], decision=decision)
+
+    def on_slope(self, slope: float) -> float:
+        """Plan for another slope from now on.
+
+        Args:
+            slope: angle of the ground [rad].
+
+        Returns:
+            The slope that is planned for: 0 by a planner that knows none, or no gait there.
+        """
+        report, ground = self.reports[-1], self.parameters
+        # All of them: the strides ahead may be others' than the present one.
+        answers = {
+            id(planner): answered(SlipParameters, planner.on_slope, slope)
+            for planner in self.planners.values()
+            if isinstance(planner, SlopePlanner)
+        }
+        ground = answers.get(id(self.planner), ground)
+        if isinstance(self.planner, CurvePlanner) and ground.slope:
+            # No spring carries along a curve, but in the strides after it.
+            assists = (answer.assist for answer in answers.values())
+            ground = replace(ground, assist=next(filter(None, assists), 0.0))
+        if self._rest.stand_on(ground):
+            self.hold(replace(report.decision, nominal=False))
+        return ground.slope
+
+    @property
+    def ground(self) -> SlipParameters:
+        """The template on its present ground."""
+        return self._rest.ground
+
+    def steady(self, node: Node, sensed: Sensed) -> None:
+        """Choose the assist of a double stance that begins on ground that was not expected.
+
+        Arguments as for :meth:`follow`. The assist is a slope's: it is left to planners of slopes.
+        """
+        planner = self.planner
+        if isinstance(planner, SlopePlanner) and not isinstance(planner, CurvePlanner):
+            steady(self._rest, node, sensed, self.reports[-1])
+
+    # -- the path ----
+
+    def follow(self, node: Node, sensed: Sensed, now: float, angle_drop: float = 0.0) -> Node:
+        """Template path from here to the touchdown after the next section.
+
+        Args:
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            now: time [s].
+            angle_drop: how much lower the touchdown angle is than decided [rad].
+
+        Returns:
+            The node that the path begins in: of another stride where a curve led to no rest.
+        """
+        return self._follow(node, sensed.state, sensed, now, angle_drop)
+
+    def _follow(
+        self, node: Node, state: Array, sensed: Sensed, now: float, angle_drop: float = 0.0
+    ) -> Node:
+        report = self.reports[-1]
+        u = report.decision.controls
+        if angle_drop:
+            u = u.copy()
+            u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
+        self.reaching = angle_drop > 0.0
+        if node.name in self.curved:
+            self.reports[-1], first = follow_curve(self._rest, node.name, sensed, state, report)
+            node = self.automaton.node(first.start)
+        else:
+            first = self._rest.onward(node.name, sensed, state, u)
+        strides, self._whole = self._rest.strides(node, first, report.goal, now)
+        self.path, self.feet = join(strides, self._rest.scale.time), sensed.feet
+        self._look_ahead(0)
+        self._planned_at = now
+        return node
+
+    def due(self, event: Event) -> float:
+        """Time on the path at which ``event`` comes next [s], inf if it does not."""
+        return self.dues[event]
+
+    def pass_event(self, event: Event) -> None:
+        """The robot has fired ``event``."""
+        self._look_ahead(self.path.after(event, self._passed))
+
+    def _look_ahead(self, passed: int) -> None:
+        """So many of the path's events are over: note when each comes next."""
+        self._passed = passed
+        self.dues = self.path.dues(passed)
+
+    def landing(self, foot: int) -> Landing:
+        """Where and when on the path a foot next touches down."""
+        return self.path.landings[self.feet.index(foot)]
+
+    @property
+    def toe(self) -> float:
+        """x of the template's rear toe [m]."""
+        return float(self.path.curve.look[0])
+
+    def stand_on(self, foot: int) -> None:
+        """The template's rear toe is now the one that was this foot's at the start of the path."""
+        self.path.curve.look[0] = self.path.toes[self.feet.index(foot)]
