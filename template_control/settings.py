@@ -8,8 +8,7 @@ such as a table of tasks, is given in Python only.
 
 from __future__ import annotations
 
-import json
-import math
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
@@ -19,12 +18,15 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+import tomli_w
 
 from template_control.errors import ParameterError, TemplateControlError
 
 T = TypeVar("T")
 
 _KIND = "kind"
+_NUMBERS = re.compile(r"""\[\n((?:\ +[^\s"'\[\]{},]+,\n)+)\ *\]""")
+"""A list of numbers, one a line, as ``tomli_w`` writes it: texts have quotes, and no line break."""
 _SCALARS = {
     bool: "true or false",
     int: "a whole number",
@@ -166,7 +168,7 @@ def to_table(options: Any, where: str = "") -> dict[str, Any]:
         if value is None:
             continue
         try:
-            table[f.name] = _plain(value, place)
+            table[f.name] = _toml_value(value, place)
         except ParameterError:
             if not _is_default(f, value):
                 raise
@@ -179,7 +181,7 @@ def _is_default(f: Field[Any], value: Any) -> bool:
     return f.default is not MISSING and bool(f.default == value)
 
 
-def _plain(value: Any, where: str) -> Any:
+def _toml_value(value: Any, where: str) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return to_table(value, where)
     if isinstance(value, np.ndarray | np.generic):
@@ -189,9 +191,9 @@ def _plain(value: Any, where: str) -> Any:
     if isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, tuple | list):
-        return [_plain(entry, where) for entry in value]
+        return [_toml_value(entry, where) for entry in value]
     if isinstance(value, Mapping) and all(type(key) is str for key in value):
-        return {key: _plain(entry, f"{where}.{key}") for key, entry in value.items()}
+        return {key: _toml_value(entry, f"{where}.{key}") for key, entry in value.items()}
     raise ParameterError(f"{where} is {type(value).__name__}, which TOML cannot say")
 
 
@@ -201,45 +203,4 @@ def text(table: Mapping[str, Any]) -> str:
     Args:
         table: as :func:`to_table` returns it.
     """
-    return "\n".join(_lines(table, ())).lstrip("\n") + "\n"
-
-
-def _lines(table: Mapping[str, Any], name: tuple[str, ...]) -> list[str]:
-    """Values first, then tables: what comes after a table's header belongs to it."""
-    inner = {key: value for key, value in table.items() if isinstance(value, Mapping)}
-    rows = {key: value for key, value in table.items() if _is_list_of_tables(value)}
-    lines = [
-        f"{_key(key)} = {_literal(value)}"
-        for key, value in table.items()
-        if key not in inner and key not in rows
-    ]
-    for key, value in inner.items():
-        place = (*name, _key(key))
-        lines += ["", f"[{'.'.join(place)}]", *_lines(value, place)]
-    for key, entries in rows.items():
-        place = (*name, _key(key))
-        for entry in entries:
-            lines += ["", f"[[{'.'.join(place)}]]", *_lines(entry, place)]
-    return lines
-
-
-def _is_list_of_tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
-
-
-def _key(name: str) -> str:
-    bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
-    return name if bare else _literal(name)
-
-
-def _literal(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return repr(value) if math.isfinite(value) else str(value)
-    if isinstance(value, list):
-        return f"[{', '.join(map(_literal, value))}]"
-    if isinstance(value, str):
-        # JSON's escapes are TOML's, but for the one character that JSON leaves as it is.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return str(value)
+    return _NUMBERS.sub(lambda row: f"[{' '.join(row[1].split())[:-1]}]", tomli_w.dumps(table))

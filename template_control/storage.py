@@ -6,6 +6,7 @@ A record is a ``.npz`` with one array a field and the metadata as JSON.
 from __future__ import annotations
 
 import json
+import numbers
 import os
 import shutil
 import uuid
@@ -21,6 +22,40 @@ from filelock import lock_descriptor, unlock_descriptor
 from template_control.errors import RecordError, TemplateControlError
 
 T = TypeVar("T")
+
+
+def to_jsonable(value: Any, describe: Callable[[Any], Any] | None = None) -> Any:
+    """A value as JSON keeps it, so that what is read back equals it.
+
+    Numbers of NumPy become Python's, arrays and tuples lists, keys of mappings texts.
+
+    Args:
+        value: numbers, texts, arrays, or lists and mappings of them.
+        describe: makes one of these of any other value; None: no other is taken.
+
+    Raises:
+        TypeError: for another value, where ``describe`` is None.
+    """
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        return to_jsonable(value.tolist(), describe)
+    if isinstance(value, str):
+        return str(value)  # of an enumeration's member, what JSON writes
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real):
+        return float(value)
+    if isinstance(value, list | tuple):
+        return [to_jsonable(entry, describe) for entry in value]
+    if isinstance(value, Mapping):
+        return {str(key): to_jsonable(entry, describe) for key, entry in value.items()}
+    if describe is not None:
+        return to_jsonable(describe(value), describe)
+    raise TypeError(
+        f"a {type(value).__name__} is no plain data: give numbers, texts, arrays, or lists and"
+        " dictionaries of them"
+    )
 
 
 @contextmanager

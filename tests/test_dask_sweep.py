@@ -14,7 +14,7 @@ import pytest
 from sweep_work import COUNT, P, alive, drawn, kept, logged, quietly, wait_until, walking_step
 
 from template_control.errors import SweepError
-from template_control.sweep.file import plain
+from template_control.storage import to_jsonable
 from template_control.sweep.sweep import grid
 
 pytestmark = pytest.mark.slow  # starting a cluster and its workers takes longest
@@ -53,7 +53,7 @@ def test_dask_gives_what_processes_give(dask):
     assert quietly(walking_step, items, executor=executor) == quietly(walking_step, items)
     values = [[1, (2, 3)], {"a": [None, "x"]}, "('x', 0)", [math.inf], asdict(P)]
     result = quietly(untouched, grid(value=values), executor=executor)
-    assert list(result.results) == plain(values)
+    assert list(result.results) == to_jsonable(values)
 
 
 def test_dask_retries_what_failed(dask, tmp_path):

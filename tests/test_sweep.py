@@ -21,7 +21,7 @@ from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import Segment, example_one
-from template_control.sweep.file import plain
+from template_control.storage import to_jsonable
 from template_control.sweep.sweep import SweepOptions, grid, item_seed, sample, sweep
 
 
@@ -209,7 +209,7 @@ def test_scenarios_in_processes():
     result = quietly(short_scenario, items)
     assert np.all(result.column("completed") == 1.0)
     assert np.all(result.column("speed")[2:] > result.column("speed")[:2])  # faster as asked
-    assert list(result.results) == [plain(short_scenario(**item)) for item in items]
+    assert list(result.results) == [to_jsonable(short_scenario(**item)) for item in items]
 
 
 @pytest.mark.slow
@@ -218,4 +218,4 @@ def test_robot_runs_in_processes():
     result = quietly(robot_run, items)
     assert np.all(result.column("steps") == 2)
     assert not np.any(result.column("fell"))
-    assert list(result.results) == [plain(robot_run(**item)) for item in items]
+    assert list(result.results) == [to_jsonable(robot_run(**item)) for item in items]

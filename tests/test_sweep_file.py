@@ -31,7 +31,7 @@ from sweep_work import (
 )
 
 from template_control.errors import SweepError
-from template_control.sweep.file import plain
+from template_control.storage import to_jsonable
 from template_control.sweep.sweep import grid
 
 
@@ -78,10 +78,10 @@ data = st.recursive(
 
 @given(value=data)
 def test_plain_data_survive_json(value):
-    once = plain(value)
+    once = to_jsonable(value)
     # repr tells NaN from None and 1 from 1.0 and True; equality does not.
     assert repr(json.loads(json.dumps(once))) == repr(once)
-    assert repr(plain(once)) == repr(once)
+    assert repr(to_jsonable(once)) == repr(once)
 
 
 def test_numpy_and_not_finite_numbers_survive_the_file(tmp_path):

@@ -1,12 +1,10 @@
-"""What a record tells of its run beside the arrays: as JSON, and told without fail."""
+"""JSON-serialisable metadata of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import fields, is_dataclass
 from typing import Any
-
-import numpy as np
 
 from template_control.checks.fitting import shown
 from template_control.embedding.controller import EmbeddingController
@@ -16,6 +14,7 @@ from template_control.plant.plant import plant_name
 from template_control.run.options import SimulationOptions
 from template_control.run.recorder import Recorder
 from template_control.slip.gaits.gait import flight_share
+from template_control.storage import to_jsonable
 
 
 def about(controller: EmbeddingController, o: SimulationOptions) -> dict[str, Any]:
@@ -44,7 +43,7 @@ def about(controller: EmbeddingController, o: SimulationOptions) -> dict[str, An
         "plant": plant_name(o.plant),
         "options": _told(o),
     }
-    return {name: plain(value) for name, value in found.items()}
+    return {name: to_jsonable(value, _described) for name, value in found.items()}
 
 
 def outcome(recorder: Recorder, time_step: float, reason: str, seconds: float) -> dict[str, Any]:
@@ -65,12 +64,12 @@ def outcome(recorder: Recorder, time_step: float, reason: str, seconds: float) -
         "ticks": recorder.ticks,
         "summary": recorder.summary(),
     }
-    return {name: plain(value) for name, value in found.items()}
+    return {name: to_jsonable(value, _described) for name, value in found.items()}
 
 
 def _told(o: SimulationOptions) -> dict[str, Any]:
     """The options as data; a plant of one's own is not data."""
-    told: dict[str, Any] = plain(o)
+    told: dict[str, Any] = to_jsonable(o, _described)
     return told if isinstance(o.plant, PlantOptions | IdealOptions) else {**told, "plant": {}}
 
 
@@ -89,22 +88,8 @@ def _gait(controller: EmbeddingController) -> dict[str, Any]:
     }
 
 
-def plain(value: Any) -> Any:
-    """A value as JSON reads it back: arrays and tuples are lists, dataclasses dictionaries.
-
-    What JSON does not know is its text; nothing is refused.
-    """
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if value is None or isinstance(value, bool):
-        return value
-    for kind in (str, int, float):
-        if isinstance(value, kind):
-            return kind(value)  # of an enumeration's member, what JSON writes
+def _described(value: Any) -> Any:
+    """A dataclass as a dictionary, a set as a list, anything else as its text."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(plain(key)): plain(entry) for key, entry in value.items()}
-    if isinstance(value, Sequence | Set):
-        return [plain(entry) for entry in value]
-    return shown(value)
+        return {f.name: getattr(value, f.name) for f in fields(value)}
+    return list(value) if isinstance(value, Sequence | Set) else shown(value)

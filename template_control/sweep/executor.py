@@ -17,7 +17,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from template_control.errors import SweepError
-from template_control.sweep.file import Outcome, plain
+from template_control.storage import to_jsonable
+from template_control.sweep.file import Outcome
 
 _REFRESH = 0.2  # [s] between two looks of the progress bar
 _GRACE = 0.5  # [s] in which calls may end that Ctrl-C found running
@@ -122,7 +123,7 @@ def _call(_: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Ou
     """In the worker: one call, whatever comes of it."""
     with _no_interrupt():
         try:
-            return Outcome(plain(function(**arguments)), None)
+            return Outcome(to_jsonable(function(**arguments)), None)
         except (Exception, SystemExit) as error:
             return Outcome(None, _reason(error))
 

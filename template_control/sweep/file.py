@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import numbers
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -19,7 +18,7 @@ from typing import Any, BinaryIO, NamedTuple, NoReturn
 import numpy as np
 
 from template_control.errors import SweepError
-from template_control.storage import free_lock, take_lock
+from template_control.storage import free_lock, take_lock, to_jsonable
 
 _FORMAT = "template-control sweep 1"
 
@@ -28,40 +27,12 @@ class Outcome(NamedTuple):
     """How an item ended.
 
     Attributes:
-        result: plain data as of :func:`plain`; None where it failed.
+        result: as :func:`~template_control.storage.to_jsonable` makes it; None where it failed.
         error: None, or why it failed as 'TypeName: message'.
     """
 
     result: Any
     error: str | None
-
-
-def plain(value: Any) -> Any:
-    """The value as JSON keeps it, so that a result read back equals a fresh one.
-
-    Numbers of numpy become Python's, arrays and tuples lists, keys of dictionaries texts.
-
-    Raises:
-        TypeError: if it holds anything else.
-    """
-    if value is None or isinstance(value, bool | np.bool_):
-        return None if value is None else bool(value)
-    if isinstance(value, str):
-        return str(value)
-    if isinstance(value, numbers.Integral):
-        return int(value)
-    if isinstance(value, numbers.Real):
-        return float(value)
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    raise TypeError(
-        f"a {type(value).__name__} is no plain data: give numbers, texts, arrays, or lists and"
-        " dictionaries of them"
-    )
 
 
 def name_of(function: Callable[..., Any]) -> str:
@@ -71,7 +42,9 @@ def name_of(function: Callable[..., Any]) -> str:
         TypeError: if a partial's arguments are no plain data.
     """
     if isinstance(function, partial):
-        return f"{name_of(function.func)}{json.dumps(plain([function.args, function.keywords]))}"
+        return (
+            f"{name_of(function.func)}{json.dumps(to_jsonable([function.args, function.keywords]))}"
+        )
     kind = function if hasattr(function, "__qualname__") else type(function)
     return f"{kind.__module__}.{kind.__qualname__}"
 
@@ -95,7 +68,7 @@ def header(
         name = name_of(function)
         for item in items:
             what = f"item {count}"
-            digest.update(json.dumps(plain(item), sort_keys=True).encode() + b"\n")
+            digest.update(json.dumps(to_jsonable(item), sort_keys=True).encode() + b"\n")
             count += 1
     except TypeError as error:
         raise SweepError(f"{what} cannot be told in a file: {error}") from None
@@ -197,7 +170,7 @@ class SweepFile:
         if self._items is not None:
             if index >= len(self._items):
                 return  # a longer sweep's
-            item, own = entry.get("item"), plain(self._items[index])
+            item, own = entry.get("item"), to_jsonable(self._items[index])
             if json.dumps(item, sort_keys=True) != json.dumps(own, sort_keys=True):
                 self._refuse(f"holds another sweep (another item {index})")
         self.finished[index] = Outcome(entry.get("result"), error)
@@ -215,7 +188,7 @@ class SweepFile:
             SweepError: if it cannot be written.
         """
         end = {"result": outcome.result} if outcome.error is None else {"error": outcome.error}
-        entry = {"index": index, "item": plain(item), "seed": seed, **end}
+        entry = {"index": index, "item": to_jsonable(item), "seed": seed, **end}
         self._write(json.dumps(entry).encode() + b"\n")
 
     def _write(self, line: bytes) -> None:
