@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 import template_control as tc
 from template_control.run import FloatingRecord
-from template_control.view.figure_file import save_figure
-from template_control.view.free_figures import footholds
+from template_control.view.figures import footholds
+from template_control.view.style import save_figure
 
 
 def main() -> None:

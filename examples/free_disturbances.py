@@ -17,7 +17,7 @@ import numpy as np
 
 import template_control as tc
 from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
-from template_control.robustness.ladder import SETTLED, off_gait
+from template_control.robustness.severity_sweep import SETTLED, gait_errors
 from template_control.run import FloatingRecord
 from template_control.slip import Scale, WalkingGait
 
@@ -81,7 +81,7 @@ def main() -> None:
         if record.fell:
             print(f"{name}: {record.metadata['fall_reason']}", flush=True)
             continue
-        speed, height = off_gait(record, gait)
+        speed, height = gait_errors(record, gait)
         stood += 1
         back += max(abs(speed), abs(height)) <= SETTLED
         roll, pitch, yaw = np.abs(record.attitude).max(axis=0)

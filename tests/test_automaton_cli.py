@@ -19,8 +19,15 @@ from template_control.errors import RecordError
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
-from template_control.view.automaton_figure import automaton_figure, edge_label, mathtext
-from template_control.view.automaton_layout import choices, gaits, layout, successions
+from template_control.view.automaton_figure import (
+    automaton_figure,
+    choices,
+    edge_label,
+    gaits,
+    layout,
+    mathtext,
+    successions,
+)
 
 
 def node(name, *edges, phase=Phase.SS):

@@ -15,26 +15,26 @@ from template_control.cli.main import main
 from template_control.cli.trials import campaign as command
 from template_control.errors import ParameterError
 from template_control.robustness import (
-    FREE_MIX,
+    FLOATING_MIX,
     Campaign,
-    Conditions,
-    Draw,
-    Mix,
+    CampaignConfig,
+    DisturbanceDistribution,
+    DisturbanceSample,
     Trial,
-    first_wrong,
+    fall_cause,
 )
 from template_control.run.config import RunConfig
 from template_control.run.record import Record
 from template_control.run.specs import RobotSpec
-from template_control.view.trials.campaign_figure import campaign_figure
+from template_control.view.trial_figures import campaign_figure
 
 PAGE = (Path(__file__).parents[1] / "docs" / "campaign.md").read_text()
-RANGES = [f.name for f in fields(Mix) if f.name not in ("within", "after")]
+RANGES = [f.name for f in fields(DisturbanceDistribution) if f.name not in ("within", "after")]
 
 
 @given(seed=st.integers(0, 2**64 - 1), factor=st.floats(0.0, 1.3))
 def test_a_draw_is_within_its_mix(seed, factor):
-    mix = Mix().times(factor)
+    mix = DisturbanceDistribution().times(factor)
     draw = mix.draw(seed)
     assert draw == mix.draw(seed)
     for name in RANGES:
@@ -46,7 +46,7 @@ def test_a_draw_is_within_its_mix(seed, factor):
 
 
 def test_draws_fill_their_ranges():
-    mix = Mix()
+    mix = DisturbanceDistribution()
     draws = [mix.draw(seed) for seed in range(400)]
     for name in RANGES:
         low, high = getattr(mix, name)
@@ -56,39 +56,39 @@ def test_draws_fill_their_ranges():
 
 
 def test_severity_is_the_share_of_the_range_that_is_used():
-    mix = Mix()
-    assert mix.severity(Draw()) == 0.0
-    worst = Draw(**{name: getattr(mix, name)[1] for name in RANGES})
+    mix = DisturbanceDistribution()
+    assert mix.severity(DisturbanceSample()) == 0.0
+    worst = DisturbanceSample(**{name: getattr(mix, name)[1] for name in RANGES})
     assert mix.severity(worst) == pytest.approx(1.0)
     # Noise is the same in all trials: seven ranges are left.
-    assert mix.severity(Draw(push=-10.0)) == pytest.approx(0.5 / np.sqrt(7))
-    assert mix.severity(Draw(friction=0.6)) == pytest.approx(0.5 / np.sqrt(7))
+    assert mix.severity(DisturbanceSample(push=-10.0)) == pytest.approx(0.5 / np.sqrt(7))
+    assert mix.severity(DisturbanceSample(friction=0.6)) == pytest.approx(0.5 / np.sqrt(7))
 
 
 def test_a_mix_of_no_severity_disturbs_nothing():
-    draw = Mix().times(0.0).draw(3)
-    assert replace(draw, push_at=0.0, ground_step_at=0.0) == Draw()
+    draw = DisturbanceDistribution().times(0.0).draw(3)
+    assert replace(draw, push_at=0.0, ground_step_at=0.0) == DisturbanceSample()
 
 
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"push": (5.0, -5.0)}, "Mix.push is [5.0, -5.0]"),
-        ({"within": (3, 3)}, "Mix.within is [3, 3]"),
+        ({"push": (5.0, -5.0)}, "DisturbanceDistribution.push is [5.0, -5.0]"),
+        ({"within": (3, 3)}, "DisturbanceDistribution.within is [3, 3]"),
         ({"friction": (0.0, 1.0)}, "friction is"),
-        ({"mass": (-1.0, 1.0)}, "Mix.mass"),
-        ({"noise": (-1e-3, 1e-3)}, "Mix.noise"),
-        ({"delay": (0.0, float("nan"))}, "Mix.delay"),
+        ({"mass": (-1.0, 1.0)}, "DisturbanceDistribution.mass"),
+        ({"noise": (-1e-3, 1e-3)}, "DisturbanceDistribution.noise"),
+        ({"delay": (0.0, float("nan"))}, "DisturbanceDistribution.delay"),
     ],
 )
 def test_a_mix_that_cannot_be_is_refused(wrong, told):
     with pytest.raises(ParameterError) as error:
-        Mix(**wrong)
+        DisturbanceDistribution(**wrong)
     assert told in str(error.value)
 
 
 def test_a_trial_is_a_run_that_its_file_repeats(tmp_path):
-    conditions = Conditions(seed=5)
+    conditions = CampaignConfig(seed=5)
     config, ready = conditions.trial(3)
     draw = conditions.draw(3)
     simulation = config.simulation
@@ -100,12 +100,12 @@ def test_a_trial_is_a_run_that_its_file_repeats(tmp_path):
     assert push.impulse == pytest.approx(draw.push)
     assert push.step + push.phase == pytest.approx(draw.push_at)
     assert RunConfig.load(config.save(tmp_path / "trial.toml")) == config
-    assert settings.from_table(Conditions, settings.to_table(conditions)) == conditions
+    assert settings.from_table(CampaignConfig, settings.to_table(conditions)) == conditions
     assert conditions.trial(4)[0] != config
 
 
 def test_a_small_robot_is_disturbed_as_a_small_one():
-    draw, conditions = Conditions().draw(0), Conditions(RobotSpec("bolt"))
+    draw, conditions = CampaignConfig().draw(0), CampaignConfig(RobotSpec("bolt"))
     config, ready = conditions.trial(0)
     p = ready.gait.parameters
     length, time = p.rest_length, np.sqrt(p.rest_length * 9.81 / p.gravity)
@@ -116,26 +116,26 @@ def test_a_small_robot_is_disturbed_as_a_small_one():
 
 
 def test_a_free_robot_is_pushed_from_all_sides(tmp_path):
-    conditions = Conditions(RobotSpec("bolt", free=True), mix=FREE_MIX, seed=2)
+    conditions = CampaignConfig(RobotSpec("bolt", free=True), mix=FLOATING_MIX, seed=2)
     config, _ = conditions.trial(1)
     draw = conditions.draw(1)
     (push,) = config.simulation.pushes
     assert push.direction == pytest.approx(np.radians(draw.direction))
     assert config.robot.free
     assert RunConfig.load(config.save(tmp_path / "trial.toml")) == config
-    directions = [FREE_MIX.draw(seed).direction for seed in range(200)]
+    directions = [FLOATING_MIX.draw(seed).direction for seed in range(200)]
     assert min(directions) < -170.0
     assert max(directions) > 170.0
     # Without directions the other numbers are drawn as they always were.
-    planar = replace(FREE_MIX, direction=(0.0, 0.0)).draw(7)
-    assert replace(FREE_MIX.draw(7), direction=0.0) == planar
-    assert FREE_MIX.times(2.0).direction == FREE_MIX.direction
+    planar = replace(FLOATING_MIX, direction=(0.0, 0.0)).draw(7)
+    assert replace(FLOATING_MIX.draw(7), direction=0.0) == planar
+    assert FLOATING_MIX.times(2.0).direction == FLOATING_MIX.direction
     with pytest.raises(ParameterError, match=r"the mix has the direction .* five-link is held"):
-        Conditions(mix=FREE_MIX)
+        CampaignConfig(mix=FLOATING_MIX)
 
 
 def test_shares_and_figure_of_a_campaign():
-    conditions = Conditions()
+    conditions = CampaignConfig()
     trials = tuple(
         Trial(
             number=i,
@@ -150,7 +150,7 @@ def test_shares_and_figure_of_a_campaign():
     )
     found = Campaign(conditions, trials)
     assert len(found.fell) == 4
-    assert len(found.astray) == 4
+    assert len(found.off_gait) == 4
     assert found.reasons == {"slip": 4}
     low, high = found.interval(found.fell)
     assert low < 0.1 < high
@@ -176,7 +176,7 @@ def _panels(campaign):
 
 
 def test_what_went_wrong_first(long_walk):
-    assert first_wrong(long_walk) == "none of these"
+    assert fall_cause(long_walk) == "none of these"
     late = len(long_walk.time) - 400
     slid = long_walk.foot.copy()
     slid[late + 200 :, :, 0] += 0.1
@@ -187,12 +187,12 @@ def test_what_went_wrong_first(long_walk):
     force = long_walk.contact_force.copy()
     force[late, 0] = (-200.0, 10.0)
     wrong = replace(long_walk, solved=solved)
-    assert first_wrong(wrong) == "failed QP"
+    assert fall_cause(wrong) == "failed QP"
     wrong = replace(wrong, foot=slid)
-    assert first_wrong(wrong) == "slip"
+    assert fall_cause(wrong) == "slip"
     wrong = replace(wrong, torque=torque)
-    assert first_wrong(wrong) == "torque limit"
-    assert first_wrong(replace(wrong, contact_force=force)) == "stumble"
+    assert fall_cause(wrong) == "torque limit"
+    assert fall_cause(replace(wrong, contact_force=force)) == "stumble"
 
 
 @pytest.mark.parametrize(

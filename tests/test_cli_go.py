@@ -13,7 +13,7 @@ from template_control.cli.main import main
 from template_control.cli.report import kept
 from template_control.run.record import Record
 from template_control.slip.scenario.run import ScenarioRecord
-from template_control.view.route_figures import (
+from template_control.view.scenario_figures import (
     route_figure,
     save_route_figures,
     transition_energies,

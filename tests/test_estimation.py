@@ -10,7 +10,7 @@ from template_control.errors import ParameterError
 from template_control.estimation.base_filter import BaseFilter, BaseFilterOptions
 from template_control.estimation.imu import ImuOptions, ImuSensors
 from template_control.estimation.joint_filter import JointFilter, JointFilterOptions
-from template_control.robustness.ladder import off_gait
+from template_control.robustness.severity_sweep import gait_errors
 from template_control.run.config import RunConfig
 from template_control.run.options import SimulationOptions
 from template_control.slip.similarity import Scale
@@ -149,7 +149,7 @@ def test_the_robot_walks_on_its_estimate(default_gait):
     options = SimulationOptions(steps=30, sensors=ImuOptions(seed=1))
     record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
     assert not record.fell
-    speed, height = off_gait(record, default_gait)
+    speed, height = gait_errors(record, default_gait)
     assert abs(speed) < 0.02
     assert abs(height) < 0.01
 

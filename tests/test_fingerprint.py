@@ -10,9 +10,9 @@ import pytest
 
 import template_control as tc
 from template_control.errors import SweepError
-from template_control.robustness import fingerprint
-from template_control.robustness.campaigns import campaign
-from template_control.robustness.campaigns.campaign import Conditions, run_campaign
+from template_control.robustness import campaign
+from template_control.robustness import subject as fingerprint
+from template_control.robustness.campaign import CampaignConfig, run_campaign
 from template_control.sweep.sweep import SweepOptions, grid, sweep
 
 SOURCE = '''"""A module."""
@@ -99,7 +99,7 @@ def test_a_trial_imports_no_room_that_does_not_count():
     code = """
 import sys
 import template_control.run.config, template_control.robustness.disturbances
-import template_control.robustness.campaigns.first_wrong, template_control.run.backends
+import template_control.robustness.fall_cause, template_control.run.backends
 print(*{name.split(".")[1] for name in sys.modules if name.startswith("template_control.")})
 """
     rooms = set(_told(code, "0").split())
@@ -140,7 +140,7 @@ def trials(monkeypatch):
 def _campaign(count, folder, seed=1):
     folder.mkdir(exist_ok=True)
     with ThreadPoolExecutor(1) as pool:
-        return run_campaign(Conditions(seed=seed), count, folder, pool, progress=False)
+        return run_campaign(CampaignConfig(seed=seed), count, folder, pool, progress=False)
 
 
 def test_a_longer_campaign_goes_on_from_a_shorter_one(tmp_path, trials):

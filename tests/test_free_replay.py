@@ -11,11 +11,10 @@ from scipy.spatial.transform import Rotation
 
 import template_control as tc
 from template_control.cli.main import main
+from template_control.view.replay.film import SpaceStage, seen
 from template_control.view.replay.playback import playback
-from template_control.view.replay.replay_scene import scene_commands
-from template_control.view.replay.replay_space import in_space, turned_to
 from template_control.view.replay.robot_visuals import load_visuals, placements
-from template_control.view.replay.space_film import SpaceStage, seen
+from template_control.view.replay.scene import in_space, scene_commands, turned_to
 
 RADIUS = 0.01  # of the feet
 

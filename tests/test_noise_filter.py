@@ -9,7 +9,7 @@ from scipy.linalg import solve_discrete_are
 import template_control as tc
 from template_control.embedding import FREE_PLANNER, FreeController, FreeOptions
 from template_control.estimation import NoiseFilter, NoiseFilterOptions
-from template_control.robustness.ladder import off_gait
+from template_control.robustness.severity_sweep import gait_errors
 from template_control.run.backends import FloatingBackend
 from template_control.run.sensing import FilteredSensors, Sensors
 from template_control.slip.similarity import Scale
@@ -113,4 +113,4 @@ def test_bolt_walks_with_noise_and_delay(bolt):
     record = tc.simulate(bolt, tc.LqrPlanner(gait, FREE_PLANNER), options)
     assert not record.fell, record.metadata["fall_reason"]
     assert record.metadata["summary"]["qp_failures"] == 0
-    assert abs(off_gait(record, gait)[0]) < 0.03
+    assert abs(gait_errors(record, gait)[0]) < 0.03

@@ -15,8 +15,8 @@ from template_control.view.replay.playback import (
     spring,
     template_legs,
 )
-from template_control.view.replay.replay_scene import scene_commands
 from template_control.view.replay.robot_visuals import load_visuals, placements
+from template_control.view.replay.scene import scene_commands
 
 FOOT_RADIUS = 0.01
 

@@ -14,14 +14,23 @@ from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.library import load_robot
-from template_control.robustness import ladder as robustness
-from template_control.robustness.aside import ASIDE
-from template_control.robustness.disturbance import Situation
-from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES
+from template_control.robustness import severity_sweep as robustness
+from template_control.robustness.disturbances import (
+    AFTER,
+    BEGIN,
+    DISTURBANCES,
+    LATERAL_PUSHES,
+    Situation,
+)
 from template_control.robustness.findings import Finding, Level, wilson_interval
-from template_control.robustness.ladder import SETTLED, measure, off_gait, trial
+from template_control.robustness.severity_sweep import (
+    SETTLED,
+    gait_errors,
+    measure,
+    template_limit,
+    trial,
+)
 from template_control.robustness.subject import ENGINES, Subject
-from template_control.robustness.template_limit import template_limit
 from template_control.run.options import FallOptions
 from template_control.run.simulation import perturbed_start, simulate
 from template_control.run.specs import RobotSpec
@@ -29,7 +38,7 @@ from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.view.trials.robustness_figure import robustness_figure
+from template_control.view.trial_figures import robustness_figure
 
 DOCS = Path(__file__).parents[1] / "docs"
 BY_NAME = {d.name: d for d in DISTURBANCES}
@@ -122,14 +131,14 @@ def test_the_edge_of_a_step_lies_between_two_footholds(robot, gait, number):
 
 def test_the_error_of_a_walk_is_that_of_its_last_five_steps(undisturbed, default_gait):
     gait = default_gait
-    errors = off_gait(undisturbed, gait)
+    errors = gait_errors(undisturbed, gait)
     last = undisturbed.time >= undisturbed.section_time[-6]
     speed = undisturbed.com_velocity[last, 0].mean()
     assert errors[0] == pytest.approx(speed / gait.mean_speed - 1.0, abs=1e-3)
     height = np.mean([z[1] for z in undisturbed.section_state[-5:]])
     assert errors[1] == pytest.approx(height / gait.vlo[1] - 1.0)
     slower = replace(gait, step_length=0.9 * gait.step_length)
-    assert off_gait(undisturbed, slower)[0] == pytest.approx((1.0 + errors[0]) / 0.9 - 1.0)
+    assert gait_errors(undisturbed, slower)[0] == pytest.approx((1.0 + errors[0]) / 0.9 - 1.0)
 
 
 @pytest.mark.slow
@@ -240,7 +249,7 @@ def test_levels_rise_until_the_walk_breaks(cheap, tmp_path, monkeypatch):
     assert [level.level for level in down.levels] == pytest.approx(BY_NAME["step-down"].levels)
     assert down.breaking_point == pytest.approx(0.02)
     assert down.half_point == pytest.approx(0.08)
-    assert (down.levels[-1].fell, down.levels[-1].astray) == (0, 2)
+    assert (down.levels[-1].fell, down.levels[-1].off_gait) == (0, 2)
     # The same again takes everything from the files.
     monkeypatch.setattr(not_to_be_called, "__module__", made_up.__module__)
     monkeypatch.setattr(not_to_be_called, "__qualname__", made_up.__qualname__)
@@ -290,7 +299,7 @@ def test_a_free_robot_is_pushed_aside_too():
     bolt = tc.load_floating_robot("bolt")
     gait = tc.robot_gait_for_speed(bolt, 0.55)
     where = Situation(bolt, gait, LqrPlanner(gait, tc.embedding.FREE_PLANNER))
-    turned = {d.name: d.options(where, 0.1, 3).pushes[0].direction for d in ASIDE}
+    turned = {d.name: d.options(where, 0.1, 3).pushes[0].direction for d in LATERAL_PUSHES}
     assert turned == {"push-left": np.pi / 2, "push-right": -np.pi / 2}
     weak = BY_NAME["torque"].options(where, 0.9, 0).embedding
     assert isinstance(weak, tc.embedding.FreeOptions)

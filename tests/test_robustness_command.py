@@ -11,7 +11,7 @@ from template_control.cli.main import build_parser, main
 from template_control.cli.options.robot import robot_choice
 from template_control.cli.trials import robustness as command
 from template_control.robot.library import robot_path
-from template_control.robustness import disturbances, ladder
+from template_control.robustness import disturbances, severity_sweep
 from template_control.robustness.disturbances import DISTURBANCES
 from template_control.run.specs import RobotSpec
 
@@ -21,7 +21,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 @pytest.fixture
 def brief(monkeypatch):
     """Trials of a few steps: what a trial says of a robot is tested where trials are."""
-    for module in (disturbances, ladder):
+    for module in (disturbances, severity_sweep):
         monkeypatch.setattr(module, "BEGIN", 2)
         monkeypatch.setattr(module, "AFTER", 7)
 
@@ -168,8 +168,8 @@ def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capf
     others = {"--gait", "--free", "--plant"}
     (line,) = (x for x in commands() if "--quick" in x and not others & {*x.split()})
     # One level of two, and one trial of two: the test of the files runs all.
-    monkeypatch.setattr(ladder, "_QUICK_LEVELS", 1)
-    monkeypatch.setattr(ladder, "_QUICK_TRIALS", 1)
+    monkeypatch.setattr(severity_sweep, "_QUICK_LEVELS", 1)
+    monkeypatch.setattr(severity_sweep, "_QUICK_TRIALS", 1)
     monkeypatch.chdir(tmp_path)
     assert main(shlex.split(line)[1:]) == 0
     assert (tmp_path / "runs" / "robustness" / "five-link" / "robustness.png").is_file()

@@ -15,7 +15,7 @@ from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.state import Sensed
 from template_control.errors import ParameterError
 from template_control.robot.start import state_in
-from template_control.robustness.disturbance import Situation
+from template_control.robustness.disturbances import Situation
 from template_control.run.options import SimulationOptions
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.automaton import AUTOMATON

@@ -20,7 +20,7 @@ from template_control.plant.terrain.spec import KINDS, terrain_from
 from template_control.plant.terrain.terrain import Terrain
 from template_control.robot.five_link import SolidLink
 from template_control.robot.free.free_biped import FreeBiped
-from template_control.robustness.campaigns.mix import Mix
+from template_control.robustness.campaign import DisturbanceDistribution
 from template_control.run.config import RunConfig
 from template_control.storage import writing
 
@@ -214,7 +214,7 @@ def test_a_mix_says_which_key_is_wrong(tmp_path, refused):
     line = refused(["campaign", "--mix", str(path), "--trials", "1"])
     assert "the mix has the direction [0.0, 90.0], and five-link is held in its plane" in line
     with pytest.raises(ParameterError, match="the mix 100 times as severe: friction is"):
-        Mix().times(100.0)
+        DisturbanceDistribution().times(100.0)
 
 
 HOLDER = """

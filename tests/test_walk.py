@@ -10,8 +10,8 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.library import load_robot
-from template_control.robustness.disturbance import Situation
-from template_control.robustness.ladder import off_gait
+from template_control.robustness.disturbances import Situation
+from template_control.robustness.severity_sweep import gait_errors
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import perturbed_start, simulate
@@ -224,7 +224,7 @@ def test_slippery_ground(gait):
 def test_pushes(default_gait, impulse, phase):
     record = walk(default_gait, steps=13, pushes=(Push(impulse, 2, phase),))
     assert not record.fell
-    assert max(map(abs, off_gait(record, default_gait))) < 0.02, "back within 10 steps"
+    assert max(map(abs, gait_errors(record, default_gait))) < 0.02, "back within 10 steps"
 
 
 @pytest.fixture(scope="module")
@@ -243,4 +243,4 @@ def test_a_step_of_the_ground_that_it_does_not_see(default_gait, footholds, heig
     edge = GroundStep(height, before + share * (beyond - before))
     record = walk(default_gait, steps=15, plant=PlantOptions(ground_step=edge))
     assert not record.fell
-    assert max(map(abs, off_gait(record, default_gait))) < 0.02, "back within 10 steps"
+    assert max(map(abs, gait_errors(record, default_gait))) < 0.02, "back within 10 steps"

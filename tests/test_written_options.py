@@ -12,7 +12,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.walking.lqr_options import LqrOptions
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant
-from template_control.robustness.campaigns.campaign import Conditions
+from template_control.robustness.campaign import CampaignConfig
 from template_control.run import simulation
 from template_control.run.config import RunConfig
 from template_control.run.options import SimulationOptions
@@ -112,14 +112,14 @@ def test_the_default_is_the_robots_own_and_a_given_one_is_kept():
 
 @pytest.mark.parametrize("gait", [GaitSpec(), GaitSpec("run", 3.0)])
 def test_a_trial_is_written_with_the_planner_that_it_has(gait, tmp_path):
-    config, ready = Conditions(gait=gait).trial(0)
+    config, ready = CampaignConfig(gait=gait).trial(0)
     written = RunConfig.load(config.save(tmp_path / "trial.toml"))
     (planner,) = ready.planners.values()
     assert planner.options == scaled(written.planner, Scale.of(planner.gait.parameters))
 
 
 def test_a_free_trial_is_written_with_the_planner_that_it_has(tmp_path):
-    conditions = Conditions(RobotSpec("bolt", free=True), GaitSpec(speed=0.6))
+    conditions = CampaignConfig(RobotSpec("bolt", free=True), GaitSpec(speed=0.6))
     config, ready = conditions.trial(0)
     written = RunConfig.load(config.save(tmp_path / "trial.toml"))
     assert written.planner == FREE_PLANNER

@@ -17,9 +17,8 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Outcome, Reset, Slot
 from template_control.storage import Files
-from template_control.view.automaton_figure import GAIT_NAMES, automaton_figure, words
-from template_control.view.automaton_layout import gaits
-from template_control.view.figure_file import save_figure
+from template_control.view.automaton_figure import GAIT_NAMES, automaton_figure, gaits, words
+from template_control.view.style import save_figure
 
 _SUFFIXES = (".png", ".svg", ".pdf")
 _PIPE_WIDTH = 140  # columns where there is no terminal to ask

@@ -38,8 +38,8 @@ from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.storage import Files, writing
 from template_control.terminal import plain_console
-from template_control.view.figure_file import save_figure
 from template_control.view.stability_figures import UNITS, branch_figure
+from template_control.view.style import save_figure
 
 Array = NDArray[np.float64]
 

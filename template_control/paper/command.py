@@ -14,7 +14,7 @@ from template_control.errors import ParameterError
 from template_control.paper.reproduction import REPRODUCTIONS, Reproduction
 from template_control.storage import Files, writing
 from template_control.terminal import plain_console
-from template_control.view.figure_file import save_figure
+from template_control.view.style import save_figure
 
 _ON_A_ROBOT = "fig10"
 

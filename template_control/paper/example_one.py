@@ -15,8 +15,7 @@ from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import example_one
-from template_control.view.route_figures import route_figures
-from template_control.view.scenario_figures import energy_figure, scenario_figure
+from template_control.view.scenario_figures import energy_figure, route_figures, scenario_figure
 
 _TOP_SPEED = 5.0
 _PAPER_STIFFNESS = 28.2e3

@@ -11,7 +11,7 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Count, Index
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
-from template_control.robustness.disturbance import Disturbance
+from template_control.robustness.disturbances import Disturbance
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
 
@@ -44,18 +44,18 @@ class Level:
 
     Attributes:
         level: the disturbance's size for this robot [SI].
-        succeeded, fell, astray: how many trials; astray is on its feet but not on its gait.
+        succeeded, fell, off_gait: how many trials; off_gait is on its feet but not on its gait.
     """
 
     level: float
     succeeded: int
     fell: int
-    astray: int
+    off_gait: int
 
     @property
     def trials(self) -> int:
         """How many there were."""
-        return self.succeeded + self.fell + self.astray
+        return self.succeeded + self.fell + self.off_gait
 
     @property
     def rate(self) -> float:
@@ -80,7 +80,7 @@ class Finding:
     Attributes:
         disturbance: the one that was raised.
         levels: those tried, from mild to severe.
-        template: the template's own limit; see :func:`~.template_limit.template_limit`.
+        template: the template's own limit; see :func:`~.severity_sweep.template_limit`.
     """
 
     disturbance: Disturbance

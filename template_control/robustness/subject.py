@@ -1,14 +1,19 @@
-"""What is disturbed: the robot, what it keeps, and the engine that it goes in."""
+"""Subject of robustness trials, and the fingerprint of what their results depend on."""
 
 from __future__ import annotations
 
+import ast
+import hashlib
 from dataclasses import dataclass, field
-from typing import Literal
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
 
 from template_control.checks.checked import Checked
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
-from template_control.robustness.disturbance import Situation
+from template_control.robot.biped import Biped
+from template_control.robustness.disturbances import Situation
 from template_control.run.config import RunConfig
 from template_control.run.specs import GaitSpec, RobotSpec
 
@@ -44,3 +49,59 @@ class Subject(Checked):
         ready = RunConfig(self.robot, GaitSpec("run" if runs else "walk", self.speed)).prepare()
         planner = ready.planners[ready.gait.stride]
         return Situation(ready.robot, ready.gait, planner, ENGINES[self.plant]())
+
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_LETTERS = 10
+WITHOUT = ("cli", "paper", "sweep", "view")
+"""Rooms that no trial's result depends on."""
+
+
+def fingerprint(model: Biped, *trials: object) -> str:
+    """Ten letters of a digest of the code that a trial runs, the robot's URDF and the trials.
+
+    Comments, docstrings and lines do not count, nor do the rooms ``WITHOUT``.
+
+    Args:
+        model: the robot.
+        trials: what else the results depend on; known by its ``repr``.
+    """
+    digest = hashlib.sha256(model.urdf.encode())
+    digest.update(_code(_PACKAGE).encode())
+    digest.update(repr(trials).encode())
+    return digest.hexdigest()[:_LETTERS]
+
+
+@cache
+def _code(package: Path) -> str:
+    """Digest of a package's code and data, but for the rooms ``WITHOUT``."""
+    digest = hashlib.sha256()
+    for path in sorted((*package.rglob("*.py"), *package.rglob("*.json"))):
+        place = path.relative_to(package)
+        if place.parts[0] in WITHOUT:
+            continue
+        digest.update(str(place).encode())
+        content = path.read_bytes()
+        if path.suffix == ".py":
+            digest.update(ast.dump(_without_docstrings(ast.parse(content))).encode())
+        else:
+            digest.update(content)
+    return digest.hexdigest()
+
+
+def _without_docstrings(tree: Any) -> Any:
+    """The tree, in place, without statements that are texts."""
+    for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+        statements = getattr(tree, name, None)
+        if isinstance(statements, list):
+            kept = [_without_docstrings(s) for s in statements if not _is_text(s)]
+            setattr(tree, name, kept or [ast.copy_location(ast.Pass(), s) for s in statements[:1]])
+    return tree
+
+
+def _is_text(statement: ast.AST) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )

@@ -3,7 +3,7 @@ from .figures import plot as plot
 from .figures import save_figures as save_figures
 from .replay.replay import save_film as save_film
 from .replay.replay import save_html as save_html
-from .route_figures import save_route_figures as save_route_figures
+from .scenario_figures import save_route_figures as save_route_figures
 from .scenario_figures import save_scenario_figures as save_scenario_figures
 from .stability_figures import basin_figure as basin_figure
 from .stability_figures import branch_figure as branch_figure

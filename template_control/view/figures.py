@@ -1,4 +1,4 @@
-"""Figures of a recorded run: stick diagram, CoM, joint torques, ground forces, and all others."""
+"""Figures of a recorded run, by name."""
 
 from __future__ import annotations
 
@@ -17,9 +17,6 @@ from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.run.record import FloatingRecord, Record
 from template_control.slip.automaton.vocabulary import Event
-from template_control.view.figure_file import save_figure
-from template_control.view.free_figures import FREE_FIGURES
-from template_control.view.running_figures import apex_return, joint_speeds, turning
 from template_control.view.state_figures import (
     energies,
     phase_portrait,
@@ -34,11 +31,195 @@ from template_control.view.style import (
     TRUNK,
     WINDOW,
     as_text,
+    save_figure,
     shade,
+    single_stance,
     window,
 )
 
 Array = NDArray[np.float64]
+
+
+def joint_speeds(record: Record, seconds: float = WINDOW) -> Figure:
+    """Joint speeds with their limits, single stance shaded.
+
+    Args:
+        record: the run.
+        seconds: how much of its end is shown [s].
+    """
+    w = window(record, seconds)
+    names = record.metadata["joints"]
+    limits = record.metadata.get("velocity_limit", ())  # earlier versions did not keep it
+    speed = record.v[:, -len(names) :]
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    panels = figure.subplots(len(record.metadata["legs"]), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, leg in zip(panels, record.metadata["legs"], strict=True):
+        for joint, color in zip(leg, (LEFT, RIGHT, COM, TRUNK), strict=False):
+            axes.plot(record.time[w], speed[w, joint], color=color, label=names[joint])
+            for sign in (-1.0, 1.0) if limits else ():
+                axes.axhline(sign * limits[joint], color=color, linestyle=":", linewidth=0.9)
+        shade(axes, record, w)
+        axes.set_ylabel("speed [rad/s]")
+        axes.legend(loc="upper right")
+    panels[0].set_title(f"{as_text(record.metadata['robot'])}: joint speeds, limits dotted")
+    panels[-1].set_xlabel("time [s]")
+    return figure
+
+
+def apex_return(record: Record) -> Figure:
+    """Each apex against the one before it, in speed and in height; the run has two at least.
+
+    A gait that holds ends on the diagonal, at the target. A pair of points on either side of it
+    is a limp: the state alternates from step to step.
+    """
+    apex = record.section == record.metadata["sections"].index(Event.APEX.name)
+    follows = apex[:-1] & apex[1:]
+    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+    shown = zip(figure.subplots(1, 2), (0, 1), ("dx/dt", "y"), ("m/s", "m"), strict=True)
+    for axes, column, name, unit in shown:
+        z = record.section_state[:, column]
+        before, after = z[:-1][follows], z[1:][follows]
+        number = np.flatnonzero(follows)
+        axes.plot(before, after, color="0.8", linewidth=0.7, zorder=1)
+        points = axes.scatter(before, after, c=number, cmap="viridis", s=12, zorder=2)
+        low, high = min(before.min(), after.min()), max(before.max(), after.max())
+        axes.plot((low, high), (low, high), color=TEMPLATE, linewidth=0.8, linestyle=":")
+        target = record.section_target[:-1, column][follows][-1]
+        axes.plot(target, target, "*", color=RIGHT, markersize=11, zorder=3, label="last target")
+        axes.set(xlabel=f"{name} at an apex [{unit}]", ylabel=f"{name} at the next [{unit}]")
+        axes.legend(loc="upper left")
+    figure.colorbar(points, label="step")
+    figure.suptitle(f"{as_text(record.metadata['robot'])}: from apex to apex")
+    return figure
+
+
+def turning(record: Record, seconds: float = WINDOW) -> Figure:
+    """Pitch of the trunk, and angular momentum about the CoM, single stance shaded.
+
+    In flight the angular momentum keeps its value: the trunk turns against the legs.
+
+    Args:
+        record: the run.
+        seconds: how much of its end is shown [s].
+    """
+    w = window(record, seconds)
+    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.plot(record.time[w], np.degrees(record.q[w, 2]), color=TRUNK)
+    lower.plot(record.time[w], record.angular_momentum[w], color=COM)
+    upper.set_ylabel("trunk pitch [deg]")
+    lower.set_ylabel("angular momentum [N m s]")
+    lower.set_xlabel("time [s]")
+    for axes in (upper, lower):
+        shade(axes, record, w)
+    upper.set_title(
+        f"{as_text(record.metadata['robot'])}: trunk and angular momentum (forward positive)"
+    )
+    return figure
+
+
+_FEET = (("left foot", LEFT), ("right foot", RIGHT))
+
+
+def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
+    """Where and when a foot stood.
+
+    Args:
+        record: the run.
+        foot: its index.
+
+    Returns:
+        (n, 2) x and y in the world in the middle of each stance [m]; (n,) times [s].
+    """
+    weight = record.metadata["mass"] * record.metadata["template"]["gravity"]
+    stands = record.space_force[:, foot, 2] > 0.02 * weight
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], stands.astype(np.int8), [0]))))
+    spans = [(a, b) for a, b in edges.reshape(-1, 2) if record.time[b - 1] - record.time[a] > 0.05]
+    middle = np.array([(a + b) // 2 for a, b in spans], dtype=np.int64)
+    return record.space_foot[middle, foot, :2], record.time[middle]
+
+
+def from_above(record: FloatingRecord, seconds: float = 4.0) -> Figure:
+    """The CoM's path from above with the footholds: of the run, and of its end.
+
+    Args:
+        record: the run.
+        seconds: how much of its end the lower panel shows [s].
+    """
+    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    whole, end = figure.subplots(2, 1, height_ratios=(3, 2))
+    for axes, w in ((whole, slice(None)), (end, window(record, seconds))):
+        path, since = record.space_com[w], record.time[w][0]
+        axes.plot(path[:, 0], path[:, 1], color=COM, linewidth=0.8, label="CoM")
+        for foot, (name, color) in enumerate(_FEET):
+            places, times = footholds(record, foot)
+            shown = places[times >= since]
+            axes.plot(shown[:, 0], shown[:, 1], ".", color=color, markersize=4.0, label=name)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_ylabel("y, to the left [m]")
+    whole.set_title(f"{as_text(record.metadata['robot'])}: path from above")
+    whole.legend(loc="best")
+    end.set_xlabel("x [m]")
+    return figure
+
+
+def lateral_portrait(record: FloatingRecord, seconds: float = 10.0) -> Figure:
+    """Sway over its rate, from the foot that stands: left and right are mirror images.
+
+    Args:
+        record: the run.
+        seconds: how much of its end is shown [s].
+    """
+    w = window(record, seconds)
+    figure = Figure(figsize=(6.0, 5.0), layout="constrained")
+    axes = figure.subplots()
+    sway, single, rear = record.sway[w], single_stance(record)[w], record.rear[w]
+    for foot, (name, color) in enumerate(_FEET):
+        shown = np.where((single & (rear == foot))[:, None], sway, np.nan)
+        axes.plot(1e3 * shown[:, 0], shown[:, 1], color=color, linewidth=0.8, label=f"on {name}")
+    axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)
+    axes.axvline(0.0, color="0.8", linewidth=0.6, zorder=0)
+    axes.set_xlabel("y of the CoM from the stance foot [mm]")
+    axes.set_ylabel("dy/dt [m/s]")
+    axes.set_title(f"{as_text(record.metadata['robot'])}: sway in single stance")
+    axes.legend(loc="best")
+    return figure
+
+
+def attitude(record: FloatingRecord, seconds: float = 4.0) -> Figure:
+    """Roll, pitch and yaw of the trunk in the heading frame: over the run, and its end.
+
+    Args:
+        record: the run.
+        seconds: how much of its end the right column shows [s].
+    """
+    figure = Figure(figsize=(9.0, 5.5), layout="constrained")
+    panels = figure.subplots(3, 2, sharex="col", width_ratios=(2, 1))
+    w = window(record, seconds)
+    for row, name in enumerate(("roll", "pitch", "yaw")):
+        angle = record.attitude[:, row]
+        _line(panels[row, 0], record.time, angle, f"{name} [rad]")
+        _line(panels[row, 1], record.time[w], angle[w], "")
+        shade(panels[row, 1], record, w)
+    panels[0, 0].set_title(f"{as_text(record.metadata['robot'])}: trunk in the heading frame")
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    return figure
+
+
+def _line(axes: Axes, time: Array, angle: Array, name: str) -> None:
+    axes.plot(time, angle, color=TRUNK, linewidth=0.8)
+    axes.axhline(0.0, color=TEMPLATE, linewidth=0.5)
+    axes.set_ylabel(name)
+
+
+FREE_FIGURES: dict[str, Callable[[FloatingRecord], Figure]] = {
+    "from_above": from_above,
+    "lateral_portrait": lateral_portrait,
+    "attitude": attitude,
+}
+"""What only a run in space has, by file name."""
+
 
 _LEGS = (LEFT, RIGHT)
 

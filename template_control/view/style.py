@@ -1,13 +1,17 @@
-"""What the figures of a run share: colours, the part they show, the shading of single stance."""
+"""Shared parts of figures: colours, time window, shading of single stance, file."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Phase
+from template_control.storage import replacing
 
 LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
 WINDOW = 2.2  # [s], about four steps
@@ -56,3 +60,22 @@ def shade(axes: Axes, record: Record, w: slice) -> None:
         zorder=0,
     )
     axes.margins(x=0)
+
+
+DPI = 110
+
+
+def save_figure(figure: Figure, path: str | Path, dpi: int = DPI) -> Path:
+    """Write a figure; a file that is there is replaced by a whole one or stays.
+
+    Args:
+        figure: what to draw.
+        path: of the file; its ending tells the format.
+        dpi: dots per inch, of a picture made of dots.
+
+    Raises:
+        RecordError: if the file cannot be written.
+    """
+    with replacing(path) as place:
+        figure.savefig(place, dpi=dpi)
+    return Path(path)

@@ -22,8 +22,8 @@ from template_control.slip.gaits.family_search import (
 )
 from template_control.storage import Files
 from template_control.terminal import plain_console
-from template_control.view.figure_file import save_figure
 from template_control.view.stability_figures import speed_family_figure
+from template_control.view.style import save_figure
 
 Array = NDArray[np.float64]
 Chains = tuple[list[Member], ...]

@@ -22,20 +22,21 @@ from template_control.cli.trials.common import (
     kept,
 )
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.robustness.campaigns.campaign import (
-    ASTRAY,
+from template_control.robustness.campaign import (
+    FLOATING_MIX,
+    OFF_GAIT,
     Campaign,
-    Conditions,
+    CampaignConfig,
+    DisturbanceDistribution,
     Trial,
     run_campaign,
     save_falls,
 )
-from template_control.robustness.campaigns.mix import FREE_MIX, Mix
 from template_control.run.specs import GaitSpec, RobotSpec
 from template_control.storage import Files, write_text, writing
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
-from template_control.view.trials.campaign_figure import campaign_figure
+from template_control.view.trial_figures import campaign_figure
 
 _LISTED = 20  # trials that went wrong, at most, in the printed table
 
@@ -45,7 +46,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Walk or run a robot many times, each time with start, friction, mass, push, ground step,"
         " noise and delay drawn at once from a mix, which the controller does not know. Tells"
-        f" the share of falls and of trials that end more than {100 * ASTRAY:g} % off the"
+        f" the share of falls and of trials that end more than {100 * OFF_GAIT:g} % off the"
         " gait's speed, with Wilson's 95 % intervals; lists what went wrong first in each fall,"
         " and writes a file that repeats it. Ctrl-C and the same command again go on where it was."
         " Exit status: 0, 2 for bad input, 130 after Ctrl-C."
@@ -90,9 +91,9 @@ def run(options: argparse.Namespace) -> int:
         TemplateControlError: naming the option that is wrong.
     """
     chosen = robot_choice(options, RobotSpec())
-    default = FREE_MIX if chosen.free else Mix()
-    mix = default if options.mix is None else settings.read(Mix, options.mix)
-    conditions = Conditions(
+    default = FLOATING_MIX if chosen.free else DisturbanceDistribution()
+    mix = default if options.mix is None else settings.read(DisturbanceDistribution, options.mix)
+    conditions = CampaignConfig(
         chosen,
         GaitSpec(options.gait, options.speed),
         options.plant,
@@ -104,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         return _try(options, conditions, folder)
 
 
-def _try(options: argparse.Namespace, conditions: Conditions, folder: Path) -> int:
+def _try(options: argparse.Namespace, conditions: CampaignConfig, folder: Path) -> int:
     """Run the trials, with all files in ``folder``."""
     try:
         with workers(options.workers) as pool, stdout_to_stderr():
@@ -125,18 +126,18 @@ def _try(options: argparse.Namespace, conditions: Conditions, folder: Path) -> i
     return 0
 
 
-def _name(robot: str, conditions: Conditions) -> str:
+def _name(robot: str, conditions: CampaignConfig) -> str:
     parts = [robot]
     if conditions.robot.free:
         parts.append("free")
     if conditions.gait.name != "walk":
         parts.append(conditions.gait.name)
-    if conditions.plant != Conditions().plant:
+    if conditions.plant != CampaignConfig().plant:
         parts.append(conditions.plant)
     return "-".join(parts)
 
 
-def _save_mix(mix: Mix, folder: Path) -> Path:
+def _save_mix(mix: DisturbanceDistribution, folder: Path) -> Path:
     head = "# template-control campaign --mix FILE draws from these ranges.\n"
     return write_text(folder / "mix.toml", head + settings.text(settings.to_table(mix)))
 
@@ -161,7 +162,7 @@ def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:
         "trials": len(found.trials),
         "mix": settings.to_table(conditions.mix),
         "fell": _share(found, found.fell),
-        "astray": _share(found, found.astray),
+        "astray": _share(found, found.off_gait),
         "reasons": found.reasons,
         "wrong": [
             {
@@ -173,7 +174,7 @@ def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:
                 "severity": t.severity,
                 "config": str(falls[t.number]) if t.number in falls else None,
             }
-            for t in (*found.fell, *found.astray)
+            for t in (*found.fell, *found.off_gait)
         ],
     }
 
@@ -185,7 +186,7 @@ def _share(found: Campaign, of: tuple[Trial, ...]) -> dict[str, float]:
 
 def _rows(found: Campaign) -> list[tuple[str, str, str, str]]:
     rows = []
-    for name, of in (("fell", found.fell), ("off its gait", found.astray)):
+    for name, of in (("fell", found.fell), ("off its gait", found.off_gait)):
         low, high = found.interval(of)
         share = len(of) / len(found.trials)
         rows.append((name, str(len(of)), f"{share:.2%}", f"{low:.2%} to {high:.2%}"))
@@ -219,7 +220,7 @@ def _print_tables(found: Campaign, falls: dict[int, Path], figure: Path | None) 
     for row in _rows(found):
         table.add_row(*row)
     console.print(table)
-    wrong = (*found.fell, *found.astray)
+    wrong = (*found.fell, *found.off_gait)
     if wrong:
         listed = Table(title="what went wrong")
         for column in ("trial", "first", "how it ended", "repeat it with"):

@@ -15,7 +15,7 @@ from template_control.checks.option_types import SPEED, number, whole
 from template_control.checks.ranges import Range
 from template_control.cli.report.output import INTERRUPTED
 from template_control.robustness.subject import ENGINES, Subject
-from template_control.view.figure_file import save_figure
+from template_control.view.style import save_figure
 
 _MOST = 1000
 

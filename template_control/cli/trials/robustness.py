@@ -21,17 +21,16 @@ from template_control.cli.trials.common import (
 )
 from template_control.errors import ParameterError
 from template_control.plant.quiet import stdout_to_stderr
-from template_control.robustness.aside import ALL
-from template_control.robustness.disturbances import AFTER
+from template_control.robustness.disturbances import AFTER, ALL
 from template_control.robustness.findings import Finding, Robustness
-from template_control.robustness.ladder import SETTLED, measure
+from template_control.robustness.severity_sweep import SETTLED, measure
 from template_control.robustness.subject import Subject
 from template_control.run.specs import GaitSpec, RobotSpec
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writing
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
-from template_control.view.trials.robustness_figure import robustness_figure
+from template_control.view.trial_figures import robustness_figure
 
 _NAMES = tuple(d.name for d in ALL)
 _COLUMNS = (
@@ -160,7 +159,7 @@ def data(found: Robustness) -> dict[str, Any]:
                         "success_rate": level.rate,
                         "interval": level.interval,
                         "fell": level.fell,
-                        "astray": level.astray,
+                        "astray": level.off_gait,
                     }
                     for level in f.levels
                 ],
@@ -177,7 +176,7 @@ def _row(finding: Finding) -> tuple[str, ...]:
         return _up_to(finding, level) + (" or more" if level == last.level else "")
 
     after = next((x for x in finding.levels if x.rate < 1.0), None)
-    beyond = "" if after is None else f"{d.shown(after.level)}: {_told(after.fell, after.astray)}"
+    beyond = "" if after is None else f"{d.shown(after.level)}: {_told(after.fell, after.off_gait)}"
     all_good, half, standing = map(
         point, (finding.breaking_point, finding.half_point, finding.standing_point)
     )
@@ -204,8 +203,8 @@ def _up_to(finding: Finding, level: float | None) -> str:
     return f"not {shown(finding.levels[0].level)}" if level is None else shown(level)
 
 
-def _told(fell: int, astray: int) -> str:
-    parts = [f"{n} {what}" for n, what in ((fell, "fell"), (astray, "off its gait")) if n]
+def _told(fell: int, off_gait: int) -> str:
+    parts = [f"{n} {what}" for n, what in ((fell, "fell"), (off_gait, "off its gait")) if n]
     return ", ".join(parts)
 
 

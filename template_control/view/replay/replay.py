@@ -13,7 +13,7 @@ from template_control.view.replay.film import write_film
 from template_control.view.replay.playback import playback
 
 if TYPE_CHECKING:
-    from template_control.view.replay.replay_server import ReplayServer
+    from template_control.view.replay.viewer import ReplayServer
 
 # meshcat brings ZeroMQ and IPython along: it is imported where a replay begins, so that
 # whoever only walks a robot does not wait for it.
@@ -50,8 +50,8 @@ def replay(
         ParameterError: if a number is out of its range.
         RecordError: if the run or its robot cannot be shown, or the server does not start.
     """
-    from template_control.view.replay.replay_scene import scene_commands
-    from template_control.view.replay.replay_server import ReplayServer
+    from template_control.view.replay.scene import scene_commands
+    from template_control.view.replay.viewer import ReplayServer
 
     frames = playback(record, fps=fps, speed=speed, start=start, end=end)
     return ReplayServer(scene_commands(frames), port)
@@ -76,8 +76,8 @@ def save_html(
         ParameterError: if a number is out of its range.
         RecordError: if the run cannot be shown, or the file not be written.
     """
-    from template_control.view.replay.replay_page import write_page
-    from template_control.view.replay.replay_scene import scene_commands
+    from template_control.view.replay.scene import scene_commands
+    from template_control.view.replay.viewer import write_page
 
     frames = playback(record, fps=fps, speed=speed, start=start, end=end)
     m = record.metadata

@@ -1,4 +1,4 @@
-"""How much a robot's walk or run takes: every disturbance raised until it breaks.
+"""Severity sweep: every disturbance raised until a robot's walk or run breaks.
 
 All disturbances are raised together, one level after the other, each level a sweep whose
 trials are on disk as they finish. A disturbance is left out from the level on where all trials
@@ -14,23 +14,69 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from template_control import settings
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError, RobotError, SweepError
-from template_control.robustness.aside import ALL
-from template_control.robustness.disturbance import Disturbance, Situation
-from template_control.robustness.disturbances import AFTER, BEGIN, DISTURBANCES
+from template_control.robustness.disturbances import (
+    AFTER,
+    ALL,
+    BEGIN,
+    DISTURBANCES,
+    Disturbance,
+    Situation,
+)
 from template_control.robustness.findings import Finding, Level, Robustness
-from template_control.robustness.fingerprint import fingerprint
-from template_control.robustness.subject import Engine, Subject
-from template_control.robustness.template_limit import template_limit
+from template_control.robustness.subject import Engine, Subject, fingerprint
 from template_control.run.options import SimulationOptions
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
 from template_control.run.specs import RobotSpec
+from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.gait import Gait
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.sweep.sweep import Item, SweepOptions, sweep
+
+Array = NDArray[np.float64]
+
+
+def template_limit(
+    disturbance: Disturbance, where: Situation, strides: int, settled: float
+) -> float | None:
+    """The severest level up to which the template comes back to its gait from its section.
+
+    Args:
+        disturbance: one that changes the state at once.
+        where: whose gait and planner.
+        strides: after which the template must be back.
+        settled: relative error of speed and height that counts as back.
+
+    Returns:
+        The level [SI]; 0 if it does not come back from the mildest. None where the template has
+        no limit of its own, as to friction.
+    """
+    if disturbance.kick is None:
+        return None
+    last = 0.0
+    for level in disturbance.levels_for(where.gait.parameters):
+        kick = disturbance.kick(where, level)[: len(where.gait.state)]
+        if not _returns(where, where.gait.state + kick, strides, settled):
+            break
+        last = level
+    return last
+
+
+def _returns(where: Situation, z: Array, strides: int, settled: float) -> bool:
+    gait, planner = where.gait, where.planner
+    step = ReturnMap(gait.parameters, gait.stride)
+    planner.reset()
+    for _ in range(strides):
+        z, outcome = step.step(z, planner.decide(z).controls)
+        if outcome is not Outcome.SECTION:
+            return False
+    return bool((abs(z[:2] / gait.state[:2] - 1.0) < settled).all())
+
 
 SETTLED = 0.02
 """How near to the gait's mean speed and height at its section a robot must be to be back on it."""
@@ -40,7 +86,7 @@ _QUICK_LEVELS, _QUICK_TRIALS = 2, 2
 _BY_NAME = {d.name: d for d in ALL}
 
 
-def off_gait(record: Record, gait: Gait) -> tuple[float, float]:
+def gait_errors(record: Record, gait: Gait) -> tuple[float, float]:
     """How far a robot's last 5 steps are from its gait, relative to the gait.
 
     Args:
@@ -83,7 +129,7 @@ def trial(
     where = Subject(choice, speed, plant).situation()
     options = _BY_NAME[disturbance].options(where, level, number)
     record = simulate(where.robot, where.planner, options)
-    errors = (None, None) if record.fell else off_gait(record, where.gait)
+    errors = (None, None) if record.fell else gait_errors(record, where.gait)
     return {
         "fell": record.fell,
         "reason": record.metadata["fall_reason"],
@@ -174,7 +220,7 @@ def measure(
             of_level = [next(results) for _ in range(d.trials)]
             level = _judged(d, levels[d.name][index], of_level)
             found[d.name] = replace(found[d.name], levels=(*found[d.name].levels, level))
-    errors = off_gait(undisturbed, gait)
+    errors = gait_errors(undisturbed, gait)
     findings = tuple(found[d.name] for d in chosen)
     return Robustness(model.name, gait, *errors, findings, subject.plant)
 
@@ -205,10 +251,10 @@ def _shortened(disturbance: Disturbance, quick: bool) -> Disturbance:
 def _judged(disturbance: Disturbance, level: float, results: list[dict[str, Any]]) -> Level:
     """Count the trials of one level."""
     fell = sum(r["fell"] for r in results)
-    astray = sum(
+    off_gait = sum(
         not r["fell"] and max(abs(r["speed_error"]), abs(r["height_error"])) > SETTLED
         for r in results
     )
     if not disturbance.passing:
-        astray = 0
-    return Level(level, len(results) - fell - astray, fell, astray)
+        off_gait = 0
+    return Level(level, len(results) - fell - off_gait, fell, off_gait)

@@ -20,7 +20,7 @@ _STRAIGHT = 0.998  # of the leg's length, that a knee is straight from on
 _WALL = 2.0  # times the friction, which only an edge of the ground can press with
 
 
-def first_wrong(record: Record) -> str:
+def fall_cause(record: Record) -> str:
     """The first of these that happened in the four strides before a fall.
 
     ``failed QP``; ``torque limit``: a joint is at its limit for 20 ms on end; ``slip``: a loaded

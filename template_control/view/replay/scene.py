@@ -1,12 +1,13 @@
-"""The 3-D scene of a replay: what meshcat is told, objects first, then their animation.
+"""3-D scene of a replay as meshcat's commands: objects first, then their animation.
 
-Forward is meshcat's x, to the left its y and up its z; a free robot's are the world's. The camera
-stands to the right; the world moves backward past it, because meshcat's camera always looks at its
-origin.
+Forward is meshcat's x, to the left its y and up its z; a floating-base robot's are the world's.
+The camera stands to the right; the world moves backward past it, because meshcat's camera always
+looks at its origin.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,18 +18,181 @@ from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform
 from meshcat.path import Path as ScenePath
 from numpy.typing import NDArray
 
+from template_control.plant.terrain.terrain import Terrain
+from template_control.run.record import FloatingRecord, Record
 from template_control.view.replay.playback import (
     Playback,
+    arrows_of,
     carrying,
+    footholds,
+    force_arrows,
     spring,
     template_legs,
 )
-from template_control.view.replay.replay_ground import ground_shape, plates, smoothed
-from template_control.view.replay.replay_space import Space, in_space, raised, turned_to
 from template_control.view.replay.robot_visuals import Robot, foot_sides, load_visuals, placements
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
 Array = NDArray[np.float64]
+
+_AROUND = 11  # places that a height is the mean of
+
+
+def plates(centres: Array, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
+    """Rectangles that lie level.
+
+    Args:
+        centres: (N, 3) [m].
+        size: along x and y [m].
+
+    Returns:
+        Vertices (4 N, 3) and faces (2 N, 3).
+    """
+    corners = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*size, 0.0]
+    faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(centres))[:, None, None]
+    return (centres[:, None] + corners).reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tuple[Any, Array]:
+    """The ground under a line: a board where it is level, else its surface.
+
+    Args:
+        line: (N, 2) x and height of its points [m].
+        sides: y of its right and its left edge [m].
+        length: the template's rest length [m].
+
+    Returns:
+        The shape and its placement (4, 4).
+    """
+    place = np.eye(4)
+    (low, level), (high, _), (right, left) = line[0], line[-1], sides
+    if np.all(line[:, 1] == level):
+        thick = 0.02 * length
+        place[:3, 3] = 0.5 * (low + high), 0.5 * (right + left), level - 0.5 * thick
+        return mg.Box([high - low, left - right, thick]), place
+    count = len(line)
+    edges = [np.column_stack((line[:, 0], np.full(count, y), line[:, 1])) for y in sides]
+    first = np.arange(count - 1)
+    near = np.column_stack((first, first + 1, first + count))
+    far = np.column_stack((first + 1, first + count + 1, first + count))
+    surface = mg.TriangularMeshGeometry(np.concatenate(edges), np.concatenate((near, far)))
+    return surface, place
+
+
+def smoothed(ground: Terrain, x: Array, length: float) -> Array:
+    """Height of the ground around places, without its edges: a camera goes up and down with it.
+
+    Args:
+        ground: whose height.
+        x: (N,) the places [m].
+        length: over which the mean is taken [m].
+    """
+    around = np.linspace(-0.5, 0.5, _AROUND) * length
+    return np.array([np.mean([ground.height_at(p) for p in place + around]) for place in x])
+
+
+_LANDED = 0.015  # [s] after its touchdown a foot rests
+
+
+@dataclass(frozen=True)
+class Space:
+    """Where things are; x forward or as the world's, y to the left, z up [m].
+
+    Attributes:
+        com: (T, 3) of the robot.
+        template: (T, 3) the template's CoM.
+        toes: (T, 2, 3) of the template's rear and front leg.
+        foot: (T, 2, 3) left and right.
+        arrow: (T, 2, 3) the ground's force on each foot, drawn.
+        stood: for each foot (n, 3) where it stood, and (n,) since when [s].
+    """
+
+    com: Array
+    template: Array
+    toes: Array
+    foot: Array
+    arrow: Array
+    stood: tuple[tuple[Array, Array], tuple[Array, Array]]
+
+
+def in_space(record: Record, sides: Array) -> Space:
+    """A run in three directions.
+
+    Args:
+        record: the run.
+        sides: (2,) how far to the left a planar robot's feet are [m]; not asked of a free one.
+    """
+    if isinstance(record, FloatingRecord):
+        return _free(record)
+    ground, aside = record.ground, np.array([0.0, 1.0, 0.0])
+    found = footholds(record)
+    stood = []
+    for foot, side in enumerate(sides.tolist()):
+        own = [f for f in found if f.foot == foot]
+        places = [[f.x, side, ground.height_at(f.x)] for f in own]
+        stood.append((np.array(places).reshape(-1, 3), np.array([f.time for f in own])))
+    toes, _ = template_legs(record)
+    return Space(
+        com=raised(record.com),
+        template=raised(record.template_com),
+        toes=raised(toes),
+        foot=raised(record.foot) + sides[:, None] * aside,
+        arrow=raised(force_arrows(record)),
+        stood=(stood[0], stood[1]),
+    )
+
+
+def _free(record: FloatingRecord) -> Space:
+    away = record.template_com - record.com
+    ahead = np.stack((np.cos(record.heading), np.sin(record.heading)), axis=1)
+    template = record.space_com + np.column_stack((away[:, :1] * ahead, away[:, 1]))
+    samples = np.arange(len(record.time))
+    toes = np.stack(
+        (record.space_foot[samples, record.rear], record.space_foot[samples, 1 - record.rear]),
+        axis=1,
+    )
+    found = footholds(record)
+    stood = []
+    for foot in range(2):
+        since = np.array([f.time for f in found if f.foot == foot])
+        rows = np.searchsorted(record.time, since + _LANDED)
+        stood.append((record.space_foot[np.minimum(rows, len(samples) - 1), foot], since))
+    arrow = arrows_of(record.space_force, record)
+    arrow[~carrying(record)] = 0.0
+    return Space(record.space_com, template, toes, record.space_foot, arrow, (stood[0], stood[1]))
+
+
+def raised(points: Array) -> Array:
+    """Points of the plane in space.
+
+    Args:
+        points: (..., 2) x and height [m].
+
+    Returns:
+        (..., 3) with y = 0 [m].
+    """
+    return np.stack((points[..., 0], np.zeros(points.shape[:-1]), points[..., 1]), axis=-1)
+
+
+def turned_to(direction: Array) -> Array:
+    """Quaternions that turn the vertical z into directions.
+
+    Args:
+        direction: (F, 3); where it is zero nothing turns.
+
+    Returns:
+        (F, 4) x, y, z, w.
+    """
+    x, y, z = direction.T
+    size = np.linalg.norm(direction, axis=1)
+    zero = np.zeros(len(size))
+    # Upward the smallest turn; downward a half turn about y and the smallest after it, so that a
+    # leg that passes the vertical does not spin.
+    up = np.stack((-y, x, zero, size + z), axis=1)
+    down = np.stack((zero, size - z, y, x), axis=1)
+    found = np.where((z < 0.0)[:, None], down, up)
+    found[size == 0.0] = 0.0, 0.0, 0.0, 1.0
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
 
 _FLOAT32 = 0x17  # the viewer's MessagePack extension for a Float32Array
 _FOREVER = 1_000_000

@@ -1,27 +1,28 @@
-"""How sure a gait is: many trials, each with a draw of everything that disturbs, all at once."""
+"""Monte Carlo campaign: fall rate under random disturbances, all at once."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from math import radians
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from template_control import settings
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Count, Index
+from template_control.checks.ranges import Count, Index, NotNegative
 from template_control.errors import ParameterError, SweepError
+from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
-from template_control.robustness.campaigns.first_wrong import first_wrong
-from template_control.robustness.campaigns.mix import Draw, Mix
 from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
+from template_control.robustness.fall_cause import fall_cause
 from template_control.robustness.findings import wilson_interval
-from template_control.robustness.fingerprint import fingerprint
-from template_control.robustness.ladder import off_gait
-from template_control.robustness.subject import ENGINES, Engine
+from template_control.robustness.severity_sweep import gait_errors
+from template_control.robustness.subject import ENGINES, Engine, fingerprint
 from template_control.run.config import PreparedRun, RunConfig
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.sensing import SensorOptions
@@ -29,12 +30,163 @@ from template_control.run.specs import GaitSpec, RobotSpec
 from template_control.slip.similarity import Scale
 from template_control.sweep.sweep import Item, SweepOptions, item_seed, sweep
 
-ASTRAY = 0.03
+Ends = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class DisturbanceSample(Checked):
+    """What disturbs one trial; units and meaning as in :class:`DisturbanceDistribution`.
+
+    Attributes:
+        speed, height: how far off its gait the robot starts.
+        friction: of the ground.
+        mass: error of every link's.
+        push: impulse on the trunk.
+        direction: of the push, to the left of forward [deg].
+        push_at: when it begins, in steps from the start.
+        ground_step: height of the step.
+        ground_step_at: place of its edge, in step lengths from the start.
+        noise: of the sensors.
+        delay: of the torques.
+    """
+
+    speed: float = 0.0
+    height: float = 0.0
+    friction: float = PlantOptions().friction
+    mass: float = 0.0
+    push: float = 0.0
+    push_at: float = 0.0
+    ground_step: float = 0.0
+    ground_step_at: float = 0.0
+    noise: float = 0.0
+    delay: float = 0.0
+    direction: float = 0.0
+
+
+@dataclass(frozen=True)
+class DisturbanceDistribution(Checked):
+    """Ranges of the disturbances; a trial draws one number uniformly from each, by its seed.
+
+    Numbers with a dimension are those of the reference template (80 kg, 1 m); another robot gets
+    them scaled by dynamic similarity. The controller is told of none of them.
+
+    Attributes:
+        speed: of the start's dx/dt, a share of the gait's.
+        height: of the start's y at the section [m].
+        friction: coefficient of the ground; the controller reckons with 0.9 of 0.7.
+        mass: of every link, a share too much.
+        push: impulse on the trunk over 0.1 s, forward positive [N s].
+        ground_step: height of one step of the ground, up positive [m].
+        noise: standard deviation of measured angles [rad]; see ``SensorOptions.of_size``.
+        delay: from measurement to torque [s], rounded to physics steps.
+        direction: of the push, to the left of forward [deg]; only a free robot has other directions
+            than 0, and it is no part of a draw's severity.
+        within: steps in which push and ground step come, anywhere in them.
+        after: steps that follow.
+
+    Raises:
+        ParameterError: if a range's ends are out of order, or a number is out of its range.
+    """
+
+    speed: Ends = (-0.05, 0.05)
+    height: Ends = (-0.02, 0.02)
+    friction: Ends = (0.5, 1.0)
+    mass: Ends = (-0.1, 0.1)
+    push: Ends = (-20.0, 20.0)
+    ground_step: Ends = (-0.02, 0.02)
+    noise: tuple[NotNegative, NotNegative] = (5e-4, 5e-4)
+    delay: tuple[NotNegative, NotNegative] = (0.0, 0.004)
+    direction: Ends = (0.0, 0.0)
+    within: tuple[Index, Count] = (2, 6)
+    after: Count = 20
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        own = type(self).__name__
+        for f in fields(self):
+            ends = getattr(self, f.name)
+            if isinstance(ends, tuple) and ends[0] > ends[1]:
+                raise ParameterError(f"{own}.{f.name} is {list(ends)}: give its lower end first")
+        if self.within[0] == self.within[1]:
+            raise ParameterError(
+                f"{own}.within is {list(self.within)}: give two numbers that differ"
+            )
+        for name, lowest in (("friction", 0.0), ("mass", -1.0)):
+            if getattr(self, name)[0] <= lowest:
+                raise ParameterError(
+                    f"{own}.{name} is {list(getattr(self, name))}: stay above {lowest:g}"
+                )
+
+    @property
+    def steps(self) -> int:
+        """Steps of a trial."""
+        return self.within[1] + self.after
+
+    def draw(self, seed: Index) -> DisturbanceSample:
+        """The numbers of one trial.
+
+        Args:
+            seed: of the draw.
+        """
+        lot = np.random.default_rng(seed)
+        drawn = {name: float(lot.uniform(*getattr(self, name))) for name in _DRAWN}
+        at = lot.uniform(*self.within, 2)
+        drawn["direction"] = float(lot.uniform(*self.direction))
+        return DisturbanceSample(**drawn, push_at=float(at[0]), ground_step_at=float(at[1]))
+
+    def times(self, factor: NotNegative) -> DisturbanceDistribution:
+        """The same mix with all its ranges so many times as far from where nothing disturbs.
+
+        Args:
+            factor: 0 for no disturbance, 1 for this mix.
+
+        Raises:
+            ParameterError: if a range then holds what cannot be, such as a friction below 0.
+        """
+        ends: dict[str, Any] = {}
+        for name in _DRAWN:
+            still = getattr(_STILL, name)
+            ends[name] = tuple(still + factor * (end - still) for end in getattr(self, name))
+        try:
+            return replace(self, **ends)
+        except ParameterError as error:
+            text = str(error).replace(f"{type(self).__name__}.", "")
+            raise ParameterError(f"the mix {factor:g} times as severe: {text}") from None
+
+    def severity(self, draw: DisturbanceSample) -> float:
+        """How severe a draw is for this mix: root mean square of its shares of the ranges.
+
+        Each share is a number's distance from where nothing disturbs over the distance of its
+        range's end on that side. Ranges of no width are left out, as all trials share them.
+
+        Args:
+            draw: of this mix.
+        """
+        shares = []
+        for name in _DRAWN:
+            (low, high), still = getattr(self, name), getattr(_STILL, name)
+            away = getattr(draw, name) - still
+            reach = (high if away > 0.0 else low) - still
+            if low < high:
+                shares.append(away / reach if away != 0.0 else 0.0)
+        return float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
+
+
+FLOATING_MIX = DisturbanceDistribution(
+    height=(-0.01, 0.01), push=(0.0, 10.0), ground_step=(-0.01, 0.01), direction=(-180.0, 180.0)
+)
+"""For a robot that nothing holds: pushes from all sides, half as strong, and half the heights."""
+
+_DRAWN = ("speed", "height", "friction", "mass", "push", "ground_step", "noise", "delay")
+_STILL = DisturbanceSample()  # nothing disturbs
+
+
+OFF_GAIT = 0.03
 """Share of the gait's mean speed beyond which a robot is off its gait after the last step."""
 
 
 @dataclass(frozen=True)
-class Conditions(Checked):
+class CampaignConfig(Checked):
     """What is tried.
 
     Attributes:
@@ -52,18 +204,18 @@ class Conditions(Checked):
     robot: RobotSpec = field(default_factory=RobotSpec)
     gait: GaitSpec = field(default_factory=GaitSpec)
     plant: Engine = "pybullet"
-    mix: Mix = field(default_factory=Mix)
+    mix: DisturbanceDistribution = field(default_factory=DisturbanceDistribution)
     seed: Index = 0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.robot.free and self.mix.direction != Mix().direction:
+        if not self.robot.free and self.mix.direction != DisturbanceDistribution().direction:
             raise ParameterError(
                 f"the mix has the direction {list(self.mix.direction)}, and {self.robot.model} is"
                 " held in its plane: leave it out, or take a free robot"
             )
 
-    def draw(self, number: Index) -> Draw:
+    def draw(self, number: Index) -> DisturbanceSample:
         """What disturbs a trial.
 
         Args:
@@ -111,7 +263,7 @@ class Conditions(Checked):
 _SEED_BITS = 63  # that TOML can say
 
 
-def _ground_step(draw: Draw, length: float, step_length: float) -> GroundStep | None:
+def _ground_step(draw: DisturbanceSample, length: float, step_length: float) -> GroundStep | None:
     height = draw.ground_step * length
     return GroundStep(height, draw.ground_step_at * step_length) if height != 0.0 else None
 
@@ -123,7 +275,7 @@ class Trial(NamedTuple):
         number: from 0.
         fell: whether the robot fell.
         reason: of the fall, "" without one.
-        first: what went wrong first, "" without a fall; see :func:`first_wrong`.
+        first: what went wrong first, "" without a fall; see :func:`fall_cause`.
         speed_error: mean speed of the last 5 steps over the gait's, less one; None after a fall.
         draw: what disturbed.
         severity: of the draw.
@@ -134,18 +286,18 @@ class Trial(NamedTuple):
     reason: str
     first: str
     speed_error: float | None
-    draw: Draw
+    draw: DisturbanceSample
     severity: float
 
     @property
-    def astray(self) -> bool:
+    def off_gait(self) -> bool:
         """Whether the robot is on its feet and off its gait."""
-        return self.speed_error is not None and abs(self.speed_error) > ASTRAY
+        return self.speed_error is not None and abs(self.speed_error) > OFF_GAIT
 
     @property
     def good(self) -> bool:
         """Whether it is on its gait."""
-        return not (self.fell or self.astray)
+        return not (self.fell or self.off_gait)
 
 
 @dataclass(frozen=True)
@@ -157,7 +309,7 @@ class Campaign:
         trials: by number.
     """
 
-    conditions: Conditions
+    conditions: CampaignConfig
     trials: tuple[Trial, ...]
 
     @property
@@ -166,9 +318,9 @@ class Campaign:
         return tuple(t for t in self.trials if t.fell)
 
     @property
-    def astray(self) -> tuple[Trial, ...]:
+    def off_gait(self) -> tuple[Trial, ...]:
         """Trials that ended on the feet, off the gait."""
-        return tuple(t for t in self.trials if t.astray)
+        return tuple(t for t in self.trials if t.off_gait)
 
     @property
     def reasons(self) -> dict[str, int]:
@@ -194,19 +346,19 @@ def campaign_trial(conditions: dict[str, Any], number: int) -> dict[str, Any]:
     Returns:
         fell, reason, first, speed_error; see :class:`Trial`.
     """
-    config, ready = settings.from_table(Conditions, conditions).trial(number)
+    config, ready = settings.from_table(CampaignConfig, conditions).trial(number)
     record = ready.run(config.simulation)
     return {
         "fell": record.fell,
         "reason": record.metadata["fall_reason"],
-        "first": first_wrong(record) if record.fell else "",
-        "speed_error": None if record.fell else off_gait(record, ready.gait)[0],
+        "first": fall_cause(record) if record.fell else "",
+        "speed_error": None if record.fell else gait_errors(record, ready.gait)[0],
     }
 
 
 @checked
 def run_campaign(
-    conditions: Conditions,
+    conditions: CampaignConfig,
     trials: Count,
     folder: Path | None = None,
     executor: Executor | None = None,
@@ -265,5 +417,5 @@ def save_falls(campaign: Campaign, folder: Path) -> dict[int, Path]:
     """
     return {
         t.number: campaign.conditions.trial(t.number)[0].save(folder / f"trial-{t.number:04d}.toml")
-        for t in (*campaign.fell, *campaign.astray)
+        for t in (*campaign.fell, *campaign.off_gait)
     }

@@ -1,1 +1,0 @@
-"""Many trials with everything disturbed at once: how sure a gait is."""

@@ -1,0 +1,154 @@
+"""Figures of many trials: robustness level by level, and campaigns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from template_control.robustness.campaign import Campaign, Trial
+from template_control.robustness.disturbances import AFTER
+from template_control.robustness.findings import Finding, Robustness, wilson_interval
+from template_control.view.style import LEFT, RIGHT, as_text
+
+_SHOWN = {
+    "friction": ("friction", 1.0),
+    "mass": ("mass [%]", 100.0),
+    "push": ("push [N s]", 1.0),
+    "direction": ("push, direction [deg]", 1.0),
+    "ground_step": ("ground step [cm]", 100.0),
+    "noise": ("noise [mrad]", 1e3),
+    "delay": ("delay [ms]", 1e3),
+    "speed": ("start, speed [%]", 100.0),
+    "height": ("start, height [cm]", 100.0),
+}
+_BINS = 6  # each with as many trials
+_COLUMNS = 3
+
+
+def campaign_figure(campaign: Campaign) -> Figure:
+    """Shares of trials, by severity and by each number that is drawn.
+
+    Each mark is a sixth of the trials, at their mean: the share without a fall, and the share on
+    the gait. Bars are Wilson's 95 % intervals; the scale begins below the lowest of them. Pushes,
+    lengths and times are those of the reference template.
+
+    Args:
+        campaign: with at least one trial.
+    """
+    mix = campaign.conditions.mix
+    panels = {"severity": np.array([t.severity for t in campaign.trials])}
+    for name, (title, factor) in _SHOWN.items():
+        low, high = getattr(mix, name)
+        if low < high:
+            panels[title] = factor * np.array([getattr(t.draw, name) for t in campaign.trials])
+    rows = -(-len(panels) // _COLUMNS)
+    figure = Figure(figsize=(9.0, 2.2 * rows + 0.6), layout="constrained")
+    axes = figure.subplots(rows, _COLUMNS, sharey=True, squeeze=False).ravel()
+    for panel, (title, values) in zip(axes, panels.items(), strict=False):
+        _share_panel(panel, values, campaign.trials)
+        panel.set_xlabel(title, fontsize=9)
+    for panel in axes[len(panels) :]:
+        panel.set_visible(False)
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), fontsize=8, loc="outside lower center", ncols=2
+    )
+    figure.supylabel("share of the trials [%]", fontsize=9)
+    robot, plant = as_text(campaign.conditions.robot.model), campaign.conditions.plant
+    figure.suptitle(f"{robot} in {plant}: {len(campaign.trials)} trials, all disturbed at once")
+    return figure
+
+
+def _share_panel(axes: Axes, values: NDArray[np.float64], trials: Sequence[Trial]) -> None:
+    for shift, (label, color, good) in enumerate(
+        (
+            ("no fall", RIGHT, [not t.fell for t in trials]),
+            ("on its gait", LEFT, [t.good for t in trials]),
+        )
+    ):
+        width = 0.01 * (float(np.ptp(values)) or 1.0)
+        for part in np.array_split(np.argsort(values, kind="stable"), _BINS):
+            if len(part):
+                count = int(np.sum(np.array(good)[part]))
+                share = count / len(part)
+                low, high = wilson_interval(count, len(part))
+                axes.errorbar(
+                    values[part].mean() + shift * width,
+                    100.0 * share,
+                    100.0 * np.array([[share - low], [high - share]]),
+                    fmt="o",
+                    color=color,
+                    markersize=3.5,
+                    linewidth=1.2,
+                    label=label,
+                )
+                label = "_"
+    axes.tick_params(labelsize=8)
+
+
+_RATE, _STANDING, _POINT = "#2a6196", "0.6", "#db7321"
+_TEMPLATE = "#3d8a4f"
+_LEVEL_COLUMNS = 5
+
+
+def robustness_figure(found: Robustness) -> Figure:
+    """Success rate in per cent over the levels, severity growing to the right.
+
+    The dashed line is the breaking point: the last level up to which all trials succeed. Grey:
+    trials without a fall, where success asks for more. The band holds the true rate with 95 %
+    confidence. Dotted: what the template alone takes at its section.
+    """
+    columns = min(_LEVEL_COLUMNS, len(found.findings))
+    rows = -(-len(found.findings) // columns)
+    figure = Figure(figsize=(2.1 * columns + 0.4, 2.0 * rows + 0.7), layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    for axes, finding in zip(panels, found.findings, strict=False):
+        _level_panel(axes, finding)
+    for axes in panels[len(found.findings) :]:
+        axes.set_visible(False)
+    figure.supylabel("success rate [%]", fontsize=9)
+    figure.suptitle(
+        f"{as_text(found.robot)} in {found.plant}: success over {AFTER} steps", fontsize=10
+    )
+    marks = (
+        Line2D([], [], color=_RATE, marker="o", markersize=3.5, label="success"),
+        Line2D([], [], color=_STANDING, label="no fall"),
+        Line2D([], [], color=_POINT, linestyle="--", label="breaking point"),
+        Patch(color=_RATE, alpha=0.15, label="95 % confidence"),
+        Line2D([], [], color=_TEMPLATE, linestyle=":", label="the template alone"),
+    )
+    figure.legend(
+        handles=marks, loc="outside lower center", ncols=len(marks), fontsize=8, frameon=False
+    )
+    return figure
+
+
+def _level_panel(axes: Axes, finding: Finding) -> None:
+    d = finding.disturbance
+    levels = d.unit.factor * np.array([level.level for level in finding.levels])
+    rates = 100.0 * np.array([level.rate for level in finding.levels])
+    if d.passing:
+        standing = 100.0 * np.array([level.standing for level in finding.levels])
+        axes.plot(levels, standing, ".-", color=_STANDING, linewidth=1.2)
+    sure = 100.0 * np.array([level.interval for level in finding.levels])
+    axes.fill_between(levels, *sure.T, color=_RATE, alpha=0.15, linewidth=0.0)
+    axes.plot(levels, rates, "o-", color=_RATE, markersize=3.5, linewidth=1.2)
+    if finding.template:
+        limit = d.unit.factor * finding.template
+        axes.axvline(limit, color=_TEMPLATE, linestyle=":", linewidth=1.2)
+    if finding.breaking_point is not None:
+        axes.axvline(
+            d.unit.factor * finding.breaking_point, color=_POINT, linestyle="--", linewidth=1.0
+        )
+    axes.axhline(50.0, color="0.85", linewidth=0.8, zorder=0)
+    if len(levels) > 1 and levels[-1] < levels[0]:
+        axes.invert_xaxis()
+    axes.set_ylim(-5.0, 105.0)
+    axes.set_title(d.title, fontsize=9)
+    axes.set_xlabel(d.unit.name or "coefficient", fontsize=8)
+    axes.tick_params(labelsize=8)

@@ -1,1 +1,0 @@
-"""Figures of many trials: robustness level by level, and campaigns."""
