@@ -21,8 +21,8 @@ from rich.table import Table
 from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.robot_template import default_gait, template_for
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant

@@ -12,10 +12,10 @@ from . import view as view
 from . import whole_body as whole_body
 from .embedding.controller import EmbeddingController as EmbeddingController
 from .embedding.options import EmbeddingOptions as EmbeddingOptions
+from .embedding.planners.lqr import LqrOptions as LqrOptions
+from .embedding.planners.lqr import LqrPlanner as LqrPlanner
+from .embedding.planners.modified import ModifiedPlanner as ModifiedPlanner
 from .embedding.planners.running import RunningPlanner as RunningPlanner
-from .embedding.planners.walking.lqr import LqrPlanner as LqrPlanner
-from .embedding.planners.walking.lqr_options import LqrOptions as LqrOptions
-from .embedding.planners.walking.modified import ModifiedPlanner as ModifiedPlanner
 from .embedding.robot_template import default_gait as default_gait
 from .embedding.robot_template import robot_gait_for_speed as robot_gait_for_speed
 from .embedding.robot_template import template_for as template_for

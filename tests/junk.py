@@ -119,7 +119,7 @@ def targets(folder):
         tc.SensorOptions, tc.Terrain,
         tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
         embedding.FrictionOptions,
-        embedding.AheadOptions, embedding.RehearsalOptions,
+        embedding.AheadOptions,
         embedding.ModifiedOptions, embedding.ReplanOptions,
         embedding.RunningOptions, embedding.StandingOptions, slip.PaceOptions,
         embedding.SwingOptions, run.FallOptions,

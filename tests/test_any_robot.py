@@ -8,8 +8,8 @@ import pinocchio as pin
 import pytest
 
 from template_control.cli.main import main
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import RobotError
 from template_control.robot.five_link import FiveLink, Link

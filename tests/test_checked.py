@@ -94,7 +94,7 @@ OPTIONS = [
     tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
     tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
     embedding.FrictionOptions,
-    embedding.AheadOptions, embedding.RehearsalOptions,
+    embedding.AheadOptions,
     embedding.ModifiedOptions, embedding.ReplanOptions,
     embedding.RunningOptions, TransitionOptions, run.GaitSpec,
     embedding.SwingOptions, run.FallOptions,

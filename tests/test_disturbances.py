@@ -7,7 +7,7 @@ import pybullet
 import pytest
 
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import BulletPlant, PlantOptions

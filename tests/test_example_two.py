@@ -7,7 +7,7 @@ import pytest
 
 from template_control.embedding.modes import GuardOptions, RobotGuards
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.state import Sensed
 from template_control.paper.example_two import (
     EARLIER,

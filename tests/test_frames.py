@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from other_frames import rewritten
 
-from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.robot_template import default_gait, template_for
 from template_control.errors import RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions

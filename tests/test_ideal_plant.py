@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from template_control.embedding.modes import GuardOptions
-from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant

@@ -8,15 +8,36 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.embedding.ahead.gait_row import CONTROL, CONTROLS, STATE, STIFFNESS, WIDTH
-from template_control.embedding.ahead.gait_table import SLOTS, gait_table, row_at
-from template_control.embedding.ahead.look_ahead import look_ahead
-from template_control.embedding.ahead.options import AheadOptions
-from template_control.embedding.ahead.plan_cost import aimed, residuals, slopes
-from template_control.embedding.ahead.planner import AheadPlanner, prospect
-from template_control.embedding.ahead.prospect import Aim, Plan, Workspace
-from template_control.embedding.ahead.rehearsal import rehearse
+from template_control.embedding.planners.ahead import (
+    RISE,
+    SPACING,
+    AheadOptions,
+    AheadPlanner,
+    plan_problem,
+    rehearse,
+)
+from template_control.embedding.planners.gait_table import (
+    CONTROL,
+    CONTROLS,
+    SLOTS,
+    STATE,
+    STIFFNESS,
+    WIDTH,
+    gait_table,
+    row_at,
+)
+from template_control.embedding.planners.look_ahead import (
+    BOUNDS,
+    Plan,
+    PlanTarget,
+    Workspace,
+    aimed,
+    look_ahead,
+    residuals,
+    slopes,
+)
 from template_control.embedding.planners.planner import ANY_ANGLE
+from template_control.embedding.planners.step_search import TOP_MARGIN
 from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import Outcome
@@ -44,15 +65,15 @@ def planner():
 
 def table():
     """Of the planner's gaits; whoever asks first waits a second for it."""
-    return gait_table(P, OPTIONS)
+    return gait_table(P)
 
 
 def plan_from(z, speed, steps=3, **changes):
     """A plan's cost, the plan, and what it was made with."""
-    known = prospect(P, replace(OPTIONS, **changes), table())
+    known = plan_problem(P, table())._replace(**changes)
     plan = Plan(np.empty((steps + 1, 3)), np.empty((steps, CONTROLS)), np.empty(WIDTH))
     work = Workspace(new_scratch(), new_scratch(complex))
-    aim = Aim(speed, np.zeros(3), ANY_ANGLE)
+    aim = PlanTarget(speed, np.zeros(3), ANY_ANGLE)
     return look_ahead(known, work, z, aim, plan), plan, (known, work, aim)
 
 
@@ -98,16 +119,16 @@ def test_a_plan_stays_within_its_bounds(seed):
     rng = np.random.default_rng(seed)
     speed = rng.uniform(0.3, 1.2)
     z = row_at(table(), speed)[STATE : STATE + 3] + rng.uniform(-1, 1, 3) * [0.15, 0.006, 0.15]
-    cost, plan, (known, *_) = plan_from(z, speed)
+    cost, plan, _ = plan_from(z, speed)
     if not np.isfinite(cost):
         pytest.skip("no plan from there")
-    low, high = known.bounds.copy()
+    low, high = BOUNDS.copy()
     low[0] += plan.row[CONTROL]
     high[0] += plan.row[CONTROL]
     assert np.all(plan.controls >= low - 1e-12)
     assert np.all(plan.controls <= high + 1e-12)
     top = np.arcsin(np.minimum(plan.states[0, 1], 1.0))
-    assert plan.controls[0, 0] <= top - known.top_margin + 1e-12
+    assert plan.controls[0, 0] <= top - TOP_MARGIN + 1e-12
 
 
 def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
@@ -123,7 +144,7 @@ def test_dy_dt_costs_above_its_bound():
     below, *_ = plan_from(z + [0.0, 0.0, 0.1], 0.9, rounds=1)
     calm, plan, _ = plan_from(z + [0.0, 0.0, 0.1], 0.9)
     assert calm <= below
-    assert np.abs(plan.states[1:, 2]).max() < OPTIONS.rise + OPTIONS.rise_tolerance
+    assert np.abs(plan.states[1:, 2]).max() < sum(RISE)
 
 
 def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
@@ -152,7 +173,7 @@ def test_a_plan_that_is_not_cheap_gives_way_to_a_search():
     assert decision.feasible
     assert decision.lasting
     assert not decision.nominal
-    assert decision.accepted == pytest.approx(z[0], abs=OPTIONS.spacing)
+    assert decision.accepted == pytest.approx(z[0], abs=SPACING)
 
 
 def test_the_template_goes_through_all_speeds_and_back(planner):
@@ -163,7 +184,7 @@ def test_the_template_goes_through_all_speeds_and_back(planner):
         assert decision.nominal
         z, outcome = step.step(z, decision.controls)
         assert outcome is Outcome.SECTION
-        assert abs(z[2]) < OPTIONS.rise
+        assert abs(z[2]) < RISE[0]
         speeds.append(z[0])
     assert max(speeds) == pytest.approx(1.3, abs=0.02)
     assert speeds[-1] == pytest.approx(0.27, abs=0.02)

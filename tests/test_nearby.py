@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from template_control.embedding.planners import regularised
-from template_control.embedding.planners.nearby import NearbyStrides
+from template_control.embedding.planners import stride_solver
 from template_control.embedding.planners.planner import ANY_ANGLE
-from template_control.embedding.planners.regularised import FromSection, Prior, solve_stride
-from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.planners.running_limits import aim_and_bounds
+from template_control.embedding.planners.running import RunningPlanner, aim_and_bounds
+from template_control.embedding.planners.stride_solver import (
+    FromSection,
+    NearbyStrides,
+    Prior,
+    solve_stride,
+)
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
@@ -50,7 +53,7 @@ def prior_of(gait, z, angles=ANY_ANGLE):
 def exactly(stride, aim, prior, monkeypatch):
     """The solution to rounding."""
     with monkeypatch.context() as patch:
-        patch.setattr(regularised, "_CLOSE", 1e-7)
+        patch.setattr(stride_solver, "_CLOSE", 1e-7)
         return solve_stride(stride, aim, replace(prior, rounds=30), TOLERANCE)[0]
 
 

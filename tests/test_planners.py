@@ -12,9 +12,8 @@ from template_control.embedding.learners.momentum import (
     MomentumTrim,
     uncontrolled,
 )
-from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.planners.walking.lqr_options import LqrOptions
-from template_control.embedding.planners.walking.modified import ModifiedPlanner
+from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
+from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.embedding.replanning import AGILITY, SOONEST, SOONEST_SHARE, angle_later
 from template_control.embedding.rollout import ReplanOptions, RoutePlanners
 from template_control.embedding.state import Learnt, Sensed
@@ -288,8 +287,7 @@ def knee_moment(gait, z, controls):
 )
 def test_a_slow_robot_gets_no_step_that_its_knees_do_not_carry(z):
     """Two-link legs, whose knees are straight at 1.095 m, and 350 N m: five-link's."""
-    gait, free = tc.default_gait(tc.load_robot("five-link")), LqrOptions()
-    free = replace(free, strain=replace(free.strain, price=0.0))
+    gait, free = tc.default_gait(tc.load_robot("five-link")), LqrOptions(knee_load_price=0.0)
     z = np.array(z)
     without, bounded = (LqrPlanner(gait, o).decide(z) for o in (free, LqrOptions()))
     assert knee_moment(gait, z, without.controls) > 400.0

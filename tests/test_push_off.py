@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from template_control.embedding.learners.momentum import uncontrolled
-from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.planners.walking.modified import ModifiedPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.embedding.replanning import free_controls
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome, Phase, Slot

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.planners.gauss_newton import bounded_step
-from template_control.embedding.planners.regularised import (
+from template_control.embedding.planners.stride_solver import (
     FromHere,
     FromSection,
     Prior,
+    bounded_step,
     solve_stride,
 )
 from template_control.slip.automaton.vocabulary import Outcome, Slot

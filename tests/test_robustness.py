@@ -10,7 +10,7 @@ import pytest
 import template_control as tc
 from template_control import settings
 from template_control.cli.trials import robustness as command
-from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.library import load_robot

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.state import rolled, unrolled
 
 RADIUS = 0.045

@@ -9,8 +9,8 @@ from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PHASES
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.robot.start import state_in
 from template_control.run.options import SimulationOptions
 from template_control.run.simulation import simulate

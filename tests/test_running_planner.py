@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
-from template_control.embedding.planners.within_reach import solve_within_reach
+from template_control.embedding.planners.stride_solver import solve_within_reach
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.return_map import ReturnMap

@@ -6,8 +6,8 @@ import pytest
 import template_control as tc
 from template_control.embedding.ground import SlopeEstimate
 from template_control.embedding.leg_forces import leg_forces
-from template_control.embedding.standing.default import standing_planners
-from template_control.embedding.standing.pose import standing_pose
+from template_control.embedding.standing.options import standing_pose
+from template_control.embedding.standing.stepping import standing_planners
 from template_control.errors import ParameterError
 from template_control.run.config import RunConfig
 from template_control.slip.automaton.automaton import AUTOMATON

@@ -10,10 +10,9 @@ from template_control.embedding.com_path import derivatives, quintics
 from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.planner import CurvePlanner
 from template_control.embedding.standing.curves import BetweenFeet
-from template_control.embedding.standing.default import standing_planners
-from template_control.embedding.standing.options import StandingOptions
-from template_control.embedding.standing.pose import standing_pose
-from template_control.embedding.standing.vaults import Family, Vaults
+from template_control.embedding.standing.options import StandingOptions, standing_pose
+from template_control.embedding.standing.passes import Family, Vaults
+from template_control.embedding.standing.stepping import standing_planners
 from template_control.errors import ParameterError, ScenarioError
 from template_control.run.options import Push
 from template_control.slip import Event, Slot, walking_gait

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sweep_work import P, drawn, fragile, other, quietly, square, walking_step
 
-from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import SweepError
 from template_control.robot.library import load_robot
 from template_control.run.options import SimulationOptions

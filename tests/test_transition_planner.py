@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Decision, LandingPlanner, Planner
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.planners.transition import (
@@ -15,7 +16,6 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
-from template_control.embedding.planners.walking.lqr import LqrPlanner
 from template_control.embedding.replanning import free_controls
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.state import Learnt, Sensed

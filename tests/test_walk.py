@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.planners.walking.modified import ModifiedPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep

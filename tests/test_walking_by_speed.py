@@ -9,7 +9,7 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.embedding.planners.walking.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import GaitError
 from template_control.robot.library import ROBOTS
 from template_control.slip.automaton.vocabulary import Outcome

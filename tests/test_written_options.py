@@ -9,7 +9,7 @@ import pytest
 from template_control.cli.main import main
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.walking.lqr_options import LqrOptions
+from template_control.embedding.planners.lqr import LqrOptions
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant
 from template_control.robustness.campaign import CampaignConfig

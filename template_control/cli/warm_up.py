@@ -26,10 +26,10 @@ def run(options: argparse.Namespace) -> int:
         options: of the command line, none.
     """
     from template_control.compiled import cache_folder
-    from template_control.embedding.ahead.planner import AHEAD
     from template_control.embedding.free.kernels import FREE
-    from template_control.embedding.planners.walking.walk_kernels import WALK
-    from template_control.embedding.standing.curve_search import STAND
+    from template_control.embedding.planners.ahead import AHEAD
+    from template_control.embedding.planners.walk_kernels import WALK
+    from template_control.embedding.standing.curves import STAND
     from template_control.warm_up import Part, ready
 
     other = (Part(scenarios, 6.0), Part(basins, 1.5), Part(floating_base, 1.0))
@@ -71,7 +71,7 @@ def floating_base() -> None:
 
 def ideal_plant() -> None:
     """A step of the paper's gait by the paper's controller on the ideal plant."""
-    from template_control.embedding.planners.walking.modified import ModifiedPlanner
+    from template_control.embedding.planners.modified import ModifiedPlanner
     from template_control.embedding.robot_template import paper_gait, template_for
     from template_control.plant.ideal import IdealOptions
     from template_control.robot.library import load_robot

@@ -22,7 +22,7 @@ from template_control.embedding.leg_forces import unload_cap
 from template_control.embedding.modes import PLACED, Place, RobotGuards, Station, stations
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner, Planners
-from template_control.embedding.planners.walking.walk_kernels import CONTROL
+from template_control.embedding.planners.walk_kernels import CONTROL
 from template_control.embedding.state import SectionReport, Sensing, rolled
 from template_control.embedding.supervisor import StridePlanning
 from template_control.embedding.swing import Feet

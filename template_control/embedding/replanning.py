@@ -22,7 +22,7 @@ from template_control.embedding.planners.planner import (
     decided,
     lands,
 )
-from template_control.embedding.planners.regularised import FromHere, Prior, solve_stride
+from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
 from template_control.embedding.rollout import RestOfStride
 from template_control.embedding.state import SectionReport, Sensed
 from template_control.slip.automaton.hybrid import Automaton, Node

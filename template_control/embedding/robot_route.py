@@ -8,9 +8,7 @@ import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
-from template_control.embedding.ahead.gait_row import STATE
-from template_control.embedding.ahead.gait_table import gait_table, row_at
-from template_control.embedding.ahead.options import AheadOptions
+from template_control.embedding.planners.gait_table import STATE, gait_table, row_at
 from template_control.embedding.planners.running import AGILE
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ScenarioError
@@ -72,7 +70,7 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
 
 
 def _family_height(p: SlipParameters) -> Callable[[float], float]:
-    table = gait_table(p, scaled(AheadOptions(), Scale.of(p)))
+    table = gait_table(p)
     return lambda speed: float(row_at(table, speed)[STATE + 1])
 
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner
-from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.planners.walking.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.robot_template import paper_gait, template_for
 from template_control.paper.reproduction import Reproduction
 from template_control.plant.bullet import PlantOptions

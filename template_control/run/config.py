@@ -12,16 +12,14 @@ from typing import NamedTuple
 
 from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
-from template_control.embedding.ahead.options import AheadOptions
-from template_control.embedding.ahead.planner import AheadPlanner
 from template_control.embedding.free.options import FREE_PLANNER
+from template_control.embedding.planners.ahead import AheadOptions, AheadPlanner
 from template_control.embedding.planners.default import default_planners, first_speed
+from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
+from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
-from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.planners.walking.lqr_options import LqrOptions
-from template_control.embedding.planners.walking.modified import ModifiedOptions, ModifiedPlanner
-from template_control.embedding.planners.walking.walk_kernels import WALK
+from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.robot_template import check_apex
 from template_control.errors import ParameterError

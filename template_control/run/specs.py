@@ -14,11 +14,11 @@ import numpy as np
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Degrees, Positive, Speed
-from template_control.embedding.ahead.options import AheadOptions
+from template_control.embedding.planners.ahead import AheadOptions
+from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.running import RunningOptions
-from template_control.embedding.planners.walking.lqr_options import LqrOptions
-from template_control.embedding.planners.walking.modified import ModifiedOptions
 from template_control.embedding.robot_template import (
     default_gait,
     paper_gait,

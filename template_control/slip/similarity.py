@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Positive
@@ -95,6 +96,11 @@ class Scale(Checked):
     def speed(self) -> float:
         """The unit of speeds."""
         return self.factor(SPEED)
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """(3,) units of a section state dx/dt, y, dy/dt."""
+        return np.array([self.speed, self.length, self.speed])
 
     def factor(self, dimension: Dimension) -> float:
         """What a number of this dimension is multiplied by."""

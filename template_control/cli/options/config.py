@@ -9,8 +9,7 @@ from template_control.checks import option_types as values
 from template_control.cli.options.gait import gait_choice, planner_choice, scenario_choice
 from template_control.cli.options.robot import robot_choice
 from template_control.cli.options.world import simulation_choice
-from template_control.embedding.ahead.planner import AheadPlanner
-from template_control.embedding.ahead.rehearsal import rehearse
+from template_control.embedding.planners.ahead import AheadPlanner, rehearse
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.run.config import PreparedRun, RunConfig

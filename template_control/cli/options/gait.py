@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
-from template_control.embedding.ahead.options import AheadOptions
 from template_control.embedding.free.options import FREE_PLANNER
-from template_control.embedding.planners.walking.lqr_options import LqrOptions
-from template_control.embedding.planners.walking.modified import ModifiedOptions
+from template_control.embedding.planners.ahead import AheadOptions
+from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.errors import ParameterError
 from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
 from template_control.slip.automaton.vocabulary import MapKind

@@ -10,7 +10,7 @@ from template_control.checks.ranges import Positive, Share
 from template_control.embedding.free.phases import FREE_PHASES
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PhaseControl
-from template_control.embedding.planners.walking.lqr_options import LqrOptions
+from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.swing import SwingOptions
 from template_control.estimation.noise_filter import NoiseFilterOptions
 from template_control.slip.automaton.vocabulary import Phase

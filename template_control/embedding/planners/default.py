@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from template_control.checks.checked import checked
-from template_control.embedding.ahead.planner import AheadPlanner
+from template_control.embedding.planners.ahead import AheadPlanner
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
 from template_control.embedding.planners.transition import (
@@ -15,13 +16,12 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
-from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.standing.default import (
+from template_control.embedding.standing.options import StandingOptions
+from template_control.embedding.standing.stepping import (
     carrying_planners,
     gaits_by_speed,
     standing_planners,
 )
-from template_control.embedding.standing.options import StandingOptions
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds

@@ -23,7 +23,7 @@ from template_control.embedding.planners.planner import (
     Planner,
     decided,
 )
-from template_control.embedding.planners.regularised import (
+from template_control.embedding.planners.stride_solver import (
     FromHere,
     FromSection,
     Prior,

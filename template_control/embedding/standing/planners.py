@@ -1,17 +1,24 @@
-"""Planners of standing, of starting to walk, of changing a walk's speed and of stopping."""
+"""Planners of standing, of starting to walk, of changing the speed of a walk and of stopping."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.com_path import Quintic, chained, timed_stride
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.planners.planner import (
+    ANY_ANGLE,
+    Ahead,
+    Decision,
+    LandingPlanner,
+    decided,
+)
 from template_control.embedding.standing.curves import BetweenFeet, Found
 from template_control.embedding.standing.options import StandingOptions
-from template_control.embedding.standing.vaults import Touchdown, Vault, Vaults
+from template_control.embedding.standing.passes import Touchdown, Vault, Vaults
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot, StrideKind
@@ -260,3 +267,23 @@ class ChangePlanner(SlopeCurves):
         way = self._away(feet, start, speeds, True)
         u, stride = self._leaving(node, feet, way, decision.controls)
         return replace(decision, controls=u, feasible=self._fits(way[0])), stride
+
+
+class CarryingPlanner(ChangePlanner):
+    """Leads to a liftoff from which the walk passes VLO; on one leg the walk's planner chooses.
+
+    Args:
+        vaults: passes over a leg.
+        walk: the walk's planner.
+    """
+
+    def __init__(self, vaults: Vaults, walk: LandingPlanner) -> None:
+        super().__init__(vaults)
+        self._walk = walk
+        self.gait = walk.gait
+
+    def land(
+        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+    ) -> Decision:
+        """See :meth:`~.planner.LandingPlanner.land`."""
+        return decided(self._walk.land, ahead, decision, target, free)

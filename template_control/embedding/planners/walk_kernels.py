@@ -10,13 +10,12 @@ import numpy as np
 
 from template_control.embedding.com_path import LOCATE
 from template_control.embedding.leg_forces import leg_forces
-from template_control.embedding.planners.gauss_newton import improve
-from template_control.embedding.planners.running_limits import (
+from template_control.embedding.planners.running import (
     RunningLimits,
     aim_and_bounds,
 )
-from template_control.embedding.planners.walking.step_law import Law, Strain
-from template_control.embedding.planners.walking.step_search import Grid, Trust, choose
+from template_control.embedding.planners.step_search import KneeLoadPenalty, Law, choose
+from template_control.embedding.planners.stride_solver import improve
 from template_control.embedding.swing import (
     SwingOptions,
     quintic_step,
@@ -94,20 +93,16 @@ def step_search() -> None:
         upper=np.ones(3),
         slots=np.arange(3),
         second_steps=np.ones((1, 3)),
-        enough=1.0,
-        first_weight=0.3,
+        trusted_price=0.0,
         effort=np.zeros(3),
         highest=1.0,
-        top_margin=0.01,
         earliest=0.0,
         stiffness=_K0,
-        softest=0.5,
-        strain=Strain(1.1, 350.0, 1.0),
+        knee_load=KneeLoadPenalty(1.1, 350.0, 1.0),
         kernel=stride_kernel(_TEMPLATE, StrideKind.WALK),
     )
     scratch, u, first = new_scratch(), np.ones(3), np.empty(3)
-    grid = Grid(np.ones(3, np.int64), (2, 2), 1, 0.1, 0.1, 0.4)
-    choose(law, grid, Trust(0.0, 0.0), scratch, _STATE, u, first)
+    choose(law, scratch, _STATE, u, first)
 
 
 def references() -> None:

@@ -1,29 +1,16 @@
-"""The family of walking gaits as a table by speed, with what a planner needs of each gait."""
+"""Table of the walking gaits by speed, with what a planner needs of each gait."""
 
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from template_control.embedding.ahead.gait_row import (
-    CONTROL,
-    CONTROLS,
-    COST,
-    DURATION,
-    GAIN,
-    LENGTH,
-    SETTLING,
-    STATE,
-    STIFFNESS,
-    WIDTH,
-    GaitTable,
-    gait_row,
-)
-from template_control.embedding.ahead.options import AheadOptions
-from template_control.embedding.planners.walking.lqr import settling_map
+from template_control.compiled import compiled
+from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions, settling_map
 from template_control.slip.automaton.vocabulary import Slot, StrideKind
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.gait import WALKING_SLOTS
@@ -31,9 +18,62 @@ from template_control.slip.gaits.walking_by_speed import Chain, walking_by_speed
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale, scaled
 
 Array = NDArray[np.float64]
 
+CONTROLS = 4
+"""Controls of a step: alpha, kappa_1, kappa_2, kappa_p."""
+STIFFNESS, STATE, CONTROL = 0, 1, 4
+"""Places in a row: k [N/m]; (3,) VLO state; (4,) alpha and shares of k."""
+COST, SETTLING = 8, 17
+"""Places in a row: (3, 3) cost-to-go; (7, 3) shift of state and controls by an offset."""
+GAIN = 38
+"""Place in a row: (4, 3) gain of the LQR."""
+STEP_DURATION, STEP_LENGTH = 50, 51
+"""Places in a row: duration [s] and length [m] of a step."""
+WIDTH = 52
+
+
+class GaitTable(NamedTuple):
+    """Gaits at rising speeds; where one chain of the family ends and the next begins, two.
+
+    Attributes:
+        speed: (n,) dx/dt at VLO [m/s].
+        rows: (n, WIDTH) what belongs to each.
+    """
+
+    speed: Array
+    rows: Array
+
+
+@compiled
+def gait_row(table: GaitTable, speed: float, row: Array) -> None:
+    """What belongs to a speed, interpolated; beyond the ends the end's own.
+
+    Args:
+        table: the gaits.
+        speed: dx/dt at VLO [m/s].
+        row: (WIDTH,) overwritten.
+    """
+    low, high = 0, table.speed.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table.speed[middle] <= speed:
+            low = middle
+        else:
+            high = middle
+    width = table.speed[high] - table.speed[low]
+    share = (speed - table.speed[low]) / width if width > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    for i in range(row.shape[0]):
+        row[i] = (1.0 - share) * table.rows[low, i] + share * table.rows[high, i]
+
+
+STATE_TOLERANCE = np.array([0.06, 0.006, 0.04])
+"""Differences of dx/dt, y, dy/dt from a gait's that cost 1 [m/s, m, m/s], for the reference."""
+CONTROL_TOLERANCE = np.array([0.04, 0.15, 0.15, 0.15])
+"""Differences of alpha [rad], kappa_1, kappa_2 and kappa_p from a gait's that cost 1."""
 STRIDE = StrideKind.WALK_PUSH_OFF
 """The steps of these gaits."""
 SLOTS = np.array([int(slot) for slot in WALKING_SLOTS[STRIDE]])
@@ -43,7 +83,7 @@ COLUMNS = np.concatenate((np.arange(PADDED), PADDED + SLOTS))
 
 
 def row_at(table: GaitTable, speed: float) -> Array:
-    """(WIDTH,) what belongs to a speed; see :func:`~.gait_row.gait_row`.
+    """(WIDTH,) what belongs to a speed; see :func:`~.gait_table.gait_row`.
 
     Args:
         table: the gaits.
@@ -55,16 +95,15 @@ def row_at(table: GaitTable, speed: float) -> Array:
 
 
 @cache
-def gait_table(parameters: SlipParameters, options: AheadOptions) -> GaitTable:
+def gait_table(parameters: SlipParameters) -> GaitTable:
     """The library's family on a template.
 
     Args:
         parameters: the template; its stiffness k0 counts for nothing, each gait has its own.
-        options: tolerances that the costs come from, scaled to the template.
     """
     family = walking_by_speed()
     unit = parameters.speed_unit
-    parts = [_rows(chain, parameters, options) for chain in family.chains]
+    parts = [_rows(chain, parameters) for chain in family.chains]
     speeds = [chain.vlo_speed * unit for chain in family.chains]
     for i in range(len(parts) - 1):
         # Chains overlap; each serves up to the middle.
@@ -78,8 +117,10 @@ def gait_table(parameters: SlipParameters, options: AheadOptions) -> GaitTable:
     return GaitTable(np.concatenate(speeds), np.vstack(parts))
 
 
-def _rows(chain: Chain, p: SlipParameters, o: AheadOptions) -> Array:
+def _rows(chain: Chain, p: SlipParameters) -> Array:
     """(n, WIDTH) of a chain's knots, which are gaits to rounding."""
+    scale = Scale.of(p)
+    tolerance = np.array(scaled(LqrOptions(), scale).tolerance)
     unit, weight = p.speed_unit, p.mass * p.gravity / p.rest_length
     step = ReturnMap(p, STRIDE)
     rows = np.zeros((len(chain.height), WIDTH))
@@ -93,19 +134,15 @@ def _rows(chain: Chain, p: SlipParameters, o: AheadOptions) -> Array:
         units = np.array([1.0, *[k] * (CONTROLS - 1)])
         a[i], b[i] = slopes[:3, :3], slopes[:3, 3:] * units
         row[STIFFNESS], row[STATE:CONTROL], row[CONTROL:COST] = k, z, u[SLOTS] / units
-        row[LENGTH] = result[PADDED]
-        row[DURATION] = row[LENGTH] / (chain.mean_speed[i] * unit)
-        shift = settling_map(a[i], b[i], np.array(o.lqr.tolerance), o.lqr.control_weight)
+        row[STEP_LENGTH] = result[PADDED]
+        row[STEP_DURATION] = row[STEP_LENGTH] / (chain.mean_speed[i] * unit)
+        shift = settling_map(a[i], b[i], tolerance, CONTROL_WEIGHT)
         row[SETTLING:GAIN] = shift.ravel()
-    q, r = np.diag(1.0 / np.square(o.tolerance)), 1.0 / control_tolerance(o) ** 2
+    q = np.diag(1.0 / np.square(STATE_TOLERANCE * scale.state))
+    r = 1.0 / CONTROL_TOLERANCE**2
     p_ahead = np.array([solve_discrete_are(*at, q, np.diag(r)) for at in zip(a, b, strict=True)])
     weighted = np.swapaxes(b, 1, 2) @ p_ahead
     gain = np.linalg.solve(np.diag(r) + weighted @ b, weighted @ a)
     rows[:, COST:SETTLING] = p_ahead.reshape(-1, 9)
-    rows[:, GAIN:DURATION] = gain.reshape(len(rows), -1)
+    rows[:, GAIN:STEP_DURATION] = gain.reshape(len(rows), -1)
     return rows
-
-
-def control_tolerance(options: AheadOptions) -> Array:
-    """(4,) differences of alpha and the stiffnesses over k that cost 1."""
-    return np.array([options.angle_tolerance, *[options.stiffness_tolerance] * (CONTROLS - 1)])

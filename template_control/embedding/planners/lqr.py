@@ -9,19 +9,29 @@ gait and not beside it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from template_control.checks.checked import checked
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import (
+    NotNegative,
+    Positive,
+    Share,
+)
 from template_control.embedding.planners.planner import ANY_ANGLE, Ahead, Decision
-from template_control.embedding.planners.walking.lqr_options import LqrOptions
-from template_control.embedding.planners.walking.rest_of_step import choose_rest
-from template_control.embedding.planners.walking.step_law import Law, Strain
-from template_control.embedding.planners.walking.step_search import FALL_PRICE, Grid, Trust, choose
-from template_control.embedding.planners.walking.walk_kernels import WALK
+from template_control.embedding.planners.step_search import (
+    EFFORT,
+    FALL_PRICE,
+    KneeLoadPenalty,
+    Law,
+    choose,
+)
+from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
+from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import GaitError
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.dynamics.kernel import new_scratch
@@ -32,14 +42,172 @@ from template_control.slip.gaits.walking_by_speed import WalkingFamily
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import (
+    LENGTH,
+    PER_LENGTH_SQUARED,
+    PER_SPEED_SQUARED,
+    SPEED,
+    TIME,
     Scale,
     scaled,
+    tuned,
 )
 from template_control.warm_up import ready
 
 Array = NDArray[np.float64]
-_LASTING = (0.0, 1.0, 1.0)  # what of an offset outlives another way of moving
+
+_Three = tuple[NotNegative, NotNegative, NotNegative]
+_VLO_STATE = (SPEED, LENGTH, SPEED)
+
+# Bounds of the controls. Steeper angles make steps too short in time for the swing leg, flatter
+# ones let the CoM sink lower than the knees can carry it.
+ANGLE_RANGE = (-0.12, 0.065)
+"""Least and greatest touchdown angle relative to the gait's [rad]."""
+STIFFNESS_RANGE = (0.5, 1.5)
+"""Least and greatest stiffness of a leg, over k0."""
+# A loaded leg that gets softer takes energy out, and sinks so low that the knee does not lift it.
+_SOFTEST_REST = 0.75  # over k0, for the rest of a step that has begun and ends slow
+
+# Costs of the controls.
+CONTROL_WEIGHT = 100.0
+"""Weight of the settled controls' squared changes [rad, share of k0]."""
+_PUSH_OFF_COST = 2.0  # of the LQR on kappa_p, as a share of k0
+# The fastest gaits bear no large change of their controls: with less weight the walk sways.
+_STRAIGHT = 0.004  # bend of the leg at VLO, 1 - y/l0, at which CONTROL_WEIGHT counts twice
+
+# The offset estimate, for the reference template: dx/dt, y, dy/dt [m/s, m, m/s].
+_OFFSET_BOUND = np.array((0.06, 0.015, 0.12))  # largest offset believed
+# A larger surprise counts as this much: a push is no offset.
+_SURPRISE_BOUND = np.array((0.03, 0.008, 0.06))
+_KEPT = (0.0, 1.0, 1.0)  # what of an offset outlives another way of moving
 _ROUNDS = 2  # of Newton's method for the fixed point; it begins at the last one
+
+# A template that flies on to this far above l0 is in flight: no walking step begins there. A robot
+# is a few millimetres above l0 in steady walks too.
+_FLIGHT = 0.005  # [m], for the reference template
+# Five-link's numbers: its knees have 350 N m, and its walks need some of them for the other leg.
+_KNEE_STRAIGHT = 1.095  # leg length at which the knee is straight [m]: it ends above the hip
+_KNEE_MOMENT = 0.41  # of the leg force about the knee, over the weight, that costs nothing [m]
+
+# Second steps that are tried besides the law's own: alpha relative to the gait's [rad], kappa_1,
+# kappa_2 (and kappa_p) over k0. A leg that is stiffer before its virtual bottom than after takes
+# energy out, the reverse puts some in; so does a stiff push-off.
+_SECOND_STEPS = (
+    (0.0, 1.5, 1.0),
+    (-0.058, 1.0, 0.75),
+    (0.025, 1.5, 1.0),
+    (-0.058, 1.25, 0.75),
+    (-0.03, 0.75, 1.0),
+    (0.0, 1.0, 1.5),
+    (0.045, 0.5, 0.75),
+)
+_SECOND_PUSH_OFF_STEPS = (
+    (0.0, 1.5, 1.0, 0.75),
+    (-0.058, 1.0, 0.75, 0.75),
+    (0.025, 1.5, 1.0, 1.0),
+    (-0.058, 1.25, 0.75, 1.0),
+    (-0.03, 0.75, 1.0, 1.0),
+    (0.0, 1.0, 1.25, 1.25),
+    (0.045, 0.75, 0.75, 1.25),
+)
+_REST_ROUNDS = 6  # of Gauss and Newton's method; most choices take three
+
+
+@dataclass(frozen=True)
+class LqrOptions(Checked):
+    """Tuning of the LQR; states in m/s, m, m/s, controls in rad and shares of k0.
+
+    States are those of the reference template (80 kg, 1 m, 9.81 m/s^2); the planner scales
+    them to its gait's by dynamic similarity.
+
+    Attributes:
+        state_cost: on dx/dt, y, dy/dt.
+        control_cost: on alpha, kappa_1, kappa_2.
+        offset_gain: share of a step's surprise that enters the offset estimate.
+        tolerance: errors of the settled state that count as equally bad; decides which
+            part of an offset that the controls cannot cancel shows up where.
+        earliest_touchdown: no foot is to touch down so soon after VLO [s]: the swing leg passes the
+            other one about then, and is not in front yet. 0 is no bound.
+        earliest_share: of the gait's step duration, which counts in its place where it is less:
+            fast gaits swing their legs faster.
+        trusted_price: the linear law's step is taken without a search below this price.
+        knee_load_price: of a searched step with twice the knee moment that costs nothing; the
+            LQR's cost-to-go is the unit.
+    """
+
+    kind: ClassVar[str] = "lqr"
+
+    state_cost: _Three = tuned(
+        (10.0, 100.0, 10.0), PER_SPEED_SQUARED, PER_LENGTH_SQUARED, PER_SPEED_SQUARED
+    )
+    control_cost: tuple[Positive, Positive, Positive] = tuned((5.0, 2.0, 2.0))
+    offset_gain: Share = tuned(0.2)
+    tolerance: tuple[Positive, Positive, Positive] = tuned((0.011, 0.005, 0.03), *_VLO_STATE)
+    earliest_touchdown: NotNegative = tuned(0.12, TIME)
+    earliest_share: Share = tuned(0.2)
+    trusted_price: NotNegative = tuned(1.0)
+    knee_load_price: NotNegative = tuned(100.0)
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """Where the rest of a step ends, in coordinates in which the cost-to-go is a squared length.
+
+    What the robot adds to a step has mostly come in by then.
+
+    Attributes:
+        ahead: the template's end.
+        root: (3, 3) with the cost-to-go root' root.
+    """
+
+    ahead: Ahead
+    root: Array
+
+    def __call__(self, u: Array) -> tuple[Array, Outcome]:
+        end, outcome = self.ahead(u)
+        return self.root @ end, outcome
+
+
+class Rest(NamedTuple):
+    """A choice for the rest of a step.
+
+    Attributes:
+        controls: (NUM_SLOTS,) of the stride.
+        end: (3,) where the step ends; None where no controls complete it.
+        change: (3,) how far that is from where it would have ended; None where it would not have.
+    """
+
+    controls: Array
+    end: Array | None
+    change: Array | None
+
+
+def choose_rest(law: Law, costs: Array, ahead: Ahead, controls: Array, free: Sequence[int]) -> Rest:
+    """Controls with the least cost-to-go at the step's end, and the least change.
+
+    Args:
+        law: the planner's, with its bounds.
+        costs: (c,) of its controls' squared changes.
+        ahead: where the rest of the step leads.
+        controls: (NUM_SLOTS,) that hold so far.
+        free: slots of the stiffnesses that the rest depends on.
+    """
+    before, outcome = ahead(controls)
+    completed = outcome is Outcome.SECTION
+    slow = before[0] < law.target[0] if completed else outcome is not Outcome.UNWANTED_FLIGHT
+    softest = _SOFTEST_REST if slow else 0.0
+    places = [place for place, slot in enumerate(law.slots) if place and slot in free]
+    slots = [int(law.slots[place]) for place in places]
+    change = law.stiffness / np.sqrt(costs[places])
+    lower = np.maximum(law.lower[places], softest) * law.stiffness
+    upper = law.upper[places] * law.stiffness
+    prior = Prior(controls, slots, np.array([controls[slots], change, lower, upper]), _REST_ROUNDS)
+    root: Array = np.linalg.cholesky(law.cost).T.astype(np.float64)
+    rest = FromHere(_Weighed(ahead, root), slots)
+    u, weighed = solve_stride(rest, root @ law.target, prior, np.ones(3))
+    if weighed is None:
+        return Rest(u, None, None)
+    end: Array = np.linalg.solve(root, weighed).astype(np.float64)
+    return Rest(u, end, end - before if completed else None)
 
 
 class LqrPlanner:
@@ -58,17 +226,12 @@ class LqrPlanner:
     @checked
     def __init__(self, gait: WalkingGait, options: LqrOptions | None = None) -> None:
         ready(WALK)
-        self.options = scaled(options or LqrOptions(), Scale.of(gait.parameters))
+        self._scale = Scale.of(gait.parameters)
+        self.options = scaled(options or LqrOptions(), self._scale)
         self.offset: Array = np.zeros(3)
         self._family = WalkingFamily(gait)
         self._scratch = new_scratch()
         self._pushes = int(Slot.K_PUSH) in control_units(gait)[0]
-        grid, spread = self.options.search, self.options.spread
-        points = (*grid.coarse, self.options.push_off.points)[: 4 if self._pushes else 3]
-        self._grid = Grid(np.array(points), grid.fine, grid.rounds, *spread, grid.narrowing)
-        o = self.options
-        settled = o.push_off.settled_price if self._pushes else np.inf
-        self._trust = Trust(o.trusted_price, settled)
         self._slope = 0.0
         self._settle_on(gait)
 
@@ -78,7 +241,7 @@ class LqrPlanner:
         gait = self._here = self._sloped()
         self.a, self.b = vlo_jacobians(gait)
         o = self.options
-        costs = (*o.control_cost, o.push_off.cost) if self._pushes else o.control_cost
+        costs = (*o.control_cost, _PUSH_OFF_COST) if self._pushes else o.control_cost
         self._costs = np.array(costs)
         q, r = np.diag(o.state_cost), np.diag(costs)
         self._cost = solve_discrete_are(self.a, self.b, q, r)
@@ -106,7 +269,7 @@ class LqrPlanner:
         for a run to come gains 0.02 m/s in each walking step; after the run it stands up, and
         loses up to 0.04 m/s. What it adds to y and dy/dt is much the same.
         """
-        self.offset = self.offset * _LASTING
+        self.offset = self.offset * _KEPT
         self._shift = self._settling @ self.offset
         self._law = self._aim()
 
@@ -131,7 +294,7 @@ class LqrPlanner:
         shift = self._shift = self._settled()
         slots, units = control_units(self._here)
         nominal, others = self._here.controls[slots] / units, len(slots) - 1
-        steps = o.push_off.second_steps if self._pushes else o.second_steps
+        steps = _SECOND_PUSH_OFF_STEPS if self._pushes else _SECOND_STEPS
         relative_to = (nominal[0], *[0.0] * others)
         return Law(
             target=self._here.vlo + shift[:3],
@@ -139,27 +302,28 @@ class LqrPlanner:
             gain=self._gain,
             cost=self._cost,
             offset=self.offset,
-            lower=np.array([nominal[0] + o.angle_range[0], *[o.stiffness_range[0]] * others]),
-            upper=np.array([nominal[0] + o.angle_range[1], *[o.stiffness_range[1]] * others]),
+            lower=np.array([nominal[0] + ANGLE_RANGE[0], *[STIFFNESS_RANGE[0]] * others]),
+            upper=np.array([nominal[0] + ANGLE_RANGE[1], *[STIFFNESS_RANGE[1]] * others]),
             slots=np.array(slots),
             second_steps=np.add(np.array(steps).reshape(-1, len(slots)), relative_to),
-            enough=o.trusted_price,
-            first_weight=o.search.first_weight,
-            effort=o.search.effort * self._costs,
-            highest=p.rest_length + o.search.flight,
-            top_margin=o.top_margin,
+            trusted_price=o.trusted_price,
+            effort=EFFORT * self._costs,
+            highest=p.rest_length + _FLIGHT * self._scale.length,
             earliest=min(o.earliest_touchdown, o.earliest_share * self.gait.step_duration),
             stiffness=p.leg_stiffness,
-            softest=o.softest_rest,
-            strain=Strain(o.strain.reach, o.strain.moment * p.mass * p.gravity, o.strain.price),
+            knee_load=KneeLoadPenalty(
+                _KNEE_STRAIGHT * self._scale.length,
+                _KNEE_MOMENT * self._scale.length * p.mass * p.gravity,
+                o.knee_load_price,
+            ),
             kernel=stride_kernel(p, self._here.stride),
         )
 
     def _weight_of_change(self) -> float:
         """Of the settled controls' changes: with push-off more, the straighter the leg at VLO."""
-        o, bend = self.options, 1.0 - self._here.vlo[1] / self._here.parameters.rest_length
-        share = o.push_off.straight / bend if self._pushes else 0.0
-        return float(o.control_weight * (1.0 + share**2))
+        bend = 1.0 - self._here.vlo[1] / self._here.parameters.rest_length
+        share = _STRAIGHT / bend if self._pushes else 0.0
+        return float(CONTROL_WEIGHT * (1.0 + share**2))
 
     def _settled(self) -> Array:
         """(3 + c,) shift of the fixed point by the present offset.
@@ -216,7 +380,7 @@ class LqrPlanner:
     def _best(self, law: Law, z: Array) -> tuple[Array, Array, float, bool]:
         """Controls, where they lead, their price, and whether they are the linear law's."""
         s, u, first = self._scratch, np.empty(len(law.slots)), np.empty(3)
-        cost, own = choose(law, self._grid, self._trust, s, z, u, first)
+        cost, own = choose(law, s, z, u, first)
         return u, first, cost, own
 
     def land(
@@ -240,11 +404,10 @@ class LqrPlanner:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
         if not (decision.feasible and decision.nominal):
             return  # far from the gait the surprise says little about it
-        o = self.options
-        limit = np.array(o.surprise_bound)
+        limit = _SURPRISE_BOUND * self._scale.state
         surprise = np.clip(z - decision.predicted, -limit, limit)
-        bound = np.array(o.offset_bound)
-        self.offset = np.clip(self.offset + o.offset_gain * surprise, -bound, bound)
+        bound = _OFFSET_BOUND * self._scale.state
+        self.offset = np.clip(self.offset + self.options.offset_gain * surprise, -bound, bound)
         self._law = self._aim()
 
 

@@ -1,50 +1,88 @@
-"""The planner that looks several steps ahead, and reduces what cannot be had."""
+"""Planner of walking steps that looks several steps ahead, and reduces what cannot be had."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.checked import checked
-from template_control.checks.ranges import Positive
-from template_control.embedding.ahead.gait_row import (
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import Positive, Range
+from template_control.embedding.planners.gait_table import (
+    COLUMNS,
     CONTROLS,
-    DURATION,
-    LENGTH,
+    SLOTS,
     STATE,
+    STATE_TOLERANCE,
+    STEP_DURATION,
+    STEP_LENGTH,
     STIFFNESS,
+    STRIDE,
     WIDTH,
     GaitTable,
-)
-from template_control.embedding.ahead.gait_table import (
-    COLUMNS,
-    SLOTS,
-    STRIDE,
-    control_tolerance,
     gait_table,
     row_at,
 )
-from template_control.embedding.ahead.look_ahead import look_ahead
-from template_control.embedding.ahead.options import AheadOptions
-from template_control.embedding.ahead.prospect import Aim, Plan, Prospect, Workspace
+from template_control.embedding.planners.look_ahead import (
+    Plan,
+    PlanProblem,
+    PlanTarget,
+    Workspace,
+    look_ahead,
+)
+from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
-from template_control.embedding.planners.walking.lqr import LqrPlanner
-from template_control.embedding.planners.walking.walk_kernels import WALK
+from template_control.embedding.planners.walk_kernels import WALK
+from template_control.errors import ScenarioError
+from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
-from template_control.slip.dynamics.stride import controls
+from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import WalkingGait, with_push_off
-from template_control.slip.maps.section import PADDED
+from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.similarity import Scale, scaled
+from template_control.slip.scenario.route import Route
+from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 from template_control.warm_up import Part, ready
 
 Array = NDArray[np.float64]
 
-_STANDARD = SlipParameters()
+MOST_STEPS = 6
+"""That a plan may look ahead."""
+RISE = (0.15, 0.02)
+"""|dy/dt| at VLO that costs nothing, and what is beyond it and costs 1 [m/s], for the reference
+template: from there on the template soon leaves the ground, or the leg sinks."""
+SPACING = 0.05
+"""Spacing of the speeds at VLO whose gaits the search leads to where no plan is cheap [m/s], for
+the reference template; each gait that is made is kept."""
+_SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the wanted change of speed, tried in turn
+_ROUNDS = 4  # Gauss-Newton steps of a plan at most
+_BEHIND = 0.08  # difference between wanted and accepted speed that is none [m/s], for the reference
+_MOST_STRIDES = 1000  # that are rehearsed, of a route that does not end
+
+
+@dataclass(frozen=True)
+class AheadOptions(Checked):
+    """How several walking steps are planned at once, and how much of a change is tried.
+
+    States are those of the reference template (80 kg, 1 m, 9.81 m/s^2); the planner scales them.
+
+    Attributes:
+        steps: that a plan looks ahead. With two a robot came to a VLO with a dy/dt from which no
+            plan led on; with four it gets faster no sooner.
+        pace: largest difference between the aimed speed and the present one. A few steps do not
+            lead to a gait that is further away.
+        cheap: cost up to which a plan is taken.
+    """
+
+    kind: ClassVar[str] = "ahead"
+
+    steps: Annotated[int, Range(1, MOST_STEPS)] = tuned(3)
+    pace: Positive = tuned(0.3, SPEED)
+    cheap: Positive = tuned(20.0)
 
 
 class AheadPlanner:
@@ -72,17 +110,19 @@ class AheadPlanner:
         speed: Positive | None = None,
     ) -> None:
         ready((*WALK, *AHEAD))
-        o = self.options = scaled(options or AheadOptions(), Scale.of(parameters))
+        scale = Scale.of(parameters)
+        o = self.options = scaled(options or AheadOptions(), scale)
+        self._spacing = SPACING * scale.speed
         self.parameters = parameters
-        self.table: GaitTable = gait_table(parameters, o)
-        self._prospect = prospect(parameters, o, self.table)
+        self.table: GaitTable = gait_table(parameters)
+        self._problem = plan_problem(parameters, self.table)
         self._work = Workspace(new_scratch(), new_scratch(complex))
         self._plan = Plan(
             np.empty((o.steps + 1, PADDED)), np.empty((o.steps, CONTROLS)), np.empty(WIDTH)
         )
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
         self._speed = self._first
-        self._lqr = LqrPlanner(self.gait, o.lqr)
+        self._lqr = LqrPlanner(self.gait)
 
     @property
     def speeds(self) -> tuple[float, float]:
@@ -96,8 +136,9 @@ class AheadPlanner:
         k = float(row[STIFFNESS])
         own = replace(self.parameters, leg_stiffness=k)
         u = controls(float(row[STATE + PADDED]), k, k)
-        z, length, duration = row[STATE : STATE + PADDED], float(row[LENGTH]), float(row[DURATION])
-        return with_push_off(WalkingGait("walk", own, z.copy(), u, length, duration))
+        z = row[STATE : STATE + PADDED].copy()
+        length, duration = float(row[STEP_LENGTH]), float(row[STEP_DURATION])
+        return with_push_off(WalkingGait("walk", own, z, u, length, duration))
 
     @property
     def offset(self) -> Array:
@@ -125,7 +166,7 @@ class AheadPlanner:
         present = min(max(float(z[0]), low), high)
         pace, cheapest = self.options.pace, (np.inf, present)
         change = min(max(min(max(wanted, low), high) - present, -pace), pace)
-        for share in self.options.shares:
+        for share in _SHARES:
             speed = present + share * change
             cost = self._look(z, speed, angles)
             if cost <= self.options.cheap:
@@ -134,8 +175,8 @@ class AheadPlanner:
         return self._otherwise(z, wanted, cheapest, angles)
 
     def _look(self, z: Array, speed: float, angles: tuple[float, float]) -> float:
-        aim = Aim(speed, self.offset, (float(angles[0]), float(angles[1])))
-        return float(look_ahead(self._prospect, self._work, z, aim, self._plan))
+        aim = PlanTarget(speed, self.offset, (float(angles[0]), float(angles[1])))
+        return float(look_ahead(self._problem, self._work, z, aim, self._plan))
 
     def _decision(self, speed: float, wanted: float, nominal: bool) -> Decision:
         """The first step of the last plan."""
@@ -150,7 +191,7 @@ class AheadPlanner:
         self, z: Array, wanted: float, cheapest: tuple[float, float], angles: tuple[float, float]
     ) -> Decision:
         """A step where no plan is cheap: the search's, or the cheapest plan's if that is better."""
-        spacing = self.options.spacing
+        spacing = self._spacing
         low, high = self.speeds
         speed = min(max(spacing * round(float(z[0]) / spacing), low), high)
         decision = self._lqr.decide(z, np.array([speed, 0.0, 0.0]), angles)
@@ -166,42 +207,68 @@ class AheadPlanner:
         self._lqr.observe(decision, z)
 
 
-def prospect(parameters: SlipParameters, o: AheadOptions, table: GaitTable) -> Prospect:
-    """What the compiled plans read.
+def plan_problem(parameters: SlipParameters, table: GaitTable) -> PlanProblem:
+    """Model and costs of the plans on a template.
 
     Args:
         parameters: the template.
-        o: tuning, scaled to it.
         table: its gaits.
     """
-    softest, stiffest = o.lqr.stiffness_range
-    lowest, highest = o.lqr.angle_range
-    others = CONTROLS - 1
-    return Prospect(
+    scale = Scale.of(parameters)
+    beyond, tolerance = RISE
+    return PlanProblem(
         kernel=stride_kernel(parameters, STRIDE),
         table=table,
-        tolerance=np.array(o.tolerance),
-        control_tolerance=control_tolerance(o),
-        rise=(o.rise, o.rise_tolerance),
-        bounds=np.array([[lowest, *[softest] * others], [highest, *[stiffest] * others]]),
-        top_margin=o.lqr.top_margin,
-        rounds=o.rounds,
-        done=o.done,
-        slots=SLOTS,
+        tolerance=STATE_TOLERANCE * scale.state,
+        rise=(beyond * scale.speed, tolerance * scale.speed),
+        rounds=_ROUNDS,
         columns=COLUMNS,
     )
 
 
 def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
-    options = AheadOptions(rounds=1)
     row = np.ones((1, WIDTH))
-    known = prospect(_STANDARD, options, GaitTable(np.ones(1), row))
+    known = plan_problem(SlipParameters(), GaitTable(np.ones(1), row))._replace(rounds=1)
     plan = Plan(np.empty((2, PADDED)), np.empty((1, CONTROLS)), np.empty(WIDTH))
-    aim = Aim(1.0, np.zeros(PADDED), ANY_ANGLE)
+    aim = PlanTarget(1.0, np.zeros(PADDED), ANY_ANGLE)
     work = Workspace(new_scratch(), new_scratch(complex))
     look_ahead(known, work, np.ones(PADDED), aim, plan)
 
 
 AHEAD = (Part(plan_ahead, 10.0),)
 """What this planner calls, further than a walk."""
+
+
+def rehearse(route: Route, planner: AheadPlanner) -> None:
+    """Walk a route on the template, and refuse it where the planner would reduce its changes.
+
+    Args:
+        route: of walking steps; it is reset before and after.
+        planner: of these steps; it learns nothing.
+
+    Raises:
+        ScenarioError: naming the first speed that cannot be had in time.
+    """
+    behind = _BEHIND * Scale.of(route.parameters).speed
+    simulator = StrideSimulator(route.parameters, AUTOMATON)
+    route.reset()
+    z, now = np.array(route.start), 0.0
+    for _ in range(_MOST_STRIDES):
+        goal = route.next(VLO, z, now)
+        if goal is None:
+            break
+        decision = planner.decide(z, goal.target)
+        wanted = float(goal.target[0])
+        accepted = wanted if decision.accepted is None else decision.accepted
+        if not decision.feasible or abs(accepted - wanted) > behind:
+            raise ScenarioError(
+                f"segment {goal.segment + 1} wants {wanted:.3g} m/s at VLO {now:.1f} s after the"
+                f" start, and {accepted:.3g} m/s can be had then: give a smaller acceleration or"
+                " change of speed, or leave out --strict"
+            )
+        node = AUTOMATON.start(goal.stride).name
+        stride = simulator.run(node, VLO.state(z), decision.controls)
+        z, now = VLO.of(stride.state), now + stride.duration
+    route.reset()
+    planner.reset()

@@ -1,0 +1,380 @@
+"""The cost of a plan of several walking steps, with its derivatives.
+
+Over N steps with controls u_0 to u_(N-1) and states z_1 to z_N at VLO, it is:
+
+    sum |(z_i - z*) / tolerance|^2 + |(u_i - u*) / control tolerance|^2 + (rise beyond)^2
+    + (z_N - z*)' P (z_N - z*)
+
+z* and u* are the aimed gait's, shifted so that the robot, with its offset, settles on it; the
+sum over states ends at z_(N-1); P is the LQR's cost-to-go of the same costs.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.compiled import compiled
+from template_control.embedding.planners.gait_table import (
+    CONTROL,
+    CONTROL_TOLERANCE,
+    CONTROLS,
+    COST,
+    GAIN,
+    SETTLING,
+    SLOTS,
+    STATE,
+    STIFFNESS,
+    GaitTable,
+    gait_row,
+)
+from template_control.embedding.planners.lqr import ANGLE_RANGE, STIFFNESS_RANGE
+from template_control.embedding.planners.step_search import TOP_MARGIN
+from template_control.embedding.planners.stride_solver import bounded_step
+from template_control.slip.automaton.vocabulary import NUM_SLOTS
+from template_control.slip.dynamics.kernel import Scratch
+from template_control.slip.dynamics.model import Kernel
+from template_control.slip.maps.return_map import (
+    RESULTS,
+    Derivatives,
+    one_stride,
+    section_jacobian,
+)
+from template_control.whole_body.elimination import cholesky
+
+Array = NDArray[np.float64]
+
+BOUNDS = np.array(
+    [[angle, *[share] * 3] for angle, share in zip(ANGLE_RANGE, STIFFNESS_RANGE, strict=True)]
+)
+"""(2, 4) least and greatest alpha relative to the gait's [rad], and stiffnesses over k."""
+_DONE = 0.02  # of the cost: a Gauss-Newton step that lowers it by less is the last
+_HALVINGS = 4  # of a Gauss-Newton step that does not lower the cost
+_LESS = 0.5  # of the LQR's feedback, where the template cannot do it
+
+
+class PlanProblem(NamedTuple):
+    """Model and costs of every plan.
+
+    Attributes:
+        kernel: the step.
+        table: gaits by speed.
+        tolerance: (3,) differences of the states that cost 1.
+        rise: |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s].
+        rounds: Gauss-Newton steps at most.
+        columns: (7,) of the map's derivatives, states and controls.
+    """
+
+    kernel: Kernel
+    table: GaitTable
+    tolerance: Array
+    rise: tuple[float, float]
+    rounds: int
+    columns: NDArray[np.int64]
+
+
+class PlanTarget(NamedTuple):
+    """Speed, offset and angles that a plan is made for.
+
+    Attributes:
+        speed: dx/dt at VLO of the aimed gait [m/s].
+        offset: (3,) what the robot adds to each step of the template.
+        angles: least and greatest touchdown angle of the first step [rad].
+    """
+
+    speed: float
+    offset: Array
+    angles: tuple[float, float]
+
+
+class Plan(NamedTuple):
+    """Plan of N steps.
+
+    Attributes:
+        states: (N + 1, 3) at VLO, the present one first.
+        controls: (N, 4) alpha and shares of the aimed gait's k.
+        row: of the aimed gait, see :mod:`~.gait_table`.
+    """
+
+    states: Array
+    controls: Array
+    row: Array
+
+
+class Workspace(NamedTuple):
+    """Scratch of the maps.
+
+    Attributes:
+        real: of plans.
+        complex: of their derivatives.
+    """
+
+    real: Scratch
+    complex: Scratch
+
+
+STATES = 3
+"""Of a section at VLO."""
+
+PER_STEP = STATES + 1 + CONTROLS
+"""Residuals of a step: states, what rises beyond, controls."""
+
+
+@compiled
+def aimed(p: PlanProblem, aim: PlanTarget, plan: Plan, target: Array, factor: Array) -> None:
+    """The aimed gait, as the robot settles on it.
+
+    Args:
+        p: the table of gaits.
+        aim: speed and offset.
+        plan: its ``row`` is overwritten.
+        target: (7,) overwritten with z* and u*.
+        factor: (3, 3) overwritten with L, P = L L'.
+    """
+    row = plan.row
+    gait_row(p.table, aim.speed, row)
+    for i in range(STATES + CONTROLS):
+        target[i] = row[STATE + i]
+        for j in range(STATES):
+            target[i] += row[SETTLING + STATES * i + j] * aim.offset[j]
+    for i in range(STATES):
+        for j in range(STATES):
+            factor[i, j] = row[COST + STATES * i + j]
+    cholesky(factor, STATES)
+
+
+@compiled
+def slots_of(plan: Plan, i: int, u: Array) -> None:
+    """The controls of a step by :class:`Slot`.
+
+    Args:
+        plan: shares of the aimed gait's k.
+        i: which step.
+        u: (NUM_SLOTS,) overwritten.
+    """
+    for j in range(NUM_SLOTS):
+        u[j] = 0.0
+    for j in range(CONTROLS):
+        unit = 1.0 if j == 0 else plan.row[STIFFNESS]
+        u[SLOTS[j]] = plan.controls[i, j] * unit
+
+
+@compiled
+def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Array) -> float:
+    """What a plan misses, in tolerances.
+
+    Args:
+        p: the tolerances.
+        plan: its states and controls.
+        target: (7,) z* and u*.
+        factor: (3, 3) lower triangular L with P = L L'.
+        out: (8 N,) overwritten: of each step its state, what rises beyond, its controls.
+
+    Returns:
+        The cost, their sum of squares.
+    """
+    steps, cost = plan.controls.shape[0], 0.0
+    for i in range(steps):
+        row = PER_STEP * i
+        for j in range(STATES):
+            if i < steps - 1:
+                out[row + j] = (plan.states[i + 1, j] - target[j]) / p.tolerance[j]
+            else:
+                out[row + j] = 0.0
+                for k in range(j, STATES):
+                    out[row + j] += factor[k, j] * (plan.states[i + 1, k] - target[k])
+        beyond = abs(plan.states[i + 1, 2]) - p.rise[0]
+        out[row + STATES] = max(beyond, 0.0) / p.rise[1]
+        for j in range(CONTROLS):
+            miss = plan.controls[i, j] - target[STATES + j]
+            out[row + STATES + 1 + j] = miss / CONTROL_TOLERANCE[j]
+    for i in range(PER_STEP * steps):
+        cost += out[i] * out[i]
+    return cost
+
+
+@compiled
+def slopes(p: PlanProblem, work: Workspace, plan: Plan, factor: Array, rows: Array) -> None:
+    """Derivatives of :func:`residuals` by all controls.
+
+    Args:
+        p: the tolerances.
+        work: overwritten.
+        plan: its states and controls; the template completes its steps.
+        factor: as for :func:`residuals`.
+        rows: (8 N, 4 N) overwritten.
+    """
+    steps = plan.controls.shape[0]
+    size = CONTROLS * steps
+    u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
+    by_control = np.empty((RESULTS, CONTROLS))
+    by_both = np.empty((RESULTS, STATES + CONTROLS))
+    state, following = np.zeros((STATES, size)), np.zeros((STATES, size))
+    for i in range(PER_STEP * steps):
+        for j in range(size):
+            rows[i, j] = 0.0
+    for i in range(steps):
+        slots_of(plan, i, u)
+        if i == 0:
+            # The present state is what it is.
+            found = Derivatives(result, by_control)
+            section_jacobian(
+                p.kernel, None, plan.states[i], u, p.columns[STATES:], work.complex, found
+            )
+        else:
+            found = Derivatives(result, by_both)
+            section_jacobian(p.kernel, None, plan.states[i], u, p.columns, work.complex, found)
+        skip = 0 if i == 0 else STATES
+        for a in range(STATES):
+            for c in range(CONTROLS * i):
+                total = 0.0
+                for b in range(STATES):
+                    total += by_both[a, b] * state[b, c]
+                following[a, c] = total
+            for c in range(CONTROLS):
+                unit = 1.0 if c == 0 else plan.row[STIFFNESS]
+                following[a, CONTROLS * i + c] = found.jacobian[a, skip + c] * unit
+        row = PER_STEP * i
+        beyond = abs(plan.states[i + 1, 2]) > p.rise[0]
+        sign = 1.0 if plan.states[i + 1, 2] > 0.0 else -1.0
+        for c in range(CONTROLS * (i + 1)):
+            for a in range(STATES):
+                state[a, c] = following[a, c]
+            for a in range(STATES):
+                if i < steps - 1:
+                    rows[row + a, c] = state[a, c] / p.tolerance[a]
+                else:
+                    for k in range(a, STATES):
+                        rows[row + a, c] += factor[k, a] * state[k, c]
+            if beyond:
+                rows[row + STATES, c] = sign * state[2, c] / p.rise[1]
+        for c in range(CONTROLS):
+            rows[row + STATES + 1 + c, CONTROLS * i + c] = 1.0 / CONTROL_TOLERANCE[c]
+
+
+@compiled
+def _step(p: PlanProblem, work: Workspace, aim: PlanTarget, plan: Plan, i: int) -> bool:
+    """Write the state after step ``i``; False where the template does not complete it."""
+    u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
+    slots_of(plan, i, u)
+    if one_stride(p.kernel, None, plan.states[i], u, work.real, result) != 0:
+        return False
+    for j in range(STATES):
+        plan.states[i + 1, j] = result[j] + aim.offset[j]
+    return True
+
+
+@compiled
+def _roll(p: PlanProblem, work: Workspace, aim: PlanTarget, plan: Plan) -> bool:
+    """Write the plan's states; False where the template does not complete a step."""
+    done = True
+    for i in range(plan.controls.shape[0]):
+        done = done and _step(p, work, aim, plan, i)
+    return done
+
+
+@compiled
+def _bounds(
+    p: PlanProblem, aim: PlanTarget, plan: Plan, i: int, lower: Array, upper: Array
+) -> None:
+    """Bounds of the controls of step ``i`` into their places in (4 N,) arrays."""
+    first = CONTROLS * i
+    for j in range(CONTROLS):
+        middle = plan.row[CONTROL] if j == 0 else 0.0
+        lower[first + j] = middle + BOUNDS[0, j]
+        upper[first + j] = middle + BOUNDS[1, j]
+    if i == 0:
+        lower[0] = min(max(lower[0], aim.angles[0]), upper[0])
+        upper[0] = max(min(upper[0], aim.angles[1]), lower[0])
+    top = np.arcsin(min(plan.states[i, 1] / p.kernel.rest_length, 1.0)) - TOP_MARGIN
+    upper[first] = min(upper[first], top)
+    lower[first] = min(lower[first], upper[first])
+
+
+@compiled
+def _guess(
+    p: PlanProblem, work: Workspace, aim: PlanTarget, plan: Plan, target: Array, feedback: float
+) -> bool:
+    """A plan to begin with: ``feedback`` of the LQR's on top of the aimed gait's controls.
+
+    Returns:
+        False where the template does not complete a step.
+    """
+    size = CONTROLS * plan.controls.shape[0]
+    lower, upper = np.empty(size), np.empty(size)
+    for i in range(plan.controls.shape[0]):
+        _bounds(p, aim, plan, i, lower, upper)
+        for j in range(CONTROLS):
+            wish = target[STATES + j]
+            for k in range(STATES):
+                gain = plan.row[GAIN + STATES * j + k]
+                wish -= feedback * gain * (plan.states[i, k] - target[k])
+            place = CONTROLS * i + j
+            plan.controls[i, j] = min(max(wish, lower[place]), upper[place])
+        if not _step(p, work, aim, plan, i):
+            return False
+    return True
+
+
+@compiled
+def look_ahead(p: PlanProblem, work: Workspace, z: Array, aim: PlanTarget, plan: Plan) -> float:
+    """Plan N steps from a VLO.
+
+    Args:
+        p: what holds for every plan.
+        work: overwritten.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        aim: where the plan is to lead.
+        plan: overwritten.
+
+    Returns:
+        The plan's cost; inf where the template completes no steps to begin with.
+    """
+    steps = plan.controls.shape[0]
+    size = CONTROLS * steps
+    target, factor = np.empty(STATES + CONTROLS), np.empty((STATES, STATES))
+    aimed(p, aim, plan, target, factor)
+    for j in range(STATES):
+        plan.states[0, j] = z[j]
+    feedback = 1.0
+    while not _guess(p, work, aim, plan, target, feedback):
+        if feedback == 0.0:
+            return np.inf
+        feedback = max(feedback - _LESS, 0.0)
+    lower, upper = np.empty(size), np.empty(size)
+    rows, residual = np.empty((PER_STEP * steps, size)), np.empty(PER_STEP * steps)
+    start, x = np.empty(size), np.empty(size)
+    cost = residuals(p, plan, target, factor, residual)
+    for _ in range(p.rounds):
+        slopes(p, work, plan, factor, rows)
+        for i in range(steps):
+            _bounds(p, aim, plan, i, lower, upper)
+        for i in range(size):
+            start[i] = plan.controls[i // CONTROLS, i % CONTROLS]
+            x[i] = min(max(start[i], lower[i]), upper[i])
+        for r in range(residual.shape[0]):
+            for i in range(size):
+                residual[r] += rows[r, i] * (x[i] - start[i])
+        there = bounded_step(rows, residual, x, lower, upper)
+        share, lowered = 1.0, np.inf
+        for _ in range(_HALVINGS):
+            for i in range(size):
+                value = start[i] + share * (there[i] - start[i])
+                plan.controls[i // CONTROLS, i % CONTROLS] = value
+            if _roll(p, work, aim, plan):
+                lowered = residuals(p, plan, target, factor, residual)
+                if lowered < cost:
+                    break
+            share *= 0.5
+        if not lowered < cost:
+            for i in range(size):
+                plan.controls[i // CONTROLS, i % CONTROLS] = start[i]
+            _roll(p, work, aim, plan)
+            break
+        small = cost - lowered < _DONE * max(lowered, 1.0)
+        cost = lowered
+        if small:
+            break
+    return cost

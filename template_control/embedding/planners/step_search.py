@@ -1,0 +1,372 @@
+"""Compiled look-ahead on the exact VLO return map: what an LQR step is worth, and a better one.
+
+A step is judged two steps ahead: after it comes the best of the (bounded) LQR law's step and a
+few that brake or boost hard, and the state then reached is priced with the LQR's cost-to-go.
+The search runs on the improved closed-form map, whose error is far below the robot's; what it
+finds is priced on the exact one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.compiled import compiled
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
+from template_control.slip.dynamics.kernel import Scratch
+from template_control.slip.dynamics.model import Kernel
+from template_control.slip.maps.return_map import RESULTS, one_stride
+
+Array = NDArray[np.float64]
+
+_FAST = np.int64(MapKind.IMPROVED)  # Numba would compile once more for a literal int
+_FLIES = int(Outcome.UNWANTED_FLIGHT)
+_ON_EXACT, _ON_FAST = np.bool_(True), np.bool_(False)  # Numba would compile once more for a literal
+FALL_PRICE = 1e6
+"""Price of a second step that fails; a first step that fails costs twice that."""
+
+TOP_MARGIN = 0.01
+"""Distance of alpha below asin(y / l0), at which the foot would touch down at once [rad]."""
+# Where two steps end alike, the first weight favours the one nearer the gait half-way, the effort
+# the one with the gait's controls: no robot follows a step well whose legs are much softer.
+_FIRST_WEIGHT = 0.3  # of the cost-to-go after the first step, over that after the second
+EFFORT = 0.1
+"""Weight of the LQR's own cost of the first step's controls."""
+# Near some gaits the law alone settles beside them, in states in which the map is not linear.
+_SETTLED_PRICE = 0.01  # cost-to-go up to which a step with push-off may lead further away
+# Most points are in alpha, which decides where the foot lands; kappa_1, which matters least near
+# the best, gets two points beside the plane of alpha and kappa_2. Alphas end 0.03 rad apart.
+_COARSE = np.array([5, 3, 3, 3])  # points in alpha, kappa_1, kappa_2, kappa_p over all bounds
+_FINE = (5, 3)  # points in alpha and kappa_2 of each finer grid about the best so far
+_FINER_GRIDS = 2
+_WIDTHS = (0.16, 0.25)  # half-widths of the first finer grid in alpha [rad] and kappa_2
+_NARROWING = 0.4  # half-widths of a finer grid over those of the one before, at most 0.5
+
+
+class KneeLoadPenalty(NamedTuple):
+    """What a step costs whose leg forces are more than a knee carries.
+
+    Attributes:
+        reach: length of the leg at which the knee is straight [m].
+        most: moment of the leg force about the knee from which on a step costs more [N m].
+        price: of a moment that is twice as much.
+    """
+
+    reach: float
+    most: float
+    price: float
+
+
+class Law(NamedTuple):
+    """A bounded linear law u = u_s - K (z - z_s) and what it needs to be judged.
+
+    There are c controls: 3 in the paper's walking step, 4 in one with push-off.
+
+    Attributes:
+        target: (3,) z_s, dx/dt, y, dy/dt.
+        control: (c,) u_s: alpha [rad], kappa_1/k0, kappa_2/k0 and, with push-off, kappa_p/k0.
+        gain: (c, 3) K.
+        cost: (3, 3) cost-to-go about ``target``.
+        offset: (3,) what the robot adds to the template's next VLO state.
+        lower, upper: (c,) bounds of u.
+        slots: (c,) places of u in a stride's controls.
+        second_steps: (n, c) other controls than u_s - K (z - z_s) for the second step.
+        trusted_price: a cost below which no other second step is tried, nor any other first one.
+        effort: (c,) of (u - u_s)^2 in the first step, beside both.
+        highest: a CoM that flies higher than this [m] has left the ground.
+        earliest: alpha also stays below asin(y / l0) this long after VLO [s].
+        stiffness: k0 [N/m].
+        knee_load: what a step costs that loads the knees more than they carry.
+        kernel: the template's walking step.
+    """
+
+    target: Array
+    control: Array
+    gain: Array
+    cost: Array
+    offset: Array
+    lower: Array
+    upper: Array
+    slots: NDArray[np.int64]
+    second_steps: Array
+    trusted_price: float
+    effort: Array
+    highest: float
+    earliest: float
+    stiffness: float
+    knee_load: KneeLoadPenalty
+    kernel: Kernel
+
+
+@compiled
+def copy(source: Array, target: Array) -> None:
+    """Copy numbers; a slice would take Numba seconds to compile, for what it says of wrong shapes.
+
+    Args:
+        source: (n,) of them.
+        target: (m,) overwritten, m <= n.
+    """
+    for i in range(target.shape[0]):
+        target[i] = source[i]
+
+
+@compiled
+def bounded(law: Law, z: Array, u: Array) -> None:
+    """Clip controls in place to what is admissible at a VLO state.
+
+    The height a short time after VLO comes from its Taylor series to the second order.
+
+    Args:
+        law: its bounds, and its ``earliest`` count.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (c,) alpha [rad], stiffnesses/k0; overwritten.
+    """
+    for i in range(u.shape[0]):
+        u[i] = min(max(u[i], law.lower[i]), law.upper[i])
+    length, t = law.kernel.rest_length, law.earliest
+    u[0] = min(u[0], np.arcsin(min(z[1] / length, 1.0)) - TOP_MARGIN)
+    if t > 0.0:
+        lift = u[1] * law.stiffness / law.kernel.mass * (length - z[1]) - law.kernel.gravity
+        later = z[1] + t * (z[2] + 0.5 * t * lift)
+        u[0] = min(u[0], np.arcsin(min(max(later / length, 0.0), 1.0)))
+
+
+@compiled
+def linear(law: Law, z: Array, u: Array) -> None:
+    """Write the law's controls, within their bounds, into ``u``.
+
+    Args:
+        law: u = u_s - K (z - z_s), and the bounds.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (c,) overwritten with alpha [rad], stiffnesses/k0.
+    """
+    for i in range(u.shape[0]):
+        u[i] = law.control[i]
+        for j in range(3):
+            u[i] -= law.gain[i, j] * (z[j] - law.target[j])
+    bounded(law, z, u)
+
+
+@compiled
+def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -> int:
+    """Take one walking step of the template, and add the robot's offset to where it ends.
+
+    Args:
+        law: the template's step and the offset.
+        exact: try it on the exact map; else on the improved closed form.
+        s: overwritten.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (c,) alpha [rad], stiffnesses/k0.
+        result: (RESULTS,) overwritten: the next VLO state first; see :func:`~.one_stride`.
+
+    Returns:
+        The Outcome's value; ``result`` means nothing where that is not SECTION.
+    """
+    # The template's leg would pull at the ground, which no robot's does.
+    if z[1] + max(z[2], 0.0) ** 2 / (2.0 * law.kernel.gravity) > law.highest:
+        return _FLIES
+    controls = np.zeros(NUM_SLOTS)
+    for i in range(u.shape[0]):
+        controls[law.slots[i]] = u[i] if i == 0 else u[i] * law.stiffness
+    if exact:
+        outcome = one_stride(law.kernel, None, z, controls, s, result)
+    else:
+        outcome = one_stride(law.kernel, _FAST, z, controls, s, result)
+    for i in range(3):
+        result[i] += law.offset[i]
+    return outcome
+
+
+@compiled
+def knee_load(law: Law, z: Array, u: Array, result: Array) -> float:
+    """What the knees make a step cost, where the legs are shortest.
+
+    A leg of length l bends a knee half-way up it, which is then sqrt(reach^2 - l^2) / 2 beside it.
+    A robot that is fast may strain its knees: legs that brake as they can slow it down all the
+    same. One that is slow sinks.
+
+    Args:
+        law: its ``knee_load``, ``stiffness`` and ``target`` count.
+        z: (3,) VLO state that the step begins in.
+        u: (c,) alpha [rad], stiffnesses/k0.
+        result: (RESULTS,) of the step.
+    """
+    total, l0 = 0.0, law.kernel.rest_length
+    if z[0] >= law.target[0]:
+        return total
+    for leg in range(2):
+        length = result[4 + leg]
+        # The rear leg has kappa_1 until the front one lands, and then kappa_p.
+        k = max(u[1], u[u.shape[0] - 1]) if leg == 0 and u.shape[0] > 3 else u[1]
+        arm = 0.5 * np.sqrt(max(law.knee_load.reach**2 - length**2, 0.0))
+        excess = k * law.stiffness * (l0 - length) * arm / law.knee_load.most - 1.0
+        if excess > 0.0:
+            total += law.knee_load.price * excess**2
+    return total
+
+
+@compiled
+def cost_to_go(target: Array, cost: Array, z: Array) -> float:
+    """(z - z_s)^T P (z - z_s).
+
+    It takes no :class:`Law`, which has 32 parts: a callee would take longer to compile.
+
+    Args:
+        target: (3,) z_s.
+        cost: (3, 3) P.
+        z: (3,) VLO state.
+    """
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += (z[i] - target[i]) * cost[i, j] * (z[j] - target[j])
+    return total
+
+
+@compiled
+def price(
+    law: Law, exact: bool, s: Scratch, z: Array, u: Array, limit: float, first: Array
+) -> float:
+    """Cost of taking ``u`` at ``z``.
+
+    Args:
+        law: says what a state costs.
+        exact: see :func:`step`.
+        s: overwritten.
+        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
+        u: (c,) alpha [rad], stiffnesses/k0.
+        limit: a cost known to be too much; the second step is not looked at beyond it.
+        first: (3,) overwritten with the state after one step.
+    """
+    result, u2 = np.empty(RESULTS), np.empty(u.shape[0])
+    if step(law, exact, s, z, u, result) != 0:
+        return 2.0 * FALL_PRICE
+    copy(result, first)
+    here = cost_to_go(law.target, law.cost, first)
+    share = _FIRST_WEIGHT * here + knee_load(law, z, u, result)
+    for i in range(u.shape[0]):
+        share += law.effort[i] * (u[i] - law.control[i]) ** 2
+    if share >= limit:
+        return share
+    best = FALL_PRICE + here
+    for i in range(-1, law.second_steps.shape[0]):
+        if i < 0:
+            linear(law, first, u2)
+        else:
+            # The law's own step is good enough near the gait.
+            if best < law.trusted_price:
+                break
+            copy(law.second_steps[i], u2)
+            bounded(law, first, u2)
+        if step(law, exact, s, first, u2, result) == 0:
+            cost = cost_to_go(law.target, law.cost, result) + knee_load(law, first, u2, result)
+            best = min(best, cost + share)
+    return best
+
+
+@compiled
+def _coarse(law: Law, i: int, u: Array) -> None:
+    """Point ``i`` of the grid over all bounds into ``u`` (c,); the last control varies first."""
+    for j in range(u.shape[0] - 1, -1, -1):
+        count = _COARSE[j]
+        u[j] = (i % count + 0.5) / count
+        u[j] = law.lower[j] + u[j] * (law.upper[j] - law.lower[j])
+        i //= count
+
+
+@compiled
+def _fine(centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
+    """Point ``i`` of a grid about ``centre`` (c,) into ``u`` (c,).
+
+    A plane of points in alpha and kappa_2, then two in kappa_1, and two in kappa_p.
+    """
+    n0, n2 = _FINE
+    copy(centre, u)
+    if i < n0 * n2:
+        u[0] += (i // n2 / (0.5 * (n0 - 1)) - 1.0) * widths[0]
+        u[2] += (i % n2 / (0.5 * (n2 - 1)) - 1.0) * widths[1]
+    else:
+        beside = i - n0 * n2
+        u[1 + beside // 2 * 2] += (2 * (beside % 2) - 1) * widths[1]
+
+
+@compiled
+def search(law: Law, s: Scratch, z: Array, best: Array, first: Array) -> float:
+    """Improve ``best`` (c,) in place: a coarse grid over all bounds, then finer ones about it.
+
+    Far from the gait the good steps (hard braking, say, with a stiff leg before the virtual
+    bottom and a soft one after) are not near what the linear law says.
+
+    Args:
+        law: what judges.
+        s: overwritten.
+        z: (3,) VLO state.
+        best: start of the search, and its result.
+        first: (3,) overwritten with the state after the step.
+
+    Returns:
+        The price of ``best``.
+    """
+    controls = best.shape[0]
+    u, end, centre = np.empty(controls), np.empty(3), np.empty(controls)
+    cheapest = price(law, _ON_EXACT, s, z, best, np.inf, first)
+    coarse, fine = 1, _FINE[0] * _FINE[1] + 2 * (controls - 2)
+    for j in range(controls):
+        coarse *= _COARSE[j]
+    widths = _WIDTHS
+    for level in range(1 + _FINER_GRIDS):
+        count = coarse if level == 0 else fine
+        for i in range(count):
+            if level == 0:
+                _coarse(law, i, u)
+            else:
+                _fine(centre, widths, i, u)
+            bounded(law, z, u)
+            if price(law, _ON_FAST, s, z, u, cheapest, end) >= cheapest:
+                continue
+            cost = price(law, _ON_EXACT, s, z, u, cheapest, end)
+            if cost < cheapest:
+                cheapest = cost
+                copy(u, best)
+                copy(end, first)
+        copy(best, centre)
+        if level > 0:
+            widths = _NARROWING * widths[0], _NARROWING * widths[1]
+    return cheapest
+
+
+@compiled
+def choose(law: Law, s: Scratch, z: Array, u: Array, first: Array) -> tuple[float, bool]:
+    """The law's controls, or better ones where they cost too much.
+
+    One function for both: compiled code of the maps is long, and each function that Python
+    calls has one of its own.
+
+    Args:
+        law: says u, and what judges it.
+        s: overwritten.
+        z: (3,) VLO state.
+        u: (c,) overwritten with the controls: alpha [rad], stiffnesses/k0.
+        first: (3,) overwritten with the state after the step.
+
+    Returns:
+        The price of ``u``; whether it is the law's.
+    """
+    linear(law, z, u)
+    cost = price(law, _ON_EXACT, s, z, u, np.inf, first)
+    trusted = cost < law.trusted_price
+    left = cost_to_go(law.target, law.cost, first)
+    settled = _SETTLED_PRICE if u.shape[0] > 3 else np.inf
+    if trusted and left <= max(cost_to_go(law.target, law.cost, z), settled):
+        return cost, True
+    other, end = np.empty(u.shape[0]), np.empty(3)
+    copy(u, other)
+    found = search(law, s, z, other, end)
+    if trusted and (cost <= found or left <= cost_to_go(law.target, law.cost, end)):
+        # What is found must come nearer, and not only be cheaper in the end.
+        return cost, True
+    copy(other, u)
+    copy(end, first)
+    return found, False

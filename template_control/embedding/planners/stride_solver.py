@@ -1,0 +1,452 @@
+"""One stride ahead: bounded least squares on a return map, against changes of the controls."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from operator import gt, lt, sub
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.compiled import compiled
+from template_control.embedding.planners.planner import Ahead
+from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import PADDED
+from template_control.whole_body.elimination import cholesky, solve_cholesky
+
+Array = NDArray[np.float64]
+
+_NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
+
+
+@compiled
+def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Array) -> Array:
+    """x + dx with the least |rows dx + residual| between the bounds.
+
+    A variable that would leave its bounds is held there, and the others are solved for again.
+
+    Args:
+        rows: (r, f) Jacobian of the residual, its columns independent.
+        residual: (r,) at x.
+        x: (f,) within the bounds.
+        lower, upper: (f,) bounds.
+    """
+    size = x.shape[0]
+    there = np.empty(size)
+    held = np.empty(size, np.bool_)
+    for i in range(size):
+        there[i] = min(max(x[i], lower[i]), upper[i])
+        held[i] = not upper[i] > lower[i]
+    normal, right = np.empty((size, size)), np.empty((size, 1))
+    free = np.empty(size, np.int64)
+    for _ in range(size):
+        count = _NONE
+        for i in range(size):
+            if not held[i]:
+                free[count] = i
+                count += 1
+        if count == 0:
+            break
+        for a in range(count):
+            for b in range(a + 1):
+                total = 0.0
+                for r in range(rows.shape[0]):
+                    total += rows[r, free[a]] * rows[r, free[b]]
+                normal[a, b] = total
+            right[a, 0] = 0.0
+        for r in range(rows.shape[0]):
+            left = residual[r]
+            for i in range(size):
+                if held[i]:
+                    left += rows[r, i] * (there[i] - x[i])
+            for a in range(count):
+                right[a, 0] -= rows[r, free[a]] * left
+        if not cholesky(normal, count):
+            break
+        solve_cholesky(normal, count, right)
+        beyond = False
+        for a in range(count):
+            i = free[a]
+            wish = x[i] + right[a, 0]
+            there[i] = min(max(wish, lower[i]), upper[i])
+            if there[i] != wish:
+                held[i] = beyond = True
+        if not beyond:
+            break
+    return there
+
+
+class Linear(NamedTuple):
+    """A stride to first order.
+
+    Attributes:
+        z: (n,) where it begins.
+        x: (f,) its free controls.
+        end: (m,) where it ends.
+        by_state: (m, n) derivatives.
+        by_controls: (m, f) derivatives.
+    """
+
+    z: Array
+    x: Array
+    end: Array
+    by_state: Array
+    by_controls: Array
+
+
+@compiled
+def improve(
+    linear: tuple[Array, Array, Array, Array, Array],
+    z: Array,
+    aim: Array,
+    tolerance: Array,
+    prior: Array,
+) -> tuple[float, float, Array, Array]:
+    """One step towards the least |(end - aim) / tolerance|^2 + |(x - base) / change|^2.
+
+    Args:
+        linear: a :class:`Linear`; compiled code takes a plain tuple more quickly.
+        z: (n,) where the stride begins, near that of ``linear``.
+        aim: (m,) where it should end.
+        tolerance: (m,) errors that count as 1.
+        prior: (4, f) base, change, lower and upper bounds.
+
+    Returns:
+        The cost at x; the longest component of the step in units of its change; (f,) the next x;
+        (m,) where that leads, to first order.
+    """
+    known, x, end, by_state, by_controls = linear
+    m, size = by_controls.shape
+    there = np.empty(m)
+    rows, residual = np.zeros((m + size, size)), np.empty(m + size)
+    cost = 0.0
+    for i in range(m):
+        there[i] = end[i]
+        for j in range(z.shape[0]):
+            there[i] += by_state[i, j] * (z[j] - known[j])
+        residual[i] = (there[i] - aim[i]) / tolerance[i]
+        for j in range(size):
+            rows[i, j] = by_controls[i, j] / tolerance[i]
+    for j in range(size):
+        residual[m + j] = (x[j] - prior[0, j]) / prior[1, j]
+        rows[m + j, j] = 1.0 / prior[1, j]
+    for i in range(m + size):
+        cost += residual[i] * residual[i]
+    better = bounded_step(rows, residual, x, prior[2], prior[3])
+    longest = 0.0
+    for j in range(size):
+        longest = max(longest, abs(better[j] - x[j]) / prior[1, j])
+        for i in range(m):
+            there[i] += by_controls[i, j] * (better[j] - x[j])
+    return cost, longest, better, there
+
+
+_DIFFERENCE = 1e-6  # of a control
+_GRID = 5  # points of each control, where the base's stride fails
+_CLOSE = 0.03  # a step this short, in units of change, is the last: what it leaves is its square
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Controls that a stride would have, were there no target.
+
+    Attributes:
+        controls: (NUM_SLOTS,) u by Slot; those that are not free stay.
+        slots: the f free ones.
+        table: (4, f) of these: their values, changes that count as 1, lower and upper bounds.
+        rounds: Gauss-Newton steps.
+    """
+
+    controls: Array
+    slots: list[int]
+    table: Array
+    rounds: int
+
+    @property
+    def base(self) -> Array:
+        """(f,) values of the free controls."""
+        return self.table[0]
+
+    @property
+    def change(self) -> Array:
+        """(f,) changes that count as 1."""
+        return self.table[1]
+
+    @property
+    def lower(self) -> Array:
+        """(f,) lower bounds."""
+        return self.table[2]
+
+    @property
+    def upper(self) -> Array:
+        """(f,) upper bounds."""
+        return self.table[3]
+
+
+class StrideEnd(Protocol):
+    """Where a stride, or the rest of one, ends with given controls."""
+
+    def at(self, u: Array) -> tuple[Array, Outcome]:
+        """(m,) state at the section where it ends, and how, with (NUM_SLOTS,) controls ``u``."""
+
+    def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
+        """As :meth:`at`, with the (m, f) derivatives by the free controls in the middle."""
+
+
+@dataclass(frozen=True)
+class FromSection:
+    """A whole stride, with exact derivatives.
+
+    Attributes:
+        step: the map.
+        z: (n,) where the stride begins.
+        slots: the free controls.
+    """
+
+    step: ReturnMap
+    z: Array
+    slots: Sequence[int]
+
+    def at(self, u: Array) -> tuple[Array, Outcome]:
+        """See :class:`StrideEnd`."""
+        return self.step.step(self.z, u)
+
+    @cached_property
+    def columns(self) -> NDArray[np.int64]:
+        """Places of the free controls among the map's arguments."""
+        return np.array(self.slots) + PADDED
+
+    def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
+        """See :class:`StrideEnd`."""
+        m, columns = self.step.dimensions[1], self.columns
+        result, jacobian, outcome = self.step.derivatives(self.z, u, columns)
+        return result[:m], jacobian[:m], outcome
+
+
+@dataclass(frozen=True)
+class FromHere:
+    """The rest of a stride, with differences: no map begins within one.
+
+    Attributes:
+        ahead: where it ends.
+        slots: the free controls.
+    """
+
+    ahead: Ahead
+    slots: Sequence[int]
+
+    def at(self, u: Array) -> tuple[Array, Outcome]:
+        """See :class:`StrideEnd`."""
+        return self.ahead(u)
+
+    def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
+        """See :class:`StrideEnd`."""
+        end, outcome = self.ahead(u)
+        jacobian = np.zeros((len(end), len(self.slots)))
+        for column, slot in enumerate(self.slots):
+            changed = u.copy()
+            changed[slot] *= 1.0 + _DIFFERENCE
+            other, how = self.ahead(changed)
+            if how is not Outcome.SECTION:
+                return end, jacobian, how
+            jacobian[:, column] = (other - end) / (changed[slot] - u[slot])
+        return end, jacobian, outcome
+
+
+def solve_stride(
+    stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array
+) -> tuple[Array, Array | None]:
+    """min |(P(u) - aim) / tolerance|^2 + |(u - base) / change|^2 over bounded u.
+
+    Args:
+        stride: its P.
+        aim: (m,) where the stride should end.
+        prior: the free controls.
+        tolerance: (m,) errors that count as 1.
+
+    Returns:
+        (NUM_SLOTS,) controls; (m,) where the stride ends, None where none of those tried completes
+        it.
+    """
+    u = prior.controls.copy()
+    wish, errors = np.array([aim, tolerance])
+    here, by_state = np.empty(0), np.empty((len(wish), 0))  # the state is what it is
+    x = prior.base
+    best: tuple[float, Array, Array] | None = None
+    for number in range(prior.rounds + 1):
+        u[prior.slots] = x
+        end, jacobian, outcome = stride.slopes(u)
+        if outcome is not Outcome.SECTION:
+            if best is not None:
+                x = 0.5 * (x + best[1])
+            elif number == 0:
+                x = _from_grid(stride, aim, prior, tolerance)
+            else:
+                break
+            continue
+        linear = here, x, end, by_state, jacobian
+        cost, longest, there, _ = improve(linear, here, wish, errors, prior.table)
+        if best is not None and cost >= best[0]:
+            x = 0.5 * (x + best[1])
+            continue
+        best = (cost, x, end)
+        if longest < _CLOSE:
+            u[prior.slots] = there
+            end, outcome = stride.at(u)
+            if outcome is Outcome.SECTION:
+                return u, end
+            break
+        x = there
+    if best is None:
+        u[prior.slots] = prior.base
+        return u, None
+    u[prior.slots] = best[1]
+    return u, best[2]
+
+
+def _from_grid(stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array) -> Array:
+    """The best of a grid within the bounds; the base where all of it fails."""
+    u = prior.controls.copy()
+    axes = [
+        np.linspace(low, high, _GRID) for low, high in zip(prior.lower, prior.upper, strict=True)
+    ]
+    best, least = prior.base, np.inf
+    for x in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes)):
+        u[prior.slots] = x
+        end, outcome = stride.at(u)
+        if outcome is Outcome.SECTION:
+            residual = np.concatenate(((end - aim) / tolerance, (x - prior.base) / prior.change))
+            cost = float(residual @ residual)
+            if cost < least:
+                best, least = x, cost
+    return best
+
+
+_STEADY = 1.5  # a run that is to change its state by this many tolerances is not steady
+_TURN = 0.3  # controls this far from a solution's, in units of change, are another stride's
+_KEPT = 4  # solutions: of the stride that begins, as its foot lands, of the next, and one to come
+
+
+class _Solution:
+    """A stride that was solved; its derivatives are not taken before a second one comes near."""
+
+    def __init__(self, z: Array, u: Array, turns: bool, tolerance: Array) -> None:
+        self.z, self.u, self.turns = z, u, turns
+        self.place: list[float] = (z / tolerance).tolist()
+        self.linear: Linear | None = None
+
+    def about(self, stride: FromSection) -> Linear:
+        """To first order."""
+        if self.linear is None:
+            step, n, slots = stride.step, len(self.z), stride.slots
+            m, columns = step.dimensions[1], np.array([*range(n), *(PADDED + s for s in slots)])
+            end, jacobian, _ = step.derivatives(self.z, self.u, columns)
+            by_state, by_controls = jacobian[:m, :n].copy(), jacobian[:m, n:].copy()
+            self.linear = Linear(self.z, self.u[slots], end[:m], by_state, by_controls)
+        return self.linear
+
+
+class NearbyStrides:
+    """Solves strides, and keeps the last solutions.
+
+    Args:
+        tolerance: (m,) errors at the end that count as 1. The section that a stride begins at is
+            that which it ends at.
+        near: a state that is this many tolerances away is another stride's; 0: every one is.
+    """
+
+    def __init__(self, tolerance: Array, near: float) -> None:
+        self.tolerance = tolerance
+        self.near = near
+        self._steady: list[float] = (_STEADY * tolerance).tolist()
+        self._known: deque[_Solution] = deque(maxlen=_KEPT)
+
+    def forget(self) -> None:
+        """Solve the next stride on its own."""
+        self._known.clear()
+
+    def solve(self, stride: FromSection, aim: Array, prior: Prior) -> tuple[Array, Array | None]:
+        """As :func:`~.planners.stride_solver.solve_stride`.
+
+        Args:
+            stride: its P.
+            aim: (m,) where the stride should end.
+            prior: the free controls.
+        """
+        change = map(abs, (aim - stride.z).tolist())
+        if not all(map(lt, change, self._steady)):
+            return solve_stride(stride, aim, prior, self.tolerance)
+        turns = all(map(gt, prior.upper.tolist(), prior.lower.tolist()))
+        known = self._nearest(stride.z, turns)
+        found = known and self._nearby(known.about(stride), stride.z, aim, prior)
+        if found:
+            return found
+        u, end = solve_stride(stride, aim, prior, self.tolerance)
+        if end is not None:
+            self._known.append(_Solution(stride.z.copy(), u.copy(), turns, self.tolerance))
+        return u, end
+
+    def _nearest(self, z: Array, turns: bool) -> _Solution | None:
+        least, best = self.near, None
+        here = (z / self.tolerance).tolist()
+        for known in self._known:
+            if known.turns is turns:
+                away = max(map(abs, map(sub, here, known.place)))
+                if away < least:
+                    least, best = away, known
+        return best
+
+    def _nearby(
+        self, linear: Linear, z: Array, aim: Array, prior: Prior
+    ) -> tuple[Array, Array] | None:
+        """On the derivatives of a solution that is known; None where they do not hold."""
+        _, turn, x, end = improve(tuple(linear), z, aim, self.tolerance, prior.table)
+        if turn > _TURN:
+            return None
+        u = prior.controls.copy()
+        for slot, value in zip(prior.slots, x.tolist(), strict=True):
+            u[slot] = value
+        return u, end
+
+
+Solve = Callable[[Array], tuple[Array, Array | None]]
+"""Controls and end of a stride for where it should end; the end is None where there is none."""
+
+_MADE = 0.5  # of a change: a stride that makes less of it is not the one that was sought
+_SMALLER = 0.7  # of the change asked for before
+_TRIES = 2  # as many more solutions a stride may cost
+
+
+def solve_within_reach(
+    solve: Solve, z: Array, aim: Array, least: float
+) -> tuple[Array, Array | None]:
+    """The stride that comes nearest to the speed aimed at, of a few that aim at less.
+
+    Args:
+        solve: finds a stride.
+        z: (n,) where it begins.
+        aim: (n,) where it should end.
+        least: strides that miss the speed by less than this are left as they are [m/s].
+
+    Returns:
+        As ``solve``.
+    """
+    u, end = solve(aim)
+    if end is None:
+        return u, end
+    change, near = float(aim[0] - z[0]), abs(float(end[0] - aim[0]))
+    bound = max(least, (1.0 - _MADE) * abs(change))
+    for number in range(_TRIES):
+        if near <= bound:
+            break
+        nearer = aim.copy()
+        nearer[0] = z[0] + _SMALLER ** (number + 1) * change
+        other, there = solve(nearer)
+        if there is not None and abs(there[0] - aim[0]) < near:
+            u, end, near = other, there, abs(float(there[0] - aim[0]))
+    return u, end

@@ -1,1 +1,0 @@
-"""Planners of walking steps, from VLO to VLO."""
