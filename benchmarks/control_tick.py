@@ -27,7 +27,7 @@ from template_control.embedding.robot_template import default_gait, template_for
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.robot.biped import Biped
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import state_at_vlo, state_in
@@ -49,7 +49,7 @@ Times = dict[str, np.ndarray[Any, Any]]
 
 
 def _plant(robot: Biped, options: PlantOptions) -> BulletPlant | FreeBulletPlant:
-    if isinstance(robot, FreeBiped):
+    if isinstance(robot, FloatingBaseBiped):
         return FreeBulletPlant(robot, options)
     assert isinstance(robot, PlanarBiped)
     return BulletPlant(robot, options)

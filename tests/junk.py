@@ -11,7 +11,7 @@ import template_control as tc
 from template_control import embedding, estimation, run, slip, sweep, whole_body
 from template_control.plant import BulletPlant, IdealPlant, MujocoPlant
 from template_control.robot import (
-    FreeFiveLink,
+    FloatingBaseFiveLink,
     HipBlock,
     JointLimits,
     SolidLink,
@@ -138,7 +138,7 @@ def targets(folder):
             "length": 0.4, "mass": 3.0, "com": 0.2, "inertia": 0.1, "side_inertia": (0.1, 0.1)
         },
         HipBlock: {"mass": 1.0, "radius": 0.05, "torque_limit": 9.0},
-        FreeFiveLink: {"planar": PLANAR, "block": HipBlock(1.0, 0.05, 9.0)},
+        FloatingBaseFiveLink: {"planar": PLANAR, "block": HipBlock(1.0, 0.05, 9.0)},
         JointLimits: {"torque": 9.0, "velocity": 9.0},
         embedding.PhaseControl: {"tasks": (whole_body.PostureTask(),)},
         embedding.Decision: {

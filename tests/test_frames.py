@@ -14,11 +14,10 @@ from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.plant.free.mujoco import FreeMujocoPlant
 from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
-from template_control.robot.free.free_biped import FreeBiped
-from template_control.robot.free.start import FreePose, free_state_in
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.start import state_at_vlo
+from template_control.robot.start import FloatingBasePose, floating_state_in, state_at_vlo
 from template_control.run.options import SimulationOptions
 from template_control.run.simulation import simulate
 
@@ -129,9 +128,9 @@ def test_a_planar_robot_in_other_words_is_the_same(seed, tmp_path):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_free_robot_in_other_words_is_the_same(seed, tmp_path):
-    words = Words(FreeBiped, robot_path("five-link-3d"), seed, tmp_path)
+    words = Words(FloatingBaseBiped, robot_path("five-link-3d"), seed, tmp_path)
     assert_same_model(words, np.random.default_rng(seed))
-    pose = FreePose(
+    pose = FloatingBasePose(
         com=np.array([0.0, 0.05, 0.97]),
         com_velocity=np.array([1.0, 0.1, 0.0]),
         feet=np.array([[0.0, -0.1, 0.0], [0.1, 0.1, 0.04]]),
@@ -139,7 +138,7 @@ def test_a_free_robot_in_other_words_is_the_same(seed, tmp_path):
         rear=1,
         pitch=0.05,
     )
-    (q, v), (other_q, other_v) = (free_state_in(r, pose) for r in (words.own, words.other))
+    (q, v), (other_q, other_v) = (floating_state_in(r, pose) for r in (words.own, words.other))
     np.testing.assert_allclose(other_q, words.q(q), atol=SAME)
     np.testing.assert_allclose(other_v, words.v(v), atol=SAME)
 
@@ -155,7 +154,7 @@ def test_a_planar_robot_in_other_words_falls_as_it_does(plant, seed, tmp_path):
 @pytest.mark.parametrize("plant", FREE_PLANTS)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_free_robot_in_other_words_falls_as_it_does(plant, seed, tmp_path):
-    words = Words(FreeBiped, robot_path("five-link-3d"), seed, tmp_path)
+    words = Words(FloatingBaseBiped, robot_path("five-link-3d"), seed, tmp_path)
     q = words.own.neutral()
     # At a stop PyBullet's iterations depend on which end of a range comes first.
     q[2], q[7:] = 0.93, (0.1, -0.3, 0.6, -0.1, -0.2, 0.4)

@@ -13,13 +13,13 @@ from template_control.errors import RobotError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot import (
-    FreeBiped,
-    FreeFiveLink,
-    FreePose,
+    FloatingBaseBiped,
+    FloatingBaseFiveLink,
+    FloatingBasePose,
     HipBlock,
     JointLimits,
     SolidLink,
-    free_state_in,
+    floating_state_in,
     load_floating_robot,
     robot_path,
 )
@@ -48,7 +48,7 @@ def load(tmp_path):
     def load(text):
         path = tmp_path / "robot.urdf"
         path.write_text(text)
-        return FreeBiped.from_urdf(path)
+        return FloatingBaseBiped.from_urdf(path)
 
     return load
 
@@ -75,7 +75,9 @@ def table():
         hip_range=(-2.0, 1.5),
         knee_range=(0.0, 2.05),
     )
-    return FreeFiveLink(planar, HipBlock(2.0, 0.06, torque_limit=200.0, velocity_limit=23.0))
+    return FloatingBaseFiveLink(
+        planar, HipBlock(2.0, 0.06, torque_limit=200.0, velocity_limit=23.0)
+    )
 
 
 def test_the_shipped_one_is_written_of_its_table(load):
@@ -180,13 +182,13 @@ def edited(old, new):
 
 def start(robot, height=0.98):
     feet = np.array([[0.0, 0.1, 0.0], [0.0, -0.1, 0.05]])
-    pose = FreePose(np.array([0.0, 0.0, height]), np.zeros(3), feet, np.zeros((2, 3)))
-    free_state_in(robot, pose)
+    pose = FloatingBasePose(np.array([0.0, 0.0, height]), np.zeros(3), feet, np.zeros((2, 3)))
+    floating_state_in(robot, pose)
 
 
 def limited(ranges):
     path, limits = robot_path("five-link-3d"), JointLimits(200.0, 20.0, ranges)
-    return FreeBiped.from_urdf(path, limits=limits)
+    return FloatingBaseBiped.from_urdf(path, limits=limits)
 
 
 MISTAKES = {
@@ -203,7 +205,7 @@ MISTAKES = {
         'lower="0" upper="2.05"', 'lower="2.05" upper="0"'
     ),
     "ranges are given: give one for each joint of a leg": lambda _: limited(((-1.0, 1.0),)),
-    "hang on the same leg: name one of each": lambda _: FreeBiped.from_urdf(
+    "hang on the same leg: name one of each": lambda _: FloatingBaseBiped.from_urdf(
         robot_path("five-link")
     ),
     "is planar and cannot walk free": lambda _: load_floating_robot("human"),
@@ -288,13 +290,13 @@ def test_legs_of_four_hinges_walk(load, text, above, plant):
 def test_the_start_of_a_leg_of_four_hinges_moves_its_feet_as_wanted(load, text):
     robot = load(with_yaw(text, above=True))
     velocity = np.array([[0.0, 0.0, 0.0], [2.0, 0.1, -0.2]])
-    pose = FreePose(
+    pose = FloatingBasePose(
         com=np.array([0.0, 0.02, 0.96]),
         com_velocity=np.array([1.1, 0.1, 0.0]),
         feet=np.array([[0.0, 0.1, 0.0], [0.1, -0.12, 0.05]]),
         feet_velocity=velocity,
     )
-    q, v = free_state_in(robot, pose)
+    q, v = floating_state_in(robot, pose)
     robot.update(q, v)
     np.testing.assert_allclose(robot.space.foot, pose.feet, atol=1e-9)
     np.testing.assert_allclose(robot.contact_velocity, velocity, atol=1e-9)

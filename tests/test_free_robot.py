@@ -12,9 +12,9 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.plant.free.mujoco import FreeMujocoPlant
 from template_control.plant.mujoco import MujocoOptions
-from template_control.robot.free.free_biped import FreeBiped, JointLimits
-from template_control.robot.free.start import FreePose, free_state_in
+from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
+from template_control.robot.start import FloatingBasePose, floating_state_in
 
 
 @pytest.fixture(scope="module")
@@ -180,14 +180,14 @@ def test_roll_pitch_and_yaw_are_those_of_the_heading_frame(bolt):
 
 
 def test_a_start_is_in_the_pose(bolt):
-    pose = FreePose(
+    pose = FloatingBasePose(
         com=np.array([0.0, 0.01, 0.35]),
         com_velocity=np.array([0.6, -0.1, 0.02]),
         feet=np.array([[0.0, 0.05, 0.0], [0.02, -0.06, 0.02]]),
         feet_velocity=np.array([[0.0, 0.0, 0.0], [1.2, 0.1, 0.0]]),
         rear=1,
     )
-    q, v = free_state_in(bolt, pose)
+    q, v = floating_state_in(bolt, pose)
     bolt.update(q, v)
     s = bolt.space
     np.testing.assert_allclose(s.com, pose.com, atol=1e-11)
@@ -198,7 +198,7 @@ def test_a_start_is_in_the_pose(bolt):
     about = s.com_velocity + [s.momentum[1] / weight, -s.momentum[0] / weight, 0.0]
     np.testing.assert_allclose(about, pose.com_velocity, atol=1e-11)
     with pytest.raises(RobotError, match="do not reach"):
-        free_state_in(bolt, replace(pose, com=np.array([0.0, 0.0, 0.8])))
+        floating_state_in(bolt, replace(pose, com=np.array([0.0, 0.0, 0.8])))
 
 
 def test_the_limits_are_those_of_the_actuators(bolt):
@@ -219,20 +219,22 @@ def test_the_limits_are_those_of_the_actuators(bolt):
 )
 def test_what_is_no_free_biped_is_refused(feet, message):
     with pytest.raises(RobotError, match=message):
-        FreeBiped.from_urdf(robot_path("bolt"), feet, 0.016)
+        FloatingBaseBiped.from_urdf(robot_path("bolt"), feet, 0.016)
 
 
 def test_ranges_are_given_for_every_joint_of_a_leg():
     limits = JointLimits(torque=2.0, velocity=80.0, ranges=((-1.0, 1.0), (-2.0, 2.0)))
     with pytest.raises(RobotError, match="3 joints move foot 'FL_FOOT', and 2 ranges"):
-        FreeBiped.from_urdf(robot_path("bolt"), ("FL_FOOT", "FR_FOOT"), 0.016, limits=limits)
+        FloatingBaseBiped.from_urdf(
+            robot_path("bolt"), ("FL_FOOT", "FR_FOOT"), 0.016, limits=limits
+        )
 
 
 def test_a_planar_robot_is_not_free():
     with pytest.raises(RobotError, match="'five-link' is planar"):
         load_floating_robot("five-link")
     with pytest.raises(RobotError, match="the same leg"):
-        FreeBiped.from_urdf(robot_path("five-link"))
+        FloatingBaseBiped.from_urdf(robot_path("five-link"))
 
 
 @pytest.mark.parametrize("length", [1.0 + 5e-4, 1.0 - 5e-4])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from template_control.robot.joint_reserve import joint_reserve
+from template_control.robot.terms import joint_reserve
 from template_control.whole_body.solver import JointBounds, QpOptions
 
 RANGES = np.array([[-2.0, 1.5], [0.0, 2.5]])

@@ -12,7 +12,7 @@ import template_control as tc
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.specs import RobotSpec
@@ -48,7 +48,7 @@ def test_damping_is_the_same_in_every_engine(written, name, damping, engine):
 @pytest.mark.parametrize("damping", [0.5, 5.0])
 def test_damping_is_the_same_in_every_engine_in_space(written, damping, engine):
     plant, options = FREE[engine]
-    robot = FreeBiped.from_urdf(written("five-link-3d", f'damping="{damping}"'))
+    robot = FloatingBaseBiped.from_urdf(written("five-link-3d", f'damping="{damping}"'))
     falls_as_pinocchio_says(robot, plant(robot, options(time_step=1e-4)))
 
 
@@ -70,7 +70,7 @@ def slid(robot, plant, torque, speed=0.0, duration=0.05):
 def test_friction_holds_what_is_less_and_slows_what_is_more(written, engine):
     plant, options = PLANAR.get(engine) or FREE[engine.removeprefix("free ")]
     if engine.startswith("free"):
-        load, name = FreeBiped.from_urdf, "five-link-3d"
+        load, name = FloatingBaseBiped.from_urdf, "five-link-3d"
     else:
         load, name = PlanarBiped.from_urdf, "five-link"
     dry = load(written(name, 'friction="3"'))

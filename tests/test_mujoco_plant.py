@@ -13,7 +13,7 @@ from template_control.cli.main import main
 from template_control.errors import ParameterError
 from template_control.plant import MujocoPlant
 from template_control.robot.library import ROBOTS
-from template_control.robot.requirements import BASE_DOF
+from template_control.robot.terms import PLANAR_DOF
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 G = 9.81
@@ -25,9 +25,9 @@ def high_states(robot, count=10):
     low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
     for _ in range(count):
         q, v = rng.uniform(-0.5, 0.5, robot.nv), rng.uniform(-2.0, 2.0, robot.nv)
-        share = rng.uniform(0.2, 0.8, robot.nv - BASE_DOF)
-        bottom = np.maximum(low[BASE_DOF:], -2.0)
-        q[BASE_DOF:] = bottom + share * (np.minimum(high[BASE_DOF:], 2.0) - bottom)
+        share = rng.uniform(0.2, 0.8, robot.nv - PLANAR_DOF)
+        bottom = np.maximum(low[PLANAR_DOF:], -2.0)
+        q[PLANAR_DOF:] = bottom + share * (np.minimum(high[PLANAR_DOF:], 2.0) - bottom)
         q[1] += 4.0 * robot.leg_length
         yield q, v
 
@@ -67,9 +67,9 @@ def test_a_flight_is_pinocchios_step_by_step(robot):
     q, v = next(high_states(robot))
     plant.reset(q, v)
     for _ in range(50):
-        torque = rng.uniform(-5.0, 5.0, robot.nv - BASE_DOF)
+        torque = rng.uniform(-5.0, 5.0, robot.nv - PLANAR_DOF)
         plant.step(torque)
-        v = v + dt * pin.aba(robot.model, data, q, v, np.r_[np.zeros(BASE_DOF), torque])
+        v = v + dt * pin.aba(robot.model, data, q, v, np.r_[np.zeros(PLANAR_DOF), torque])
         q = q + dt * v
     np.testing.assert_allclose(np.r_[state(plant, robot)], np.r_[q, v], atol=1e-10)
 
@@ -78,7 +78,7 @@ def test_a_push_gives_its_impulse_to_the_whole_robot(robot):
     plant = MujocoPlant(robot, tc.MujocoOptions())
     q, _ = next(high_states(robot))
     plant.reset(q, np.zeros(robot.nv))
-    nothing = np.zeros(robot.nv - BASE_DOF)
+    nothing = np.zeros(robot.nv - PLANAR_DOF)
     for _ in range(100):
         plant.step(nothing, 200.0)
     robot.update(*state(plant, robot))
@@ -139,7 +139,7 @@ def test_a_robot_that_lies_down_is_seen(robot):
     plant.reset(q, np.zeros(robot.nv))
     assert not plant.trunk_touches_ground()
     for _ in range(400):
-        plant.step(np.zeros(robot.nv - BASE_DOF))
+        plant.step(np.zeros(robot.nv - PLANAR_DOF))
     assert plant.trunk_touches_ground()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import template_control as tc
 from template_control.errors import RobotError
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
 
@@ -124,11 +124,11 @@ def test_it_is_refused_for_what_it_is(name):
 def test_a_free_robot_s_soles_are_below_its_ankles():
     bolt = path_of("bolt.urdf")
     feet = ("FL_FOOT", "FR_FOOT")
-    own = FreeBiped.from_urdf(bolt, feet, 0.016)
-    lower = FreeBiped.from_urdf(bolt, feet, 0.016, foot_offset=(0.0, 0.0, -0.02))
+    own = FloatingBaseBiped.from_urdf(bolt, feet, 0.016)
+    lower = FloatingBaseBiped.from_urdf(bolt, feet, 0.016, foot_offset=(0.0, 0.0, -0.02))
     assert lower.leg_length == pytest.approx(own.leg_length + 0.02)
     with pytest.raises(RobotError, match="foot_offset places the spheres of foot_radius"):
-        FreeBiped.from_urdf(robot_path("five-link-3d"), foot_offset=(0.0, 0.0, -0.02))
+        FloatingBaseBiped.from_urdf(robot_path("five-link-3d"), foot_offset=(0.0, 0.0, -0.02))
 
 
 def test_joints_of_a_free_robot_are_locked():
@@ -136,14 +136,14 @@ def test_joints_of_a_free_robot_are_locked():
     joints = ET.parse(path).getroot().findall("joint")
     names = [j.get("name") for j in joints if j.get("type") not in ("fixed", "floating")]
     with pytest.raises(RobotError, match="6 joints move foot 'left_sole_link'"):
-        FreeBiped.from_urdf(path, TALOS["feet"], 0.02)
+        FloatingBaseBiped.from_urdf(path, TALOS["feet"], 0.02)
     with pytest.raises(RobotError, match="has no joint 'ankle'"):
-        FreeBiped.from_urdf(path, TALOS["feet"], 0.02, locked={"ankle": 0.0})
+        FloatingBaseBiped.from_urdf(path, TALOS["feet"], 0.02, locked={"ankle": 0.0})
     held = [n for n in names if n[:-7] not in ("leg_left_", "leg_right_") or n[-7] in "56"]
     ankles = [n for n in held if n.startswith("leg")]
     with pytest.raises(RobotError, match="make them fixed, or name them in `locked`"):
-        FreeBiped.from_urdf(path, TALOS["feet"], 0.02, locked=dict.fromkeys(ankles, 0.0))
-    robot = FreeBiped.from_urdf(path, TALOS["feet"], 0.02, locked=dict.fromkeys(held, 0.0))
+        FloatingBaseBiped.from_urdf(path, TALOS["feet"], 0.02, locked=dict.fromkeys(ankles, 0.0))
+    robot = FloatingBaseBiped.from_urdf(path, TALOS["feet"], 0.02, locked=dict.fromkeys(held, 0.0))
     assert [len(leg) for leg in robot.legs] == [4, 4]
     assert robot.leg_length == pytest.approx(load("talos_reduced.urdf").leg_length)
     assert robot.mass == pytest.approx(load("talos_reduced.urdf").mass)

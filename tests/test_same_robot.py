@@ -10,7 +10,7 @@ from falling import DT, FREE, PLANAR, falls_as_pinocchio_says
 from template_control.errors import RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import (
     FLOATING_ROBOTS,
     ROBOTS,
@@ -105,7 +105,7 @@ def test_a_shipped_planar_robot_falls_as_its_model(name, engine):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_massless_root_link_falls_with_the_trunk(written, kind, engine):
     plant, options = FREE[engine]
-    robot = FreeBiped.from_urdf(written(KINDS[kind]))
+    robot = FloatingBaseBiped.from_urdf(written(KINDS[kind]))
     falls_as_pinocchio_says(robot, plant(robot, options(time_step=DT)))
 
 
@@ -136,7 +136,7 @@ def test_a_push_acts_on_the_whole_trunk(written, kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_masses_and_centre_are_those_of_the_file(written, kind):
-    made = FreeBiped.from_urdf(written(KINDS[kind]))
+    made = FloatingBaseBiped.from_urdf(written(KINDS[kind]))
     model = pin.buildModelFromXML(KINDS[kind](robot_path("five-link-3d").read_text()).replace(
         "floating", "fixed"), pin.JointModelFreeFlyer())  # fmt: skip
     q = pin.neutral(model)
@@ -152,7 +152,7 @@ def test_a_trunk_that_weighs_nothing_at_all_is_refused(written):
         return re.sub(r'(<link name="trunk">)\s*<inertial>.*?</inertial>', r"\1", text, flags=re.S)
 
     with pytest.raises(RobotError, match="the root link weighs nothing"):
-        FreeBiped.from_urdf(written(empty))
+        FloatingBaseBiped.from_urdf(written(empty))
 
 
 @pytest.mark.parametrize("plant", [BulletPlant, MujocoPlant])

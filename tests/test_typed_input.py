@@ -19,7 +19,7 @@ from template_control.errors import GaitError, ParameterError, RecordError, Robo
 from template_control.plant.terrain.spec import KINDS, terrain_from
 from template_control.plant.terrain.terrain import Terrain
 from template_control.robot.five_link import SolidLink
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robustness.campaign import DisturbanceDistribution
 from template_control.run.config import RunConfig
 from template_control.storage import writing
@@ -325,7 +325,7 @@ def test_feet_larger_than_the_legs_are_refused(tmp_path):
     for load in (
         lambda: tc.load_robot(path),
         lambda: tc.PlanarBiped.from_urdf(bolt, feet, legs, foot_radius=5.0),
-        lambda: FreeBiped.from_urdf(bolt, feet, 5.0),
+        lambda: FloatingBaseBiped.from_urdf(bolt, feet, 5.0),
     ):
         with pytest.raises(RobotError, match=r"larger than the legs.*: give a smaller radius"):
             load()

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
-from template_control.robot.free.free_biped import FreeBiped
-from template_control.robot.free.free_terms import BASE_DOF
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.terms import FLOATING_DOF
 from template_control.slip.similarity import RATE_SQUARED, TIME, tuned
 
 Array = NDArray[np.float64]
@@ -79,7 +79,9 @@ class NoiseFilter:
         options: of the robot's size.
     """
 
-    def __init__(self, robot: FreeBiped, deviation: Array, options: NoiseFilterOptions) -> None:
+    def __init__(
+        self, robot: FloatingBaseBiped, deviation: Array, options: NoiseFilterOptions
+    ) -> None:
         self._robot = robot
         self._options = options
         self._base, self._joints = _Pair(deviation), _Pair(deviation)
@@ -118,7 +120,9 @@ class NoiseFilter:
         rough = self._landed <= o.settling
         joints = o.landing_noise if rough else o.acceleration_noise
         change = np.empty_like(errors)
-        change[:, :BASE_DOF] = self._base.gain(o.acceleration_noise, dt) @ errors[:, :BASE_DOF]
-        change[:, BASE_DOF:] = self._joints.gain(joints, dt) @ errors[:, BASE_DOF:]
+        change[:, :FLOATING_DOF] = (
+            self._base.gain(o.acceleration_noise, dt) @ errors[:, :FLOATING_DOF]
+        )
+        change[:, FLOATING_DOF:] = self._joints.gain(joints, dt) @ errors[:, FLOATING_DOF:]
         self._state = robot.moved(q, change[0]), v + change[1]
         return self._state

@@ -19,7 +19,7 @@ from template_control.plant.ground import GroundStep
 from template_control.plant.quiet import silenced
 from template_control.plant.terrain.terrain import Terrain
 from template_control.robot.biped import Biped
-from template_control.robot.requirements import BASE_DOF
+from template_control.robot.terms import PLANAR_DOF
 from template_control.robot.urdf import link_masses
 
 with silenced():  # PyBullet announces its build time on standard output or stderr
@@ -124,7 +124,7 @@ class BulletPlant:
 
     def _trunk_link(self) -> int:
         """PyBullet's index of the trunk."""
-        return self.joints[BASE_DOF - 1]
+        return self.joints[PLANAR_DOF - 1]
 
     def _info(self) -> list[tuple[Any, ...]]:
         p, c = pybullet, self.client

@@ -27,7 +27,7 @@ from template_control.plant.terrain.rolling_feet import RollingFeet
 from template_control.plant.terrain.terrain import Terrain
 from template_control.plant.trunk_box import trunk_corners
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.requirements import BASE_DOF
+from template_control.robot.terms import PLANAR_DOF
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ class IdealPlant:
         self._feet = RollingFeet(self.robot, options.ground)
         self._impulse = np.zeros((2, 2))
         check_damping(self.robot, options.time_step)
-        self._rubbing = np.flatnonzero(robot.joint_friction) + BASE_DOF
+        self._rubbing = np.flatnonzero(robot.joint_friction) + PLANAR_DOF
         self._trunk_corners = tuple(trunk_corners(self.robot).T.tolist())
 
     @property
@@ -148,7 +148,7 @@ class IdealPlant:
 
     def trunk_touches_ground(self) -> bool:
         """True where the box around the trunk's collision shapes reaches the ground."""
-        x, y, pitch = self._q[:BASE_DOF].tolist()
+        x, y, pitch = self._q[:PLANAR_DOF].tolist()
         sine, cosine = sin(pitch), cos(pitch)
         return any(
             y - along * sine + up * cosine <= self.ground_height(x + along * cosine + up * sine)
@@ -166,7 +166,7 @@ class IdealPlant:
             DivergedError: if the state is not finite any more, or the legs lie so that the
                 contacts' forces are not determined.
         """
-        self._drive[BASE_DOF:] = torque
+        self._drive[PLANAR_DOF:] = torque
         self._push = push
         self._impulse[:] = 0.0
         try:
@@ -194,7 +194,7 @@ class IdealPlant:
         answer = [solve(r.mass_matrix, unit, rows, none, self.contacts)[0] for unit in units]
         per_torque = np.array(answer)[:, joints]
         ends = self._v[joints] / h + a[joints]
-        most, torque = r.joint_friction[joints - BASE_DOF], np.zeros(len(joints))
+        most, torque = r.joint_friction[joints - PLANAR_DOF], np.zeros(len(joints))
         for _ in range(_SWEEPS):
             for i, own in enumerate(per_torque):
                 wanted = torque[i] - (ends[i] + own @ torque) / own[i]

@@ -17,9 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.terrain.pieces import pieces
 from template_control.plant.trunk_box import trunk_corners
-from template_control.robot.biped import Biped, foot_frame
+from template_control.robot.biped import Biped
+from template_control.robot.legs import foot_frame
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.requirements import BASE_DOF, UNLIMITED
+from template_control.robot.requirements import UNLIMITED
+from template_control.robot.terms import PLANAR_DOF
 
 Array = NDArray[np.float64]
 
@@ -134,12 +136,12 @@ def _add_robot(ground: Element, robot: PlanarBiped, world: PlantOptions) -> None
         pose = pin.SE3.Identity()
         for above in chain:
             pose = pose * data.liMi[above]
-        name = TRUNK if joint == BASE_DOF else model.names[joint] + " link"
+        name = TRUNK if joint == PLANAR_DOF else model.names[joint] + " link"
         body = add(bodies[parent], "body", name=name, **place(pose))
         here = pose.inverse()
         for above in chain:
             here = here * data.liMi[above]
-            ref, hinge = float(neutral[above - 1]), above - 1 - BASE_DOF
+            ref, hinge = float(neutral[above - 1]), above - 1 - PLANAR_DOF
             lost = losses(robot, hinge, world.time_step) if hinge >= 0 else {}
             _add_joint(body, model, above, here, axes[:, above - 1], ref=ref, lost=lost)
         _add_inertia(body, model.inertias[joint], axes[3:, joint - 1], world.mass_scale)
@@ -150,7 +152,7 @@ def _add_robot(ground: Element, robot: PlanarBiped, world: PlantOptions) -> None
         add_ball(bodies[frame.parentJoint], f"{FOOT}{i}", centre, robot.foot_radius)
     for i, (x, z) in enumerate(trunk_corners(robot).T):
         centre = text(np.array((x, 0.0, z)) @ robot.trunk_axes)
-        add_ball(bodies[BASE_DOF], f"{TRUNK}{i}", centre, _CORNER)
+        add_ball(bodies[PLANAR_DOF], f"{TRUNK}{i}", centre, _CORNER)
 
 
 def _axes(model: pin.Model) -> Array:
@@ -193,7 +195,7 @@ def _add_joint(
         "ref": repr(ref),
     }
     low, high = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
-    if joint > BASE_DOF and max(abs(low), abs(high)) < UNLIMITED:
+    if joint > PLANAR_DOF and max(abs(low), abs(high)) < UNLIMITED:
         about["range"] = text((low, high))
     add(body, "joint", **about, **lost)
 

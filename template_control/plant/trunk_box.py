@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.requirements import BASE_DOF
+from template_control.robot.terms import PLANAR_DOF
 
 
 def trunk_corners(robot: PlanarBiped) -> NDArray[np.float64]:
@@ -17,7 +17,7 @@ def trunk_corners(robot: PlanarBiped) -> NDArray[np.float64]:
     geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.GeometryType.COLLISION)
     corners = []
     for shape in geometry.geometryObjects:
-        if shape.parentJoint != BASE_DOF:
+        if shape.parentJoint != PLANAR_DOF:
             continue
         shape.geometry.computeLocalAABB()
         box = shape.geometry.aabb_local

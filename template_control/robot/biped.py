@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.errors import DivergedError, RobotError
-from template_control.robot.legs import HINGES, middle, straight_legs
+from template_control.errors import DivergedError
+from template_control.robot.legs import HINGES, foot_frame, leg_joints, middle, straight_legs
+from template_control.robot.requirements import check_size
 
 Array = NDArray[np.float64]
 
 _BENT = np.array([-0.4, 0.8])  # of hip and knee [rad]
-# Mass over the cube of the leg's length [kg/m^3]: 20 of bolt, 110 of five-link; 100 times denser
-# and lighter ones than those that are built, and a unit of g, cm or mm is out of it.
-_DENSITY = (0.1, 2e4)
-_CENTRE = " sphere's centre"  # ends a frame's name
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
@@ -268,126 +264,3 @@ class Biped(ABC):
     @abstractmethod
     def tilt(self, q: Array) -> float:
         """Angle of the trunk from the upright [rad], at the last update."""
-
-
-def foot_frame(model: pin.Model, foot: str) -> int:
-    """Pinocchio's frame at the centre of a foot's sphere, or of its link where none was added.
-
-    Args:
-        model: of the robot.
-        foot: name of the link; a joint may have the same.
-    """
-    centre = foot + _CENTRE
-    if model.existFrame(centre, pin.FrameType.OP_FRAME):
-        return int(model.getFrameId(centre, pin.FrameType.OP_FRAME))
-    return int(model.getFrameId(foot, pin.FrameType.BODY))
-
-
-def add_foot_frame(model: pin.Model, foot: str, placement: pin.SE3) -> None:
-    """Add the frame that :func:`foot_frame` finds.
-
-    Args:
-        model: of the robot; changed.
-        foot: name of the link.
-        placement: of the sphere, in the frame of the joint that moves it.
-    """
-    frame = foot_frame(model, foot)
-    joint = model.frames[frame].parentJoint
-    kind = pin.FrameType.OP_FRAME
-    model.addFrame(pin.Frame(foot + _CENTRE, joint, frame, placement, kind))
-
-
-def leg_joints(model: pin.Model, feet: Sequence[str], base_joints: int) -> list[list[int]]:
-    """Pinocchio's joints that move each foot and not the base, from the hip on.
-
-    Args:
-        model: of the robot.
-        feet: names of the two foot frames.
-        base_joints: the first joints, which move the base.
-    """
-    parents = (model.frames[foot_frame(model, foot)].parentJoint for foot in feet)
-    return [[j for j in model.supports[parent] if j > base_joints] for parent in parents]
-
-
-def carrying(model: pin.Model, frames: Sequence[int]) -> Array:
-    """Which velocities move each foot: (2, nv), 1 where one does, else 0.
-
-    Args:
-        model: of the robot.
-        frames: of the two feet.
-    """
-    carries = np.zeros((len(frames), model.nv))
-    for row, frame in zip(carries, frames, strict=True):
-        for joint in model.supports[model.frames[frame].parentJoint]:
-            first = model.idx_vs[joint]
-            row[first : first + model.nvs[joint]] = 1.0
-    return carries
-
-
-def check_size(path: Path, mass: float, leg_length: float, foot_radius: float) -> None:
-    """Check that mass, legs and feet could be those of one robot.
-
-    Args:
-        path: of the URDF, for the message.
-        mass: of the robot [kg].
-        leg_length: [m].
-        foot_radius: of the foot spheres [m].
-
-    Raises:
-        RobotError: if not.
-    """
-    if 2.0 * foot_radius > leg_length:
-        raise RobotError(
-            f"{path}: feet of {foot_radius:.4g} m radius are larger than the legs, of"
-            f" {leg_length:.4g} m: give a smaller radius"
-        )
-    low, high = _DENSITY
-    if not low <= mass / leg_length**3 <= high:
-        raise RobotError(
-            f"{path}: a mass of {mass:.4g} kg and legs of {leg_length:.4g} m do not fit each other:"
-            " write masses in kg and lengths in m, not in g or mm"
-        )
-
-
-def bent_to(
-    robot: Biped,
-    solve: Callable[[Array, float], Array | None],
-    longest: Sequence[float],
-    height: float,
-) -> Array:
-    """(nq,) configuration of a pose, with knees bent as their ranges allow.
-
-    Args:
-        robot: whose pose it is.
-        solve: finds the pose from a configuration with bent legs by steps of a largest length
-            [rad, m], or None.
-        longest: the lengths to try, one after the other.
-        height: of the CoM, for the message [m].
-
-    Raises:
-        RobotError: naming the joint that would be beyond its range, or the legs that were tried.
-    """
-    beyond = ""
-    low, high = robot.joint_range.T
-    for backward in (False, True):
-        for length in longest:
-            q = solve(robot.bent(backward), length)
-            if q is None:
-                continue
-            angles = q[-len(low) :]
-            out = np.flatnonzero((angles < low) | (angles > high))
-            if not len(out):
-                return q
-            joint = out[0]
-            beyond = beyond or (
-                f"joint {robot.joint_names[joint]!r} at {angles[joint]:.3g} rad, beyond its limits"
-                f" of {low[joint]:.3g} to {high[joint]:.3g} rad"
-            )
-    if beyond:
-        raise RobotError(f"{robot.name}: a start at height {height:g} m needs {beyond}")
-    straight = robot.neutral()[-len(low) :]
-    legs = ", ".join(f"{n} = {q:.3g}" for n, q in zip(robot.joint_names, straight, strict=True))
-    raise RobotError(
-        f"{robot.name}: the legs do not reach a CoM height of {height:g} m, with knees bent forward"
-        f" or backward from the straight legs at {legs} rad"
-    )

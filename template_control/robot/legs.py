@@ -1,4 +1,4 @@
-"""Geometry of the legs: their lengths, and the joint angles at which they hang straight down.
+"""Legs and feet: joints and frames, lengths, and the angles at which legs hang straight down.
 
 Only the joints' axes and the feet's points count, not the frames of the links nor the zeros of
 the angles.
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 HINGES = 2  # hip and knee, the last joints of a leg
+_CENTRE = " sphere's centre"  # ends a frame's name
 _EXACT = 1e-13  # of an axis' direction
 _ITERATIONS = 30
 _QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)  # where the search for a lateral hip begins [rad]
@@ -116,3 +117,57 @@ def _turn_lateral(model: pin.Model, data: pin.Data, q: Array, leg: Sequence[int]
         if away < best - 1e-6:
             best, found = away, tried
     q[:] = found
+
+
+def foot_frame(model: pin.Model, foot: str) -> int:
+    """Pinocchio's frame at the centre of a foot's sphere, or of its link where none was added.
+
+    Args:
+        model: of the robot.
+        foot: name of the link; a joint may have the same.
+    """
+    centre = foot + _CENTRE
+    if model.existFrame(centre, pin.FrameType.OP_FRAME):
+        return int(model.getFrameId(centre, pin.FrameType.OP_FRAME))
+    return int(model.getFrameId(foot, pin.FrameType.BODY))
+
+
+def add_foot_frame(model: pin.Model, foot: str, placement: pin.SE3) -> None:
+    """Add the frame that :func:`foot_frame` finds.
+
+    Args:
+        model: of the robot; changed.
+        foot: name of the link.
+        placement: of the sphere, in the frame of the joint that moves it.
+    """
+    frame = foot_frame(model, foot)
+    joint = model.frames[frame].parentJoint
+    kind = pin.FrameType.OP_FRAME
+    model.addFrame(pin.Frame(foot + _CENTRE, joint, frame, placement, kind))
+
+
+def leg_joints(model: pin.Model, feet: Sequence[str], base_joints: int) -> list[list[int]]:
+    """Pinocchio's joints that move each foot and not the base, from the hip on.
+
+    Args:
+        model: of the robot.
+        feet: names of the two foot frames.
+        base_joints: the first joints, which move the base.
+    """
+    parents = (model.frames[foot_frame(model, foot)].parentJoint for foot in feet)
+    return [[j for j in model.supports[parent] if j > base_joints] for parent in parents]
+
+
+def carrying(model: pin.Model, frames: Sequence[int]) -> Array:
+    """Which velocities move each foot: (2, nv), 1 where one does, else 0.
+
+    Args:
+        model: of the robot.
+        frames: of the two feet.
+    """
+    carries = np.zeros((len(frames), model.nv))
+    for row, frame in zip(carries, frames, strict=True):
+        for joint in model.supports[model.frames[frame].parentJoint]:
+            first = model.idx_vs[joint]
+            row[first : first + model.nvs[joint]] = 1.0
+    return carries

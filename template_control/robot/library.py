@@ -10,7 +10,7 @@ import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.errors import RobotError
-from template_control.robot.free.free_biped import FreeBiped, JointLimits
+from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
 from template_control.robot.planar_biped import PlanarBiped
 
 _FILES = (".urdf", ".xacro")
@@ -156,7 +156,7 @@ def load_robot(name: str | Path) -> PlanarBiped:
 
 
 @checked
-def load_floating_robot(name: str | Path) -> FreeBiped:
+def load_floating_robot(name: str | Path) -> FloatingBaseBiped:
     """A shipped robot by name, or any biped by the path of its URDF, that nothing holds.
 
     Raises:
@@ -164,13 +164,13 @@ def load_floating_robot(name: str | Path) -> FreeBiped:
     """
     text = _name(name)
     if text not in _ENTRIES and (text.endswith(_FILES) or "/" in text):
-        return FreeBiped.from_urdf(text)
+        return FloatingBaseBiped.from_urdf(text)
     path, entry = robot_path(text), _ENTRIES[text]
     if not entry.free:
         raise RobotError(
             f"robot {text!r} is planar and cannot walk free: give one of {list(FLOATING_ROBOTS)} or"
             " a URDF file"
         )
-    return FreeBiped.from_urdf(
+    return FloatingBaseBiped.from_urdf(
         path, entry.feet, entry.foot_radius, limits=entry.limits, walk=entry.walk
     )

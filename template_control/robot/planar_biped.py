@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import cos, sin
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -18,30 +17,17 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import RobotError
-from template_control.robot.biped import Biped, leg_joints
-from template_control.robot.fixed_links import drop_world, gather_inertias
-from template_control.robot.joint_losses import check_guide, read_losses
-from template_control.robot.legs import HINGES
-from template_control.robot.meshes import find_meshes
-from template_control.robot.planar_terms import PlanarTerms, gather, sources
+from template_control.robot.biped import Biped
 from template_control.robot.planarise import planarise
 from template_control.robot.requirements import (
-    BASE_DOF,
     add_feet,
-    check_feet,
-    check_hips,
-    check_legs_apart,
+    check_guide,
     check_planar,
+    check_planar_legs,
 )
-from template_control.robot.urdf import (
-    build_model,
-    check_bodies,
-    check_inertias,
-    check_motion,
-    check_shapes,
-    read_urdf,
-    write_out_massless,
-)
+from template_control.robot.terms import PLANAR_DOF, PlanarTerms, gather_planar, planar_sources
+from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
+from template_control.robot.urdf_edits import complete, drop_world
 
 Array = NDArray[np.float64]
 
@@ -69,21 +55,21 @@ class PlanarBiped(Biped):
             its angle.
     """
 
-    base_dof = base_joints = BASE_DOF
+    base_dof = base_joints = PLANAR_DOF
     directions = 2
 
     def _prepare(self) -> None:
         model = self.model
         pin.forwardKinematics(model, self._data, self._neutral)
-        self.trunk_axes: Array = self._data.oMi[BASE_DOF].rotation.copy()
-        self.trunk_lever: Array = self.trunk_axes @ model.inertias[BASE_DOF].lever
+        self.trunk_axes: Array = self._data.oMi[PLANAR_DOF].rotation.copy()
+        self.trunk_lever: Array = self.trunk_axes @ model.inertias[PLANAR_DOF].lever
         self.trunk_com = float(self.trunk_lever[2])
         self.foot_turning: Array = np.zeros((2, self.nv))
         self.foot_turning[:, _PITCH] = 1.0
         for row, leg in zip(self.foot_turning, self.legs, strict=True):
-            row[[BASE_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
+            row[[PLANAR_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
         limits = self.velocity_limit, self.joint_range
-        self._sources = sources(model, self._data, self._foot_ids, self.foot_radius, limits)
+        self._sources = planar_sources(model, self._data, self._foot_ids, self.foot_radius, limits)
         terms = PlanarTerms.zeros(self.nv)
         self._terms = tuple(terms)
         self.com, self.com_velocity, self.com_bias = terms[:3]
@@ -143,40 +129,19 @@ class PlanarBiped(Biped):
         read_losses(path, tree, lossless)
         if sagittal_joints:
             planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius, foot_offset)
-        check_motion(path, tree)
-        check_inertias(path, tree)
-        find_meshes(path, tree)
-        check_shapes(path, tree)
-        gather_inertias(tree)
-        write_out_massless(tree)
-        urdf = ElementTree.tostring(tree, encoding="unicode")
+        urdf = complete(path, tree)
         model = build_model(path, urdf)
         check_planar(path, model)
         check_guide(path, model)
-        only_3d = {
-            "foot_radius": foot_radius,
-            "foot_offset": foot_offset,
-            "locked": locked or None,
-        }
+        only_3d = {"foot_radius": foot_radius, "foot_offset": foot_offset, "locked": locked or None}
         for name, value in only_3d.items():
             if value is not None and not sagittal_joints:
                 raise RobotError(
                     f"{path}: {name} is for a 3D URDF, and no sagittal_joints are named: name them"
                     " too, or leave it out"
                 )
-        check_bodies(path, tree, model, BASE_DOF)
-        check_feet(path, model, feet)
-        legs = leg_joints(model, feet, cls.base_joints)
-        check_legs_apart(path, feet, legs)
-        for foot, leg in zip(feet, legs, strict=True):
-            if not leg:
-                raise RobotError(f"{path}: foot {foot!r} hangs on no leg: name the link at its end")
-            if len(leg) != HINGES:
-                raise RobotError(
-                    f"{path}: {len(leg)} joints move foot {foot!r}: name a hip and a knee of each"
-                    " leg"
-                )
-        check_hips(path, model, [leg[0] for leg in legs])
+        check_bodies(path, tree, model, PLANAR_DOF)
+        check_planar_legs(path, model, feet)
         radius = add_feet(path, urdf, model, feet)
         return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
 
@@ -190,7 +155,7 @@ class PlanarBiped(Biped):
         Raises:
             DivergedError: if a value is NaN or infinite.
         """
-        found = gather(self._sources, q, v, self._compute(q, v), self._terms)
+        found = gather_planar(self._sources, q, v, self._compute(q, v), self._terms)
         finite, self.angular_momentum, self.angular_momentum_bias = found[:3]
         self.fastest, self.soonest_stop = found[3:]
         self._check_finite(finite, q, v)

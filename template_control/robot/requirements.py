@@ -1,8 +1,8 @@
-"""What a URDF must have to be a planar biped of this library."""
+"""Requirements of a URDF: what a planar or a floating-base biped of this library must have."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +10,41 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import RobotError
-from template_control.robot.biped import add_foot_frame, foot_frame
+from template_control.robot.legs import (
+    HINGES,
+    add_foot_frame,
+    foot_frame,
+    leg_joints,
+    straight_legs,
+)
+from template_control.robot.terms import FLOATING_DOF, PLANAR_DOF
 
 Array = NDArray[np.float64]
 
-BASE_DOF = 3
 UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 _CLOSE = 1e-4  # [m]
 _PARALLEL = 1e-6  # 1 - cosine of the angle between two axes
+_ROOT = 1  # Pinocchio's index of the free flyer
+_LEAST, _MOST = 3, 4  # joints of a floating-base robot's leg
+# Mass over the cube of the leg's length [kg/m^3]: 20 of bolt, 110 of five-link; 100 times denser
+# and lighter ones than those that are built, and a unit of g, cm or mm is out of it.
+_DENSITY = (0.1, 2e4)
+
+
+def _check_feet(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
+    """Check that two feet are named, and are there."""
+    if len(feet) != 2:
+        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
+    for foot in feet:
+        if not model.existFrame(foot, pin.FrameType.BODY):
+            links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
+            raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
+
+
+def _check_legs_apart(path: Path, feet: Sequence[str], legs: Sequence[Sequence[int]]) -> None:
+    """Check that each foot has a leg of its own."""
+    if set(legs[0]) & set(legs[1]):
+        raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")
 
 
 def check_planar(path: Path, model: pin.Model) -> None:
@@ -35,16 +62,16 @@ def check_planar(path: Path, model: pin.Model) -> None:
     hinged = [joint.nq == joint.nv == 1 for joint in model.joints[1:]]
     columns = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))
     base = np.eye(6)[[0, 2, 4]].T  # in the world's axes, the pitch joint at its origin
-    given = columns[:, :BASE_DOF]
-    if not all(hinged[:BASE_DOF]) or given.shape != base.shape or not _near(given[3:], base[3:]):
-        first = list(zip(names, kinds, strict=True))[:BASE_DOF]
+    given = columns[:, :PLANAR_DOF]
+    if not all(hinged[:PLANAR_DOF]) or given.shape != base.shape or not _near(given[3:], base[3:]):
+        first = list(zip(names, kinds, strict=True))[:PLANAR_DOF]
         raise RobotError(
             f"{path} is not planar: its first joints are {first},"
             " and must be prismatic x, prismatic z, revolute y; of a 3D robot, name the hips and"
             " knees as sagittal_joints"
         )
     for name, turns, joint in zip(names, hinged, model.joints[1:], strict=True):
-        if name in names[:BASE_DOF]:
+        if name in names[:PLANAR_DOF]:
             continue
         axis = columns[:, joint.idx_v]
         if not turns or abs(abs(axis[4]) - 1.0) > _PARALLEL:
@@ -58,44 +85,128 @@ def check_planar(path: Path, model: pin.Model) -> None:
             " joints at 0, or a slide is not along the world's x or z: give the base's joints no"
             " offset"
         )
-    if model.nv != BASE_DOF + 4:
+    if model.nv != PLANAR_DOF + 4:
         raise RobotError(
-            f"{path}: {model.nv - BASE_DOF} hinges in its legs: a hip and a knee each is what is"
+            f"{path}: {model.nv - PLANAR_DOF} hinges in its legs: a hip and a knee each is what is"
             " controlled; name these four as sagittal_joints"
         )
-    limits = np.array(model.effortLimit[BASE_DOF:])
-    for name, limit in zip(names[BASE_DOF:], limits, strict=True):
-        if not 0.0 < limit < UNLIMITED:
-            raise RobotError(f"{path}: joint {name!r} has effort {limit}: give its torque limit")
-    speeds = np.array(model.velocityLimit[BASE_DOF:])
-    for name, limit in zip(names[BASE_DOF:], speeds, strict=True):
-        if not 0.0 < limit < UNLIMITED:
-            raise RobotError(
-                f"{path}: joint {name!r} has velocity {limit}: give the speed [rad/s] that it can"
-                " have"
-            )
+    hints = {"effort": "its torque limit", "velocity": "the speed [rad/s] that it can have"}
+    _check_limits(path, model, range(PLANAR_DOF + 1, model.njoints), hints)
 
 
-def check_hips(path: Path, model: pin.Model, hips: Sequence[int]) -> None:
-    """Check that the trunk turns about the hips: the height of one is the other's.
+def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
+    """Check that each foot hangs on a hip and a knee of its own, and the trunk turns at the hips.
 
     Args:
         path: of the URDF, for the message.
         model: of the robot.
-        hips: indices of the two hip joints.
+        feet: names of the two foot links.
 
     Raises:
-        RobotError: naming the hip that is elsewhere.
+        RobotError: naming the foot or the hip that is elsewhere.
     """
+    _check_feet(path, model, feet)
+    legs = leg_joints(model, feet, PLANAR_DOF)
+    _check_legs_apart(path, feet, legs)
+    for foot, leg in zip(feet, legs, strict=True):
+        if not leg:
+            raise RobotError(f"{path}: foot {foot!r} hangs on no leg: name the link at its end")
+        if len(leg) != HINGES:
+            raise RobotError(
+                f"{path}: {len(leg)} joints move foot {foot!r}: name a hip and a knee of each leg"
+            )
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
-    for hip in hips:
-        place = data.oMi[hip].translation - data.oMi[BASE_DOF].translation
+    for hip, _ in legs:
+        place = data.oMi[hip].translation - data.oMi[PLANAR_DOF].translation
         if np.hypot(place[0], place[2]) > _CLOSE:
             raise RobotError(
                 f"{path}: hip {model.names[hip]!r} is {place.round(4).tolist()} m from the base's"
                 " pitch joint: place the trunk's origin between the hips"
             )
+
+
+def check_guide(path: Path, model: pin.Model) -> None:
+    """Check that the joints of a planar robot's base lose nothing: the guide only holds it.
+
+    Args:
+        path: of the URDF, for the message.
+        model: of the robot.
+
+    Raises:
+        RobotError: naming the joint that does.
+    """
+    for joint in range(PLANAR_DOF):
+        if model.damping[joint] > 0.0 or model.upperDryFrictionLimit[joint] > 0.0:
+            raise RobotError(
+                f"{path}: base joint {model.names[1 + joint]!r} has damping or friction: leave them"
+                " out, as lossless does for all joints"
+            )
+
+
+def check_floating(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
+    """Check that the robot is a biped whose legs can place their feet anywhere.
+
+    Args:
+        path: of the URDF, for the message.
+        model: of the robot, with a free flyer.
+        feet: names of the two foot links.
+
+    Raises:
+        RobotError: naming the foot or the joint that is otherwise.
+    """
+    _check_feet(path, model, feet)
+    for joint, name in list(zip(model.joints, model.names, strict=True))[2:]:
+        if joint.nq != 1 or joint.nv != 1:
+            raise RobotError(
+                f"{path}: joint {name!r} is {joint.shortname()}, and must be revolute with limits"
+            )
+    legs = leg_joints(model, feet, 1)
+    _check_legs_apart(path, feet, legs)
+    if model.inertias[_ROOT].mass <= 0.0:
+        raise RobotError(
+            f"{path}: the root link weighs nothing, and so does what is fixed to it: give the trunk"
+            " an <inertial> with its mass"
+        )
+    for leg, foot in zip(legs, feet, strict=True):
+        if not _LEAST <= len(leg) <= _MOST:
+            raise RobotError(
+                f"{path}: {len(leg)} joints move foot {foot!r}: three or four are needed, the last"
+                " two of them hip and knee about the lateral axis"
+            )
+    axes = straight_legs(model, legs, [foot_frame(model, foot) for foot in feet]).axes
+    for leg, foot in zip(legs, feet, strict=True):
+        for joint in leg[-HINGES:]:
+            if abs(abs(axes[1, model.idx_vs[joint]]) - 1.0) > _PARALLEL:
+                raise RobotError(
+                    f"{path}: joint {model.names[joint]!r} of foot {foot!r} does not turn about the"
+                    " lateral axis y, as hip and knee must, the last two joints of a leg"
+                )
+    if len(legs[0]) + len(legs[1]) != model.nv - FLOATING_DOF:
+        others = [n for j, n in enumerate(model.names) if j > 1 and j not in (*legs[0], *legs[1])]
+        raise RobotError(
+            f"{path}: joints {others} are in no leg: make them fixed, or name them in `locked`"
+        )
+    hints = {"effort": "its limit", "velocity": "its limit"}
+    _check_limits(path, model, (*legs[0], *legs[1]), hints)
+
+
+def _check_limits(
+    path: Path, model: pin.Model, joints: Iterable[int], hints: Mapping[str, str]
+) -> None:
+    """Check that joints have limits of torque and speed; ``hints``: what to give of each kind."""
+    joints = list(joints)
+    for kind, limits in (("effort", model.effortLimit), ("velocity", model.velocityLimit)):
+        for joint in joints:
+            limit = limits[model.idx_vs[joint]]
+            if not 0.0 < limit < UNLIMITED:
+                raise RobotError(
+                    f"{path}: joint {model.names[joint]!r} has {kind} {limit}: give {hints[kind]}"
+                )
+
+
+def _near(given: Array, wanted: Array) -> bool:
+    return bool(np.abs(given - wanted).max() <= _CLOSE)
 
 
 def add_feet(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> float:
@@ -137,39 +248,26 @@ def add_feet(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> fl
     return radii.pop()
 
 
-def check_feet(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
-    """Check that two feet are named, and are there.
+def check_size(path: Path, mass: float, leg_length: float, foot_radius: float) -> None:
+    """Check that mass, legs and feet could be those of one robot.
 
     Args:
         path: of the URDF, for the message.
-        model: of the robot.
-        feet: names of the foot links.
+        mass: of the robot [kg].
+        leg_length: [m].
+        foot_radius: of the foot spheres [m].
 
     Raises:
-        RobotError: naming the foot that is not.
+        RobotError: if not.
     """
-    if len(feet) != 2:
-        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
-    for foot in feet:
-        if not model.existFrame(foot, pin.FrameType.BODY):
-            links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
-            raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
-
-
-def _near(given: Array, wanted: Array) -> bool:
-    return bool(np.abs(given - wanted).max() <= _CLOSE)
-
-
-def check_legs_apart(path: Path, feet: Sequence[str], legs: Sequence[Sequence[int]]) -> None:
-    """Check that each foot has a leg of its own.
-
-    Args:
-        path: of the URDF, for the message.
-        feet: names of the two foot links.
-        legs: joints of each.
-
-    Raises:
-        RobotError: if they share a joint.
-    """
-    if set(legs[0]) & set(legs[1]):
-        raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")
+    if 2.0 * foot_radius > leg_length:
+        raise RobotError(
+            f"{path}: feet of {foot_radius:.4g} m radius are larger than the legs, of"
+            f" {leg_length:.4g} m: give a smaller radius"
+        )
+    low, high = _DENSITY
+    if not low <= mass / leg_length**3 <= high:
+        raise RobotError(
+            f"{path}: a mass of {mass:.4g} kg and legs of {leg_length:.4g} m do not fit each other:"
+            " write masses in kg and lengths in m, not in g or mm"
+        )

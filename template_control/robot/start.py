@@ -1,23 +1,29 @@
-"""The robot's state where a run begins: CoM, trunk and feet as wanted."""
+"""State of a robot where a run begins, for a pose of CoM, trunk and feet."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Pair, Range, Shape, Triple
 from template_control.errors import RobotError
-from template_control.robot.biped import bent_to
+from template_control.robot.biped import Biped
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.legs import foot_frame
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.requirements import BASE_DOF
+from template_control.robot.terms import PLANAR_DOF
 
 Array = NDArray[np.float64]
 
 _SHORT = 0.15  # of a step of Newton's method [rad]
+_LONGEST = 0.2  # the same, of a floating-base robot [rad, m]
+_EXACT = 1e-12  # [m, rad]
 _OUTPUTS = 7  # CoM (2), trunk (1), both feet (4)
 
 
@@ -50,6 +56,28 @@ class Pose(Checked):
     momentum_speed: bool = False
 
 
+@dataclass(frozen=True)
+class FloatingBasePose(Checked):
+    """Where the CoM and the feet are, and how they move; in the heading frame, trunk upright.
+
+    Attributes:
+        com: (3,) of the CoM [m].
+        com_velocity: (3,) m/s; with the angular momentum about the CoM, as if it moved the CoM:
+            m z times it is the momentum about the point on the ground below.
+        feet: (2, 3) lowest points of rear and front foot [m].
+        feet_velocity: (2, 3) [m/s].
+        rear: the foot that is the rear leg's.
+        pitch: of the trunk, at rest [rad].
+    """
+
+    com: Triple
+    com_velocity: Triple
+    feet: Annotated[Array, Shape((2, 3))]
+    feet_velocity: Annotated[Array, Shape((2, 3))]
+    rear: Annotated[int, Range(0, 1)] = 0
+    pitch: float = 0.0
+
+
 @checked
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     """State of a robot whose CoM and feet are in a pose.
@@ -65,7 +93,7 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
         RobotError: if the legs do not reach, or joints would be beyond their limits.
     """
     # From far away Newton's full step may bend a knee the wrong way; short ones do not.
-    q = bent_to(
+    q = _bent_to(
         robot,
         lambda q, longest: _configuration(robot, pose, q, longest),
         (np.inf, _SHORT),
@@ -73,68 +101,6 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     )
     robot.update(q, np.zeros(robot.nv))
     return q, _velocity(robot, pose, q)
-
-
-def _configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: float) -> Array | None:
-    """(nv,) q of a pose, None where it is not found.
-
-    Args:
-        robot: the model; its last update is overwritten.
-        pose: what is wanted.
-        q: (nv,) bent legs, from which the search begins; changed.
-        longest: step of Newton's method, the largest change of any joint [rad].
-    """
-    stance, swing = pose.rear, 1 - pose.rear
-    q[:BASE_DOF] = pose.com[0], 0.8 * pose.com[1], pose.pitch
-    zero = np.zeros(robot.nv)
-
-    def residual() -> Array:
-        return np.concatenate(
-            (
-                robot.com - pose.com,
-                [q[2] - pose.pitch],
-                robot.foot_position[stance] - pose.feet[0],
-                robot.foot_position[swing] - pose.feet[1],
-            )
-        )
-
-    def jacobian() -> Array:
-        rows = np.zeros((_OUTPUTS, robot.nv))
-        rows[0:2] = robot.com_jacobian
-        rows[2, 2] = 1.0
-        for i, foot in enumerate((stance, swing)):
-            rows[3 + 2 * i : 5 + 2 * i] = robot.foot_jacobian[foot]
-            # The lowest point's path, not that of the material point which touches there.
-            rows[3 + 2 * i] += robot.foot_radius * robot.foot_turning[foot]
-        return rows
-
-    for _ in range(50):
-        robot.update(q, zero)
-        error = residual()
-        if np.max(np.abs(error)) < 1e-12:
-            return q
-        step = _solved(robot, jacobian(), error)
-        q -= step * min(1.0, longest / np.max(np.abs(step)))
-    return None
-
-
-def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:
-    """(nv,) v of a pose at its configuration ``q``; the robot is updated to both."""
-    stance, swing = pose.rear, 1 - pose.rear
-    rows = np.zeros((_OUTPUTS, robot.nv))
-    rows[0:2] = robot.com_jacobian
-    if pose.momentum_speed:
-        rows[0] += _angular_momentum_row(robot, q) / (robot.mass * pose.com[1])
-    if pose.angular_momentum is None:
-        rows[2, 2] = 1.0
-    else:
-        rows[2] = _angular_momentum_row(robot, q)
-    rows[3:5] = robot.foot_jacobian[stance]
-    rows[5:7] = robot.foot_jacobian[swing]
-    wanted = [*pose.com_velocity, pose.angular_momentum or 0.0, *pose.feet_velocity.ravel()]
-    v = _solved(robot, rows, np.array(wanted))
-    robot.update(q, v)
-    return v
 
 
 @checked
@@ -174,11 +140,222 @@ def state_at_vlo(
     return state_in(robot, pose)
 
 
+@checked
+def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple[Array, Array]:
+    """State of a floating-base biped whose CoM and feet are in a pose.
+
+    Args:
+        robot: the model; its last update is overwritten, and the robot faces along the world's x.
+        pose: what is wanted.
+
+    Returns:
+        (nq,) configuration q; (nv,) velocity v.
+
+    Raises:
+        RobotError: if the legs do not reach, or joints would be beyond their limits.
+    """
+    robot.face(0.0, np.zeros(2))
+    q = _bent_to(
+        robot, lambda q, _: _floating_configuration(robot, pose, q), (_LONGEST,), pose.com[2]
+    )
+    robot.update(q, np.zeros(robot.nv))
+    rows, feet = _rows(robot), [pose.rear, 1 - pose.rear]
+    weight = robot.mass * pose.com[2]
+    rows[0] += robot.space.momentum_jacobian[1] / weight
+    rows[1] -= robot.space.momentum_jacobian[0] / weight
+    wanted = np.zeros(len(rows))
+    wanted[:3] = pose.com_velocity
+    for foot, velocity in zip(feet, pose.feet_velocity, strict=True):
+        wanted[6 + 3 * foot : 9 + 3 * foot] = velocity
+    v = _smallest(robot, rows, wanted)
+    robot.update(q, v)
+    return q, v
+
+
+def _bent_to(
+    robot: Biped,
+    solve: Callable[[Array, float], Array | None],
+    longest: Sequence[float],
+    height: float,
+) -> Array:
+    """(nq,) configuration of a pose, with knees bent as their ranges allow.
+
+    Args:
+        robot: whose pose it is.
+        solve: finds the pose from a configuration with bent legs by steps of a largest length
+            [rad, m], or None.
+        longest: the lengths to try, one after the other.
+        height: of the CoM, for the message [m].
+
+    Raises:
+        RobotError: naming the joint that would be beyond its range, or the legs that were tried.
+    """
+    beyond = ""
+    low, high = robot.joint_range.T
+    for backward in (False, True):
+        for length in longest:
+            q = solve(robot.bent(backward), length)
+            if q is None:
+                continue
+            angles = q[-len(low) :]
+            out = np.flatnonzero((angles < low) | (angles > high))
+            if not len(out):
+                return q
+            joint = out[0]
+            beyond = beyond or (
+                f"joint {robot.joint_names[joint]!r} at {angles[joint]:.3g} rad, beyond its limits"
+                f" of {low[joint]:.3g} to {high[joint]:.3g} rad"
+            )
+    if beyond:
+        raise RobotError(f"{robot.name}: a start at height {height:g} m needs {beyond}")
+    straight = robot.neutral()[-len(low) :]
+    legs = ", ".join(f"{n} = {q:.3g}" for n, q in zip(robot.joint_names, straight, strict=True))
+    raise RobotError(
+        f"{robot.name}: the legs do not reach a CoM height of {height:g} m, with knees bent forward"
+        f" or backward from the straight legs at {legs} rad"
+    )
+
+
+def _newton(
+    robot: Biped,
+    q: Array,
+    error: Callable[[Array], Array],
+    step: Callable[[Array, Array], Array],
+    longest: float,
+    iterations: int,
+) -> Array | None:
+    """(nq,) configuration at which an error is zero, by Newton's method; None if none is found.
+
+    Args:
+        robot: the model; its last update is overwritten.
+        q: (nq,) where the search begins.
+        error: (n,) of the configuration, at the robot's last update.
+        step: (nv,) that takes away the error, of the configuration and the error.
+        longest: part of a step, the largest change of any coordinate [rad, m].
+        iterations: the most.
+    """
+    rest = np.zeros(robot.nv)
+    for _ in range(iterations):
+        robot.update(q, rest)
+        away = error(q)
+        if np.max(np.abs(away)) < _EXACT:
+            return q
+        change = step(q, away)
+        q = robot.moved(q, change * min(1.0, longest / np.max(np.abs(change))))
+    return None
+
+
+def _configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: float) -> Array | None:
+    """(nv,) q of a pose, None where it is not found.
+
+    Args:
+        robot: the model; its last update is overwritten.
+        pose: what is wanted.
+        q: (nv,) bent legs, from which the search begins; changed.
+        longest: step of Newton's method, the largest change of any joint [rad].
+    """
+    stance, swing = pose.rear, 1 - pose.rear
+    q[:PLANAR_DOF] = pose.com[0], 0.8 * pose.com[1], pose.pitch
+
+    def error(q: Array) -> Array:
+        return np.concatenate(
+            (
+                robot.com - pose.com,
+                [q[2] - pose.pitch],
+                robot.foot_position[stance] - pose.feet[0],
+                robot.foot_position[swing] - pose.feet[1],
+            )
+        )
+
+    def step(_: Array, error: Array) -> Array:
+        rows = np.zeros((_OUTPUTS, robot.nv))
+        rows[0:2] = robot.com_jacobian
+        rows[2, 2] = 1.0
+        for i, foot in enumerate((stance, swing)):
+            rows[3 + 2 * i : 5 + 2 * i] = robot.foot_jacobian[foot]
+            # The lowest point's path, not that of the material point which touches there.
+            rows[3 + 2 * i] += robot.foot_radius * robot.foot_turning[foot]
+        return _solved(robot, rows, -error)
+
+    return _newton(robot, q, error, step, longest, 50)
+
+
+def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:
+    """(nv,) v of a pose at its configuration ``q``; the robot is updated to both."""
+    stance, swing = pose.rear, 1 - pose.rear
+    rows = np.zeros((_OUTPUTS, robot.nv))
+    rows[0:2] = robot.com_jacobian
+    if pose.momentum_speed:
+        rows[0] += _angular_momentum_row(robot, q) / (robot.mass * pose.com[1])
+    if pose.angular_momentum is None:
+        rows[2, 2] = 1.0
+    else:
+        rows[2] = _angular_momentum_row(robot, q)
+    rows[3:5] = robot.foot_jacobian[stance]
+    rows[5:7] = robot.foot_jacobian[swing]
+    wanted = [*pose.com_velocity, pose.angular_momentum or 0.0, *pose.feet_velocity.ravel()]
+    v = _solved(robot, rows, np.array(wanted))
+    robot.update(q, v)
+    return v
+
+
+def _floating_configuration(
+    robot: FloatingBaseBiped, pose: FloatingBasePose, q: Array
+) -> Array | None:
+    """As :func:`_configuration`, of a floating-base robot."""
+    q[:3] = pose.com[0], pose.com[1], 0.9 * pose.com[2]
+    upright = pin.rpy.rpyToMatrix(0.0, pose.pitch, 0.0)
+    feet = np.empty((2, 3))
+    feet[[pose.rear, 1 - pose.rear]] = pose.feet
+
+    def error(_: Array) -> Array:
+        turn = pin.log3(robot.rotation @ upright.T)
+        return np.concatenate((robot.space.com - pose.com, turn, (robot.space.foot - feet).ravel()))
+
+    def step(q: Array, error: Array) -> Array:
+        rows, r = _rows(robot), robot.foot_radius
+        # The lowest point's path, not that of the material point which touches there.
+        for foot in range(2):
+            turning = _foot_turning(robot, q, foot)
+            rows[6 + 3 * foot] += r * turning[1]
+            rows[7 + 3 * foot] -= r * turning[0]
+        return _smallest(robot, rows, -error)
+
+    return _newton(robot, q, error, step, _LONGEST, 100)
+
+
+def _rows(robot: FloatingBaseBiped) -> Array:
+    """(12, nv) Jacobians of the CoM, the trunk's turning and both feet."""
+    s = robot.space
+    feet = s.foot_jacobian.reshape(-1, robot.nv)
+    return np.concatenate((s.com_jacobian, s.turning_jacobian, feet))
+
+
+def _foot_turning(robot: FloatingBaseBiped, q: Array, foot: int) -> Array:
+    """(3, nv) Jacobian of a foot's angular velocity, in the world's axes."""
+    data = robot.model.createData()
+    frame = foot_frame(robot.model, robot.feet[foot])
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    return np.asarray(pin.computeFrameJacobian(robot.model, data, q, frame, world)[3:])
+
+
 def _solved(robot: PlanarBiped, matrix: Array, right: Array) -> Array:
     try:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     except np.linalg.LinAlgError:
         raise RobotError(f"{robot.name}: the legs do not determine the pose; bend them") from None
+
+
+def _smallest(robot: FloatingBaseBiped, matrix: Array, right: Array) -> Array:
+    """The smallest solution: a leg may have a joint to spare.
+
+    Raises:
+        RobotError: if the legs do not determine the pose.
+    """
+    solution, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=None)
+    if rank < len(matrix):
+        raise RobotError(f"{robot.name}: the legs do not determine the pose; bend them")
+    return np.asarray(solution)
 
 
 def _angular_momentum_row(robot: PlanarBiped, q: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Reading a URDF: what Pinocchio and PyBullet would read otherwise, or not at all, is refused.
+"""Reading and checks of a URDF: what Pinocchio and PyBullet would read otherwise is refused.
 
 Both libraries pass over a number they cannot read and go on without it, each in its own way:
 what is not checked here is a robot that falls for no reason.
@@ -38,6 +38,9 @@ _SIZES = (
     ("capsule", "radius", 1),
     ("capsule", "length", 1),
 )
+_LOSSES = ("damping", "friction")
+# Not URDF's own; written by some tools, and PyBullet has nothing that would do the same.
+_ROTORS = ("armature", "rotor_inertia", "rotorInertia")
 _ROUNDING = 1e-6  # of a link's largest moment of inertia: URDFs are written with few digits
 
 
@@ -89,6 +92,17 @@ def build_model(path: Path, urdf: str) -> pin.Model:
         raise RobotError(f"{path} is no URDF that Pinocchio reads ({_line(error)})") from None
 
 
+def end_of(joint: ET.Element, end: str) -> str:
+    """Name of the link at an end of a joint; "" where none is named.
+
+    Args:
+        joint: the element.
+        end: ``parent`` or ``child``.
+    """
+    element = joint.find(end)
+    return "" if element is None else str(element.get("link"))
+
+
 def strip_motion(joint: ET.Element) -> None:
     """Remove what says how a joint moves.
 
@@ -131,19 +145,6 @@ def check_motion(path: Path, robot: ET.Element) -> None:
                     f"{where} has lower {lower:g} and upper {upper:g}: give a range that it can"
                     " turn in"
                 )
-
-
-def write_out_massless(robot: ET.Element) -> None:
-    """Give links without ``<inertial>`` one of zero: PyBullet takes them for a kilogram.
-
-    Args:
-        robot: the root element; changed.
-    """
-    for link in robot.findall("link"):
-        if link.find("inertial") is None:
-            inertial = ET.SubElement(link, "inertial")
-            ET.SubElement(inertial, "mass", value="0")
-            ET.SubElement(inertial, "inertia", dict.fromkeys(MOMENTS, "0"))
 
 
 def link_masses(urdf: str) -> dict[str, float]:
@@ -202,6 +203,94 @@ def check_shapes(path: Path, robot: ET.Element) -> None:
                         raise RobotError(
                             f"{where} has {name} {shape.get(name)!r}: give a positive number"
                         )
+
+
+def check_inertias(path: Path, robot: ET.Element) -> None:
+    """Check that inertias are those of bodies.
+
+    Args:
+        path: of the file, for the message.
+        robot: its root element.
+
+    Raises:
+        RobotError: naming the link whose is not.
+    """
+    for link in robot.findall("link"):
+        reason = why_impossible(link)
+        if reason:
+            raise RobotError(f"{path}: link {link.get('name')!r}: {reason}")
+
+
+def why_impossible(link: ET.Element) -> str:
+    """The reason for which a link's inertia is no body's; "" if it may be."""
+    inertia = link.find("inertial/inertia")
+    if inertia is None:
+        return ""
+    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in MOMENTS)
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    slack = _ROUNDING * np.abs(moments).max()
+    if moments[0] < -slack:
+        return "its inertia has a negative principal moment: give none"
+    if moments[2] > moments[0] + moments[1] + slack:
+        return (
+            f"its inertia is no body's: the principal moment {moments[2]:.4g} kg m^2 is"
+            f" larger than the sum of the others, {moments[0] + moments[1]:.4g}; give all three"
+        )
+    return ""
+
+
+def read_losses(path: Path, robot: ET.Element, lossless: bool) -> None:
+    """Check the joints' ``<dynamics>``, or remove it.
+
+    Rotor inertias are ignored, and the log says so once.
+
+    Args:
+        path: of the URDF, for messages.
+        robot: its root element; changed: a ``<dynamics>`` that tells no loss is removed.
+        lossless: whether all of them are.
+
+    Raises:
+        RobotError: naming the joint whose damping or friction is no number, or below zero.
+    """
+    _tell_rotors(path, robot)
+    for joint in robot.findall("joint"):
+        for dynamics in joint.findall("dynamics"):
+            told = [name for name in _LOSSES if dynamics.get(name) is not None]
+            for name in told:
+                text = str(dynamics.get(name))
+                if not _is_loss(text):
+                    raise RobotError(
+                        f"{path}: joint {joint.get('name')!r}: dynamics has {name} {text!r}: give a"
+                        " finite number, not below zero"
+                    )
+            if lossless or not told:
+                joint.remove(dynamics)
+
+
+def _is_loss(text: str) -> bool:
+    try:
+        return 0.0 <= float(text) < np.inf
+    except ValueError:
+        return False
+
+
+def _tell_rotors(path: Path, robot: ET.Element) -> None:
+    """Log the first joint or transmission that tells a rotor's inertia."""
+    for part in (*robot.findall("joint"), *robot.findall("transmission")):
+        for element in part.iter():
+            local = element.tag.rpartition("}")[2]
+            if local in _ROTORS or any(name in element.attrib for name in _ROTORS):
+                _log_rotor(path, str(part.get("name")))
+                return
+
+
+@cache
+def _log_rotor(path: Path, name: str) -> None:
+    _LOG.warning(
+        "%s: the rotor inertia of %r is ignored, as all others: PyBullet has none",
+        path,
+        name,
+    )
 
 
 def _line(error: Exception) -> str:
@@ -268,91 +357,6 @@ def _check_inertial(path: Path, link: ET.Element) -> None:
     for name in MOMENTS:  # Pinocchio passes over an <inertial> that lacks one
         inertia.set(name, inertia.get(name, "0"))
         _numbers(f"{where}: inertia", inertia, name, 1)
-
-
-def _impossible(link: ET.Element) -> str:
-    """Why a link's inertia is no body's; "" if it may be."""
-    inertia = link.find("inertial/inertia")
-    if inertia is None:
-        return ""
-    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in MOMENTS)
-    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    slack = _ROUNDING * np.abs(moments).max()
-    if moments[0] < -slack:
-        return "its inertia has a negative principal moment: give none"
-    if moments[2] > moments[0] + moments[1] + slack:
-        return (
-            f"its inertia is no body's: the principal moment {moments[2]:.4g} kg m^2 is"
-            f" larger than the sum of the others, {moments[0] + moments[1]:.4g}; give all three"
-        )
-    return ""
-
-
-def check_inertias(path: Path, robot: ET.Element) -> None:
-    """Check that inertias are those of bodies.
-
-    Args:
-        path: of the file, for the message.
-        robot: its root element.
-
-    Raises:
-        RobotError: naming the link whose is not.
-    """
-    for link in robot.findall("link"):
-        reason = _impossible(link)
-        if reason:
-            raise RobotError(f"{path}: link {link.get('name')!r}: {reason}")
-
-
-def root_link(robot: ET.Element) -> str:
-    """The link that is no joint's child.
-
-    Args:
-        robot: the root element of a URDF.
-    """
-    children = {child.get("link") for child in robot.findall("joint/child")}
-    names = [str(link.get("name")) for link in robot.findall("link")]
-    return next((name for name in names if name not in children), "")
-
-
-def take_points(path: Path, robot: ET.Element) -> None:
-    """Take links on the trunk whose inertia is no body's for points with their mass; and log it.
-
-    Heads and arms often have such an inertia, and little of the trunk's. That of a root link, of a
-    leg, or of what is fixed to a leg counts, and is left for :func:`check_inertias`.
-
-    Args:
-        path: of the file, for the log.
-        robot: its root element, in which all joints but the legs' are fixed; changed.
-    """
-    links = {link.get("name"): link for link in robot.findall("link")}
-    waiting, points = [root_link(robot)], []
-    while waiting:
-        name = waiting.pop()
-        for joint in robot.findall("joint"):
-            parent, child = joint.find("parent"), joint.find("child")
-            if parent is None or child is None or parent.get("link") != name:
-                continue
-            if joint.get("type") != "fixed":
-                continue
-            link = links[child.get("link")]
-            waiting.append(str(child.get("link")))
-            inertia = link.find("inertial/inertia")
-            if inertia is not None and _impossible(link):
-                inertia.attrib.update(dict.fromkeys(MOMENTS, "0"))
-                points.append(str(child.get("link")))
-    if points:
-        _tell_points(path, tuple(points))
-
-
-@cache
-def _tell_points(path: Path, links: tuple[str, ...]) -> None:
-    _LOG.warning(
-        "%s: the inertia of %d links on the trunk is no body's (%s): they are taken for points",
-        path,
-        len(links),
-        ", ".join(links),
-    )
 
 
 def _check_joint(path: Path, joint: ET.Element) -> None:

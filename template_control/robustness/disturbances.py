@@ -22,7 +22,7 @@ from template_control.embedding.planners.planner import Planner
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ground import GroundStep
 from template_control.robot.biped import Biped
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.options import Push, SimulationOptions
 from template_control.run.sensing import SensorOptions
 from template_control.run.simulation import perturbed_start, simulate
@@ -240,7 +240,7 @@ def _other_mass(where: Situation, level: float, trial: int) -> SimulationOptions
 
 
 def _weak(where: Situation, level: float, trial: int) -> SimulationOptions:
-    tuning = FreeOptions if isinstance(where.robot, FreeBiped) else EmbeddingOptions
+    tuning = FreeOptions if isinstance(where.robot, FloatingBaseBiped) else EmbeddingOptions
     return _lasting(where, trial, embedding=tuning(torque_scale=level))
 
 

@@ -28,10 +28,15 @@ from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.plant.free.mujoco import FreeMujocoPlant
 from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.plant import Plant, World, open_plant, plant_name
-from template_control.robot.free.free_biped import FreeBiped
-from template_control.robot.free.start import FreePose, free_state_in
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.start import Pose, state_at_vlo, state_in
+from template_control.robot.start import (
+    FloatingBasePose,
+    Pose,
+    floating_state_in,
+    state_at_vlo,
+    state_in,
+)
 from template_control.run.options import HeadingCommand, SimulationOptions
 from template_control.run.recorder import FloatingRecorder, Recorder
 from template_control.run.sensing import (
@@ -244,7 +249,7 @@ class FloatingBackend(RobotBackend):
         robot: that is run.
     """
 
-    def __init__(self, robot: FreeBiped) -> None:
+    def __init__(self, robot: FloatingBaseBiped) -> None:
         self.robot = robot
 
     def controller(
@@ -289,7 +294,7 @@ class FloatingBackend(RobotBackend):
         away, drift = sideways.cycle.states[SIDES[_REAR].row]
         width = sideways.wish.width
         # Mid-swing: the other foot passes the stance foot at twice the CoM's speed.
-        pose = FreePose(
+        pose = FloatingBasePose(
             com=np.array([0.0, 0.5 * width + away, z[1]]),
             com_velocity=np.array([z[0], drift, z[2]]),
             feet=np.array(
@@ -299,7 +304,7 @@ class FloatingBackend(RobotBackend):
             rear=_REAR,
             pitch=controller.first_pitch(),
         )
-        q, v = free_state_in(self.robot, pose)
+        q, v = floating_state_in(self.robot, pose)
         controller.start(_REAR, first=(planner, node))
         return q, v
 

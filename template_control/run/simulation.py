@@ -24,7 +24,7 @@ from template_control.embedding.state import SectionReport
 from template_control.errors import DivergedError, ParameterError
 from template_control.plant.plant import Plant, plant_name
 from template_control.robot.biped import Biped
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.backends import FloatingBackend, PlanarBackend, RobotBackend
 from template_control.run.failures import QpFailures
@@ -137,7 +137,7 @@ def simulate(
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
     """
-    backend, free = _backend(robot), isinstance(robot, FreeBiped)
+    backend, free = _backend(robot), isinstance(robot, FloatingBaseBiped)
     o = (options or SimulationOptions()).for_robot(free)
     if isinstance(route, Scenario):
         route = robot_route(robot, route)
@@ -218,7 +218,7 @@ def _backend(robot: Biped) -> RobotBackend:
     """
     if isinstance(robot, PlanarBiped):
         return PlanarBackend(robot)
-    if isinstance(robot, FreeBiped):
+    if isinstance(robot, FloatingBaseBiped):
         return FloatingBackend(robot)
     raise ParameterError(f"{robot!r} is of no kind that can be run: give a planar or a free biped")
 

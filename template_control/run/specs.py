@@ -27,7 +27,7 @@ from template_control.embedding.robot_template import (
 )
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import ROBOTS, load_floating_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.gaits.gait import WalkingGait
@@ -86,7 +86,7 @@ class RobotSpec(Checked):
         if self.free:
             if self.sagittal_joints:
                 raise ParameterError("sagittal joints hold a robot in its plane: leave them out")
-            return FreeBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
+            return FloatingBaseBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
         return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
 
 

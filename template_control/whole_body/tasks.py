@@ -12,7 +12,7 @@ from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.similarity import (
     PER_ACCELERATION_SQUARED,
@@ -220,8 +220,8 @@ class OrientationTask(Checked):
         w' = kp (-roll, pitch_ref - pitch, -yaw) - kd w
 
     Roll and pitch are how far the trunk's upward axis leans, about the heading frame's axes; yaw is
-    the direction of its forward axis (:meth:`~template_control.robot.FreeBiped.roll_pitch_yaw`). In
-    the trunk's own axes its angular acceleration is a part of the generalised acceleration, so
+    the direction of its forward axis (:meth:`.FloatingBaseBiped.roll_pitch_yaw`). In the trunk's
+    own axes its angular acceleration is a part of the generalised acceleration, so
     there is no bias.
 
     Attributes:
@@ -317,13 +317,13 @@ class SpareJointTask(Checked):
             rows.desired[row] = kp * away - kd * float(robot.joint_velocity[joint])
 
 
-def _floating(robot: Biped) -> FreeBiped:
+def _floating(robot: Biped) -> FloatingBaseBiped:
     """The robot, if nothing holds it.
 
     Raises:
         ParameterError: if it is held in its plane.
     """
-    if isinstance(robot, FreeBiped):
+    if isinstance(robot, FloatingBaseBiped):
         return robot
     raise ParameterError(
         f"robot {robot.name} is held in its plane, and a task in space asks for a free one: take"

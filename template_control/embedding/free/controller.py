@@ -1,8 +1,8 @@
 """The controller of a free robot: the sagittal one on an (x, z) view, and the rest beside it.
 
-The sagittal controller runs as it is: of :class:`~template_control.robot.FreeBiped` it sees x and z
-in the heading frame. Here that frame is turned, the feet are placed sideways, and the forces get
-their third direction.
+The sagittal controller runs as it is: of :class:`~template_control.robot.FloatingBaseBiped` it
+sees x and z in the heading frame. Here that frame is turned, the feet are placed sideways, and the
+forces get their third direction.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from template_control.embedding.free.lateral import BEYOND, SIDES, Outlook, Side
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.planners.planner import Decision, Planner, Planners, decided
 from template_control.embedding.swing import quintic_step
-from template_control.robot.free.free_biped import FreeBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Event, Leg
@@ -51,13 +51,13 @@ class FreeController(EmbeddingController):
         sideways: where the feet land to the left or right.
     """
 
-    robot: FreeBiped
+    robot: FloatingBaseBiped
     options: FreeOptions
 
     @checked
     def __init__(
         self,
-        robot: FreeBiped,
+        robot: FloatingBaseBiped,
         planners: Planners | Planner,
         options: FreeOptions | None = None,
         route: Route | None = None,

@@ -12,8 +12,8 @@ from template_control.checks.checked import checked
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.bullet_bodies import load_body
 from template_control.plant.quiet import silenced
-from template_control.robot.free.free_biped import FreeBiped
-from template_control.robot.free.free_terms import BASE_DOF
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.terms import FLOATING_DOF
 
 with silenced():  # PyBullet announces its build time on standard output or stderr
     import pybullet
@@ -21,7 +21,7 @@ with silenced():  # PyBullet announces its build time on standard output or stde
 Array = NDArray[np.float64]
 
 _BASE = -1  # PyBullet's index of the base link
-_POSITION = BASE_DOF + 1
+_POSITION = FLOATING_DOF + 1
 _ANGULAR_FIRST = (3, 4, 5, 0, 1, 2)  # places of a velocity's components, linear first
 
 
@@ -40,7 +40,7 @@ class FreeBulletPlant(BulletPlant):
     """
 
     @checked
-    def __init__(self, robot: FreeBiped, options: PlantOptions) -> None:
+    def __init__(self, robot: FloatingBaseBiped, options: PlantOptions) -> None:
         super().__init__(robot, options)
         self._away = self._inertial.inverse()
 
@@ -53,10 +53,10 @@ class FreeBulletPlant(BulletPlant):
     def _mass_matrix(self, q: Array) -> Array:
         # PyBullet's base: angular velocity first, about its CoM in its axes of inertia.
         order = np.argsort(self.joints)
-        place = np.concatenate((_ANGULAR_FIRST, BASE_DOF + order))
+        place = np.concatenate((_ANGULAR_FIRST, FLOATING_DOF + order))
         found, turned = np.empty((self.robot.nv, self.robot.nv)), np.eye(self.robot.nv)
         found[np.ix_(place, place)] = self._joint_space(q[_POSITION:][order])
-        turned[:BASE_DOF, :BASE_DOF] = self._inertial.toActionMatrixInverse()
+        turned[:FLOATING_DOF, :FLOATING_DOF] = self._inertial.toActionMatrixInverse()
         return turned.T @ found @ turned
 
     def _trunk_link(self) -> int:
@@ -77,20 +77,20 @@ class FreeBulletPlant(BulletPlant):
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.plant.plant.Plant.reset`."""
         p, c = pybullet, self.client
-        super().reset(q[_POSITION:], v[BASE_DOF:])
+        super().reset(q[_POSITION:], v[FLOATING_DOF:])
         trunk = _pose(q[:3], q[3:_POSITION])
         place = trunk * self._inertial
         quaternion = pin.Quaternion(place.rotation).coeffs().tolist()
         p.resetBasePositionAndOrientation(
             self.body, place.translation.tolist(), quaternion, physicsClientId=c
         )
-        linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:BASE_DOF]
+        linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:FLOATING_DOF]
         linear = linear + np.cross(angular, place.translation - trunk.translation)
         p.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=c)
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.plant.plant.Plant.read`."""
-        super().read(q[_POSITION:], v[BASE_DOF:])
+        super().read(q[_POSITION:], v[FLOATING_DOF:])
         p, c = pybullet, self.client
         position, quaternion = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
         linear, angular = p.getBaseVelocity(self.body, physicsClientId=c)
@@ -98,7 +98,7 @@ class FreeBulletPlant(BulletPlant):
         trunk = place * self._away
         back = trunk.rotation.T
         speed = linear - np.cross(angular, place.translation - trunk.translation)
-        q[:3], v[:3], v[3:BASE_DOF] = trunk.translation, back @ speed, back @ angular
+        q[:3], v[:3], v[3:FLOATING_DOF] = trunk.translation, back @ speed, back @ angular
         coefficients = pin.Quaternion(trunk.rotation).coeffs()
         # Of the two quaternions of a rotation the one nearer to the last.
         near = float(coefficients @ q[3:_POSITION]) >= 0.0

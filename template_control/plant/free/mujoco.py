@@ -20,13 +20,14 @@ from template_control.plant.mjcf import (
     world_element,
 )
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
-from template_control.robot.biped import Biped, foot_frame
-from template_control.robot.free.free_biped import FreeBiped
-from template_control.robot.free.free_terms import BASE_DOF
+from template_control.robot.biped import Biped
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.legs import foot_frame
+from template_control.robot.terms import FLOATING_DOF
 
 Array = NDArray[np.float64]
 
-_POSITION = BASE_DOF + 1
+_POSITION = FLOATING_DOF + 1
 _ROOT = 1  # Pinocchio's index of the free flyer
 
 
@@ -46,7 +47,7 @@ class FreeMujocoPlant(MujocoPlant):
     """
 
     @checked
-    def __init__(self, robot: FreeBiped, options: MujocoOptions) -> None:
+    def __init__(self, robot: FloatingBaseBiped, options: MujocoOptions) -> None:
         super().__init__(robot, options)
 
     def _text(self, robot: Biped) -> str:
@@ -98,14 +99,14 @@ class FreeMujocoPlant(MujocoPlant):
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.plant.plant.Plant.reset`."""
-        super().reset(q[_POSITION:], v[BASE_DOF:])
+        super().reset(q[_POSITION:], v[FLOATING_DOF:])
         rotation = pin.Quaternion(q[3:_POSITION]).matrix()
         self.data.qpos[:3], self.data.qpos[3:7] = q[:3], q[[6, 3, 4, 5]]
-        self.data.qvel[:3], self.data.qvel[3:6] = rotation @ v[:3], v[3:BASE_DOF]
+        self.data.qvel[:3], self.data.qvel[3:6] = rotation @ v[:3], v[3:FLOATING_DOF]
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.plant.plant.Plant.read`."""
-        super().read(q[_POSITION:], v[BASE_DOF:])
+        super().read(q[_POSITION:], v[FLOATING_DOF:])
         q[:3], q[3:_POSITION] = self.data.qpos[:3], self.data.qpos[[4, 5, 6, 3]]
         rotation = pin.Quaternion(q[3:_POSITION]).matrix()
-        v[:3], v[3:BASE_DOF] = rotation.T @ self.data.qvel[:3], self.data.qvel[3:6]
+        v[:3], v[3:FLOATING_DOF] = rotation.T @ self.data.qvel[:3], self.data.qvel[3:6]

@@ -13,7 +13,7 @@ from meshcat import geometry as mg
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
-from template_control.robot.biped import foot_frame
+from template_control.robot.legs import foot_frame
 from template_control.run.record import FloatingRecord, Record
 from template_control.view.style import LEFT, RIGHT, TRUNK
 

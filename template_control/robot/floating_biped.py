@@ -1,12 +1,12 @@
-"""A biped that nothing holds, on Pinocchio: its trunk is a free flyer.
+"""A floating-base biped on Pinocchio: its trunk is a free flyer.
 
 Frames: world x forward, y left, z up. The configuration is q = (x, y, z of the trunk's origin, its
 quaternion x y z w, joints), the velocity v = (linear and angular velocity of the trunk in its own
 axes, joints), both in Pinocchio's order.
 
-What :meth:`FreeBiped.update` writes stands in the *heading frame*: the world, shifted and turned
-about the vertical by the heading. The sagittal controller sees the robot's x and z there, and
-knows nothing of the rest. The frame rests, but for :meth:`FreeBiped.turn`.
+What :meth:`FloatingBaseBiped.update` writes stands in the *heading frame*: the world, shifted and
+turned about the vertical by the heading. The sagittal controller sees the robot's x and z there,
+and knows nothing of the rest. The frame rests, but for :meth:`FloatingBaseBiped.turn`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import atan2, cos, isfinite, sin, sqrt
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -25,23 +24,25 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
-from template_control.robot.fixed_links import drop_world, gather_inertias
-from template_control.robot.free.free_terms import BASE_DOF, FreeTerms, gather, sources
-from template_control.robot.free.requirements import check_free, set_limits, set_ranges
-from template_control.robot.joint_losses import read_losses
 from template_control.robot.legs import HINGES
-from template_control.robot.meshes import find_meshes
-from template_control.robot.planarise import check_joint_names, lock, moving_joints, spheres
-from template_control.robot.requirements import add_feet
-from template_control.robot.urdf import (
-    build_model,
-    check_bodies,
-    check_inertias,
-    check_motion,
-    check_shapes,
-    read_urdf,
+from template_control.robot.requirements import add_feet, check_floating
+from template_control.robot.terms import (
+    FLOATING_DOF,
+    FloatingTerms,
+    floating_sources,
+    gather_floating,
+)
+from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
+from template_control.robot.urdf_edits import (
+    check_joint_names,
+    complete,
+    drop_world,
+    lock,
+    moving_joints,
+    set_limits,
+    set_ranges,
+    spheres,
     take_points,
-    write_out_massless,
 )
 
 Array = NDArray[np.float64]
@@ -67,8 +68,8 @@ class JointLimits(Checked):
     ranges: tuple[Interval, ...] = ()
 
 
-class FreeBiped(Biped):
-    """Model of a free biped, and its kinematics and dynamics at the last :meth:`update`.
+class FloatingBaseBiped(Biped):
+    """Model of a floating-base biped, and its kinematics and dynamics at the last :meth:`update`.
 
     :meth:`from_urdf` makes one from a file. Its attributes are those of
     :class:`~template_control.robot.biped.Biped`, and those below.
@@ -90,7 +91,7 @@ class FreeBiped(Biped):
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
     """
 
-    base_dof = BASE_DOF
+    base_dof = FLOATING_DOF
     base_joints = _ROOT
     directions = 3
 
@@ -101,8 +102,8 @@ class FreeBiped(Biped):
         self._hips = [data.oMi[leg[-HINGES]] for leg in self._leg_joints]
         self._in_leg = [np.zeros(3), np.zeros(3)]
         limits = self.velocity_limit, self.joint_range
-        self._sources = sources(model, data, self._foot_ids, self.foot_radius, limits)
-        self.space = FreeTerms.zeros(self.nv)
+        self._sources = floating_sources(model, data, self._foot_ids, self.foot_radius, limits)
+        self.space = FloatingTerms.zeros(self.nv)
         self._terms = tuple(self.space)
         self._frame = np.array([0.0, 0.0, 1.0, 0.0])
         self.origin = self._frame[:2]
@@ -120,7 +121,7 @@ class FreeBiped(Biped):
             (joint, float(self._neutral[model.nq - len(self.joint_names) + joint]))
             for leg in self.legs
             if len(leg) > _PLACING
-            for joint in [max(leg[:-HINGES], key=lambda j: abs(axes[BASE_DOF + j]))]
+            for joint in [max(leg[:-HINGES], key=lambda j: abs(axes[FLOATING_DOF + j]))]
         )
         self._aside = float(self._middle()[1])  # of the trunk's origin
 
@@ -154,7 +155,7 @@ class FreeBiped(Biped):
         locked: Mapping[str, float] | None = None,
         foot_offset: tuple[float, float, float] | None = None,
         lossless: bool = False,
-    ) -> FreeBiped:
+    ) -> FloatingBaseBiped:
         """Load a URDF whose root link is the trunk: x forward, y left, z up.
 
         Either leg ends in a hip and a knee about y; one joint or two may come before them.
@@ -188,16 +189,10 @@ class FreeBiped(Biped):
             lock(path, tree, moving_joints(tree, locked), locked)
             take_points(path, tree)
         spheres(path, tree, feet, foot_radius, foot_offset)
-        check_motion(path, tree)
-        check_inertias(path, tree)
-        find_meshes(path, tree)
-        check_shapes(path, tree)
-        gather_inertias(tree)
-        write_out_massless(tree)
-        urdf = ElementTree.tostring(tree, encoding="unicode")
+        urdf = complete(path, tree)
         build_model(path, urdf)  # which tells what is wrong with it
         model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-        check_free(path, model, feet)
+        check_floating(path, model, feet)
         check_bodies(path, tree, model, _ROOT + 1)
         radius = add_feet(path, urdf, model, feet)
         return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
@@ -217,7 +212,7 @@ class FreeBiped(Biped):
         square = x * x + y * y + z * z + w * w
         if abs(square - 1.0) > _UNIT:  # NaN and infinity are told below
             q = self._with_unit(q, sqrt(square))
-        finite, self.fastest, self.soonest_stop = gather(
+        finite, self.fastest, self.soonest_stop = gather_floating(
             self._sources, q, v, self._compute(q, v), self._frame, self._terms
         )
         self._check_finite(finite, q, v)

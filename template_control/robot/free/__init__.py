@@ -1,1 +1,0 @@
-"""Bipeds that nothing holds: six degrees of freedom in the base."""

@@ -1,0 +1,483 @@
+"""Edits of a URDF's text: joints that are locked, limits, feet, meshes, and links without mass."""
+
+from __future__ import annotations
+
+import logging
+import os
+import xml.etree.ElementTree as ET
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from urllib.parse import unquote
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from template_control.errors import RobotError
+from template_control.robot.urdf import (
+    MOMENTS,
+    check_inertias,
+    check_motion,
+    check_shapes,
+    end_of,
+    strip_motion,
+    why_impossible,
+)
+
+Array = NDArray[np.float64]
+
+_LOG = logging.getLogger("template_control")
+_PACKAGE = ("package://", "model://")  # what the name of a package's mesh begins with
+
+
+def complete(path: Path, robot: ET.Element) -> str:
+    """The text of a URDF as all engines read it, once its joints and feet are as they shall be.
+
+    Args:
+        path: of the file, for messages.
+        robot: its root element; changed.
+
+    Raises:
+        RobotError: naming the joint without a range, the link whose inertia is no body's or whose
+            collision shape has no size, or the mesh that is missing.
+    """
+    check_motion(path, robot)
+    check_inertias(path, robot)
+    find_meshes(path, robot)
+    check_shapes(path, robot)
+    gather_inertias(robot)
+    write_out_massless(robot)
+    return ET.tostring(robot, encoding="unicode")
+
+
+# ---- joints
+
+
+def check_joint_names(path: Path, robot: ET.Element, names: Iterable[str]) -> None:
+    """Check that joints are there.
+
+    Args:
+        path: of the URDF, for the message.
+        robot: its root element.
+        names: of the joints.
+
+    Raises:
+        RobotError: naming the one that is not.
+    """
+    joints = {str(joint.get("name")) for joint in robot.findall("joint")}
+    for name in names:
+        if name not in joints:
+            raise RobotError(f"{path} has no joint {name!r}: its joints are {sorted(joints)}")
+
+
+def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
+    """Names of the joints that neither are locked nor mimic a locked one.
+
+    Args:
+        robot: the root element of a URDF.
+        locked: names of those that are locked.
+    """
+    leaders = {
+        str(joint.get("name")): str(mimic.get("joint"))
+        for joint in robot.findall("joint")
+        for mimic in joint.findall("mimic")
+    }
+    held = set(locked)
+    for _ in leaders:  # one may mimic another that mimics
+        held |= {name for name, leader in leaders.items() if leader in held}
+    return {str(joint.get("name")) for joint in robot.findall("joint")} - held
+
+
+def lock(
+    path: Path, robot: ET.Element, moving: Collection[str], locked: Mapping[str, float]
+) -> None:
+    """Hold joints where they are.
+
+    A joint that mimics a locked one and is not named itself is held at its multiple.
+
+    Args:
+        path: of the URDF, for the message.
+        robot: its root element; changed.
+        moving: names of the joints that stay as they are.
+        locked: position of each joint [rad, m]; 0 of those not named.
+
+    Raises:
+        RobotError: if a joint that is not named mimics one that moves.
+    """
+    joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
+    places: dict[str, float] = dict(locked)
+
+    def place(name: str) -> float:
+        mimic = joints[name].find("mimic")
+        if name not in places and mimic is None:
+            places[name] = 0.0
+        elif name not in places and mimic is not None:
+            leader = str(mimic.get("joint"))
+            if leader in moving or leader not in joints:
+                state = "moves" if leader in moving else "is not there"
+                raise RobotError(
+                    f"{path}: joint {name!r} mimics joint {leader!r}, which {state}: name"
+                    f" {name!r} among the locked joints"
+                )
+            places[name] = 0.0  # of a joint that mimics itself
+            multiplier = float(mimic.get("multiplier", "1"))
+            places[name] = multiplier * place(leader) + float(mimic.get("offset", "0"))
+        return places[name]
+
+    held = {n: place(n) for n, j in joints.items() if n not in moving and j.get("type") != "fixed"}
+    for name, position in held.items():
+        _fix(joints[name], position)
+
+
+def _fix(joint: ET.Element, position: float) -> None:
+    """Turn a joint into a fixed one at ``position`` [rad, m]."""
+    origin, axis = origin_of(joint), joint.find("axis")
+    direction = vector(axis.get("xyz") if axis is not None else None, "1 0 0") * position
+    rotation = pin.rpy.rpyToMatrix(vector(origin.get("rpy")))
+    if joint.get("type") == "prismatic":
+        origin.set("xyz", vector_text(vector(origin.get("xyz")) + rotation @ direction))
+    else:
+        origin.set("rpy", vector_text(pin.rpy.matrixToRpy(rotation @ pin.exp3(direction))))
+    joint.set("type", "fixed")
+    strip_motion(joint)
+
+
+def set_limits(robot: ET.Element, torque: float, velocity: float) -> None:
+    """Give all moving joints other limits.
+
+    Args:
+        robot: the root element of a URDF; changed.
+        torque: the largest [N m].
+        velocity: the largest [rad/s].
+    """
+    for joint in robot.findall("joint"):
+        if joint.get("type") != "fixed":
+            limit = joint.find("limit")
+            if limit is None:
+                limit = ET.SubElement(joint, "limit", lower="-10", upper="10")
+            limit.set("effort", f"{torque:.12g}")
+            limit.set("velocity", f"{velocity:.12g}")
+
+
+def set_ranges(
+    path: Path, robot: ET.Element, feet: Sequence[str], ranges: Sequence[tuple[float, float]]
+) -> None:
+    """Give the joints of both legs other ranges.
+
+    Args:
+        path: of the URDF, for the message.
+        robot: its root element, whose moving joints have limits; changed.
+        feet: names of the two foot links.
+        ranges: of a leg's joints, from the trunk to the knee [rad].
+
+    Raises:
+        RobotError: if a leg has another number of joints.
+    """
+    carriers = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
+    for foot in feet:
+        leg, link = [], foot
+        while link in carriers:
+            joint = carriers.pop(link)
+            link = end_of(joint, "parent")
+            if joint.get("type") != "fixed":
+                leg.append(joint)
+        if len(leg) != len(ranges):
+            raise RobotError(
+                f"{path}: {len(leg)} joints move foot {foot!r}, and {len(ranges)} ranges are given:"
+                " give one for each joint of a leg"
+            )
+        for joint, (lower, upper) in zip(reversed(leg), ranges, strict=True):
+            for limit in joint.findall("limit"):
+                limit.set("lower", f"{lower:.12g}")
+                limit.set("upper", f"{upper:.12g}")
+
+
+# ---- feet
+
+
+def spheres(
+    path: Path,
+    robot: ET.Element,
+    feet: Sequence[str],
+    radius: float | None,
+    offset: Sequence[float] | None = None,
+) -> None:
+    """Leave collision shapes to the feet alone, and give them spheres.
+
+    Args:
+        path: of the URDF, for the message.
+        robot: its root element; changed.
+        feet: names of the foot links.
+        radius: of the spheres [m]; None to keep the feet's own shapes.
+        offset: (3,) of their centres from the links' origins, in the links' axes [m].
+
+    Raises:
+        RobotError: if the radius is not positive, or an offset comes without it.
+    """
+    if radius is not None and not 0.0 < radius < np.inf:
+        raise RobotError(f"foot_radius is {radius!r} m: give a positive number")
+    if offset is not None and radius is None:
+        raise RobotError(f"{path}: foot_offset places the spheres of foot_radius: give that too")
+    for link in robot.findall("link"):
+        foot = link.get("name") in feet
+        for collision in link.findall("collision"):
+            if not foot or radius is not None:
+                link.remove(collision)
+        if foot and radius is not None:
+            collision = ET.SubElement(link, "collision")
+            if offset is not None:
+                ET.SubElement(collision, "origin", xyz=vector_text(np.array(offset)))
+            geometry = ET.SubElement(collision, "geometry")
+            ET.SubElement(geometry, "sphere", radius=f"{radius:g}")
+
+
+# ---- meshes
+
+
+def find_meshes(path: Path, robot: ET.Element) -> None:
+    """Write absolute paths of meshes into a URDF, so that its text can be read from anywhere.
+
+    A visual whose mesh is missing is left out, and the log says so once: it is not needed to
+    walk.
+
+    Args:
+        path: of the URDF. A relative name counts from its folder; that of a package counts from
+            each folder above it, with and without the package's name, and from those of the
+            environment variable ``ROS_PACKAGE_PATH``.
+        robot: its root element; changed.
+
+    Raises:
+        RobotError: if the mesh of a collision shape is missing.
+    """
+    missing = []
+    for link in robot.findall("link"):
+        for part in ("visual", "collision"):
+            for shape in link.findall(part):
+                mesh = shape.find("geometry/mesh")
+                if mesh is None:
+                    continue
+                name = str(mesh.get("filename"))
+                file = _file(path, name)
+                if file is not None:
+                    mesh.set("filename", str(file))
+                elif part == "visual":
+                    link.remove(shape)
+                    missing.append(name)
+                else:
+                    raise RobotError(
+                        f"{path}: link {link.get('name')!r}: its collision mesh {name} is missing:"
+                        " put it there, or give the link a box, cylinder or sphere"
+                    )
+    if missing:
+        _log_meshes(path, len(missing), missing[0])
+
+
+def _file(path: Path, name: str) -> Path | None:
+    """The file that a URDF calls ``name``, or None."""
+    folder = path.resolve().parent
+    package = next((start for start in _PACKAGE if name.startswith(start)), None)
+    if package is not None:
+        inside = name.removeprefix(package)
+        without = inside.partition("/")[2]
+        above = [f / part for f in (folder, *folder.parents) for part in (inside, without)]
+        places = [*above, *(Path(root) / inside for root in _package_folders(inside))]
+    else:
+        file = name.removeprefix("file://")
+        places = [folder / file, folder / unquote(file)]
+    return next((place for place in places if place.is_file()), None)
+
+
+def _package_folders(inside: str) -> list[str]:
+    """Folders of ``ROS_PACKAGE_PATH`` that hold packages, or are the one that a file is in."""
+    roots = [root for root in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if root]
+    package = inside.partition("/")[0]
+    return [str(Path(r).parent) if Path(r).name == package else r for r in roots]
+
+
+@cache
+def _log_meshes(path: Path, count: int, name: str) -> None:
+    _LOG.warning(
+        "%s: %d meshes are missing, the first is %s: the robot walks, and is shown with sticks",
+        path,
+        count,
+        name,
+    )
+
+
+# ---- masses
+
+
+def take_points(path: Path, robot: ET.Element) -> None:
+    """Take links on the trunk whose inertia is no body's for points with their mass; and log it.
+
+    Heads and arms often have such an inertia, and little of the trunk's. That of a root link, of a
+    leg, or of what is fixed to a leg counts, and is left for :func:`check_inertias`.
+
+    Args:
+        path: of the file, for the log.
+        robot: its root element, in which all joints but the legs' are fixed; changed.
+    """
+    links = {link.get("name"): link for link in robot.findall("link")}
+    waiting, points = [root_link(robot)], []
+    while waiting:
+        name = waiting.pop()
+        for joint in robot.findall("joint"):
+            if end_of(joint, "parent") != name or joint.get("type") != "fixed":
+                continue
+            child = end_of(joint, "child")
+            waiting.append(child)
+            inertia = links[child].find("inertial/inertia")
+            if inertia is not None and why_impossible(links[child]):
+                inertia.attrib.update(dict.fromkeys(MOMENTS, "0"))
+                points.append(child)
+    if points:
+        _log_points(path, tuple(points))
+
+
+@cache
+def _log_points(path: Path, links: tuple[str, ...]) -> None:
+    _LOG.warning(
+        "%s: the inertia of %d links on the trunk is no body's (%s): they are taken for points",
+        path,
+        len(links),
+        ", ".join(links),
+    )
+
+
+def write_out_massless(robot: ET.Element) -> None:
+    """Give links without ``<inertial>`` one of zero: PyBullet takes them for a kilogram.
+
+    Args:
+        robot: the root element; changed.
+    """
+    for link in robot.findall("link"):
+        if link.find("inertial") is None:
+            inertial = ET.SubElement(link, "inertial")
+            ET.SubElement(inertial, "mass", value="0")
+            ET.SubElement(inertial, "inertia", dict.fromkeys(MOMENTS, "0"))
+
+
+def drop_world(robot: ET.Element) -> None:
+    """Remove a massless root link that carries nothing but a floating joint, and that joint.
+
+    Some URDFs write down that the robot floats in a world; here the root link floats anyway.
+
+    Args:
+        robot: the root element of a URDF; changed.
+    """
+    links = {link.get("name"): link for link in robot.findall("link")}
+    joints = robot.findall("joint")
+    children = {end_of(joint, "child") for joint in joints}
+    for joint in joints:
+        parent = end_of(joint, "parent")
+        alone = sum(end_of(other, "parent") == parent for other in joints) == 1
+        is_root = parent not in children and _inertia(links[parent]).mass == 0.0
+        if joint.get("type") == "floating" and alone and is_root:
+            robot.remove(joint)
+            robot.remove(links[parent])
+
+
+def gather_inertias(robot: ET.Element) -> None:
+    """Give a massless link that moves the inertia of all links that are fixed to it.
+
+    Links that are fixed to each other are one rigid body, and engines take the mass of its first
+    link for that of the body: PyBullet holds a robot in the air whose root link weighs nothing, and
+    pushes act on the first link's centre of mass. Links keep their names, frames and shapes; where
+    the first one of a body has a mass of its own, the text of the URDF stays as it is.
+
+    Args:
+        robot: the root element of a URDF; changed. The links that gave their inertia have none.
+    """
+    links = {str(link.get("name")): link for link in robot.findall("link")}
+    fixed = defaultdict(list)
+    for joint in robot.findall("joint"):
+        if joint.get("type") == "fixed":
+            fixed[end_of(joint, "parent")].append(joint)
+    first = links.keys() - {end_of(joint, "child") for group in fixed.values() for joint in group}
+    for name in sorted(first):
+        if _inertia(links[name]).mass > 0.0:
+            continue
+        total, found = pin.Inertia.Zero(), {name: pin.SE3.Identity()}
+        waiting = [name]
+        while waiting:
+            parent = waiting.pop()
+            for joint in fixed[parent]:
+                child = end_of(joint, "child")
+                if child in found:  # a loop: Pinocchio says so
+                    continue
+                found[child] = found[parent] * _placement(joint)
+                total += found[child].act(_inertia(links[child]))
+                waiting.append(child)
+        if total.mass > 0.0:
+            for link in found:
+                _set_inertia(links[link], total if link == name else None)
+
+
+def _placement(element: ET.Element | None) -> pin.SE3:
+    """Where the ``<origin>`` of a joint or of an ``<inertial>`` is."""
+    origin = None if element is None else element.find("origin")
+    if origin is None:
+        return pin.SE3.Identity()
+    return pin.SE3(pin.rpy.rpyToMatrix(vector(origin.get("rpy"))), vector(origin.get("xyz")))
+
+
+def _inertia(link: ET.Element) -> pin.Inertia:
+    """A link's inertia in its own frame."""
+    mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
+    if mass is None or inertia is None:
+        return pin.Inertia.Zero()
+    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in MOMENTS)
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    own = pin.Inertia(float(mass.get("value", "0")), np.zeros(3), tensor)
+    return _placement(link.find("inertial")).act(own)
+
+
+def _set_inertia(link: ET.Element, inertia: pin.Inertia | None) -> None:
+    """Replace a link's ``<inertial>``; None: it has none."""
+    for old in link.findall("inertial"):
+        link.remove(old)
+    if inertia is None:
+        return
+    inertial = ET.SubElement(link, "inertial")
+    # Python's own digits: no other text gives the same number again, in no locale.
+    ET.SubElement(inertial, "origin", xyz=" ".join(map(repr, inertia.lever.tolist())))
+    ET.SubElement(inertial, "mass", value=repr(float(inertia.mass)))
+    tensor = inertia.inertia[np.triu_indices(3)].tolist()
+    ET.SubElement(inertial, "inertia", dict(zip(MOMENTS, map(repr, tensor), strict=True)))
+
+
+# ---- elements
+
+
+def root_link(robot: ET.Element) -> str:
+    """The link that is no joint's child.
+
+    Args:
+        robot: the root element of a URDF.
+    """
+    children = {child.get("link") for child in robot.findall("joint/child")}
+    names = [str(link.get("name")) for link in robot.findall("link")]
+    return next((name for name in names if name not in children), "")
+
+
+def origin_of(element: ET.Element) -> ET.Element:
+    """The ``<origin>`` of an element, added where there is none."""
+    origin = element.find("origin")
+    return ET.SubElement(element, "origin") if origin is None else origin
+
+
+def vector(text: str | None, default: str = "0 0 0") -> Array:
+    """Numbers of an attribute.
+
+    Args:
+        text: of the attribute, None where it is absent.
+        default: taken then.
+    """
+    return np.array([float(x) for x in (text or default).split()])
+
+
+def vector_text(numbers: Array) -> str:
+    """Text of an attribute, with 12 digits."""
+    return " ".join(f"{x:.12g}" for x in numbers)
