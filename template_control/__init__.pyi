@@ -53,7 +53,7 @@ from .slip.scenario.route import SpeedProfile as SpeedProfile
 from .slip.scenario.route import SpeedRoute as SpeedRoute
 from .slip.scenario.run import simulate_scenario as simulate_scenario
 from .slip.scenario.scenario import example_one as example_one
-from .slip.scenario.scenario_file import load_scenario as load_scenario
+from .slip.scenario.scenario import load_scenario as load_scenario
 from .slip.scenario.scenario_route import ScenarioRoute as ScenarioRoute
 from .version import __version__ as __version__
 from .view.figures import plot as plot

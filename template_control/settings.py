@@ -2,8 +2,9 @@
 
 A dataclass is a table, its fields are the keys. A tuple is a list, an enumeration's member is its
 name in lower case, a field that is None is left out. Where a field may hold one of several
-dataclasses, the key ``kind`` says which by the class attribute of that name. What TOML cannot say,
-such as a table of tasks, is given in Python only.
+dataclasses, the key ``kind`` says which by the class attribute of that name. Keys that a field had
+before are in the class attribute ``old_keys``. What TOML cannot say, such as a table of tasks, is
+given in Python only.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def read(kind: type[T], path: str | Path) -> T:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ParameterError(f"cannot read {path}: {error.strerror}; give a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # of the parser, of UTF-8, of dates, of numbers
         raise ParameterError(f"{path} is no TOML: {error}") from None
     try:
         return from_table(kind, table)
@@ -73,14 +74,18 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
         raise ParameterError(f"{where} is {table!r}: give a table")
     known = {f.name: f for f in fields(kind) if f.init}  # type: ignore[arg-type]
     hints = get_type_hints(kind)
+    old_keys: Mapping[str, str] = getattr(kind, "old_keys", {})
     values: dict[str, Any] = {}
     for key, value in table.items():
         if key == _KIND and hasattr(kind, _KIND):
             continue
         place = f"{where}.{key}" if where else key
-        if key not in known:
+        name = old_keys.get(key, key)
+        if name not in known:
             raise ParameterError(f"unknown key {place}: known are {', '.join(known)}")
-        values[key] = _read(hints[key], value, place)
+        if name in values:
+            raise ParameterError(f"{place} is given by two keys: give {name} only")
+        values[name] = _read(hints[name], value, place)
     for name, f in known.items():
         if name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise ParameterError(f"{where or 'the table'} has no {name}: give one")

@@ -101,7 +101,7 @@ def test_the_example_walks_at_several_speeds(tmp_path, capfd):
     [
         (('gait = "walk"\nacc', 'gait = "run"\nacc'), "segment 2 is to run"),
         (("start = [1.1", "start = [0.03"), "the start has 0.03 m/s at VLO"),
-        (("speed = 1.1", "sped = 1.1"), "unknown key 'sped'"),
+        (("speed = 1.1", "sped = 1.1"), "unknown key segment[0].sped"),
     ],
 )
 def test_a_scenario_that_no_robot_walks_is_refused(refused, tmp_path, change, told):

@@ -12,8 +12,7 @@ from printed import go as go_as_printed
 import template_control as tc
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import simulate_scenario
-from template_control.slip.scenario.scenario import Scenario, Segment
-from template_control.slip.scenario.scenario_file import load_scenario
+from template_control.slip.scenario.scenario import Scenario, Segment, load_scenario
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

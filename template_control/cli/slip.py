@@ -18,7 +18,7 @@ from template_control.cli.go import NO_STANDS
 from template_control.cli.options.output import output_folder
 from template_control.slip.automaton.vocabulary import MapKind, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
-from template_control.slip.scenario.scenario_file import load_scenario
+from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import Files
 from template_control.terminal import plain_console
 

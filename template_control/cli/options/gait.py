@@ -14,8 +14,7 @@ from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.errors import ParameterError
 from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
 from template_control.slip.automaton.vocabulary import MapKind
-from template_control.slip.scenario.scenario import Scenario
-from template_control.slip.scenario.scenario_file import load_scenario
+from template_control.slip.scenario.scenario import Scenario, load_scenario
 
 _PLANNERS = {options.kind: options for options in (LqrOptions, AheadOptions, ModifiedOptions)}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)}

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
 
+from template_control import settings
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Count, Degrees, Positive, Range, Speed
-from template_control.errors import ScenarioError
+from template_control.errors import ParameterError, ScenarioError
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.parameters import SlipParameters
 
@@ -82,6 +84,7 @@ class Scenario(Checked):
     """
 
     _error = ScenarioError
+    old_keys: ClassVar = {"segment": "segments", "map": "map_kind"}
 
     segments: tuple[Segment, ...]
     parameters: SlipParameters = field(default_factory=SlipParameters)
@@ -161,7 +164,7 @@ def _check(scenario: Scenario) -> None:
         below = Annotated[float, Range(0.0, most, above=True, below=True)]
         check(name, height, below, ScenarioError)
     if not s.segments:
-        raise ScenarioError("the scenario has no segments: give at least one [[segment]]")
+        raise ScenarioError("the scenario has no segments: give at least one [[segments]]")
     for i, segment in enumerate(s.segments, 1):
         _check_segment(f"segment {i}", segment)
     first = s.segments[0]
@@ -229,6 +232,25 @@ def _check_segment(where: str, segment: Segment) -> None:
         raise ScenarioError(f"{where} has {' and '.join(ends)}: give it one of them")
     if segment.until_speed is not None and segment.acceleration == 0.0:
         raise ScenarioError(f"{where} has until_speed but no acceleration: give one")
+
+
+@checked
+def load_scenario(path: str | Path) -> Scenario:
+    """Read a scenario from a TOML file, as :mod:`~template_control.settings` has it.
+
+    The attributes' names are its keys: ``[parameters]`` holds the template, each ``[[segments]]`` a
+    :class:`Segment`; ``map_kind`` is the map's name in lower case.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        ScenarioError: naming the file and what is wrong in it.
+    """
+    try:
+        return settings.read(Scenario, path)
+    except ParameterError as error:
+        raise ScenarioError(str(error)) from None
 
 
 @checked
