@@ -78,8 +78,8 @@ def _running(robot: PlanarBiped, speed: float) -> tuple[EmbeddingController, Any
     """As :func:`_walking`, at ``speed`` [m/s]."""
     gait = running_gait(SlipParameters(mass=robot.mass), speed)
     controller = EmbeddingController(robot, RunningPlanner(gait))
-    controller.planning.begin(APEX)
-    swing, automaton = controller.swings.other, controller.planning.automaton
+    controller.supervisor.begin(APEX)
+    swing, automaton = controller.swings.other, controller.supervisor.automaton
     start = ApexStart(gait.apex, gait, swing, controller.first_pitch(), automaton)
     pose = apex_pose(robot, start)
     q, v = state_in(robot, pose)
@@ -123,11 +123,11 @@ class Parts(NamedTuple):
 
 def _time_parts(controller: EmbeddingController, parts: Parts) -> None:
     """Put clocks into a controller, from outside: the library carries none."""
-    robot, planning = controller.robot, controller.planning
+    robot, supervisor = controller.robot, controller.supervisor
     robot.update = _timed(robot.update, parts.update)  # type: ignore[method-assign]
     controller.qp.solve = _timed(controller.qp.solve, parts.quadratic)  # type: ignore[method-assign]
-    for name in ("decide", "land", "follow", "reach_on", "reconsider"):
-        setattr(planning, name, _whole(getattr(planning, name), parts.plans))
+    for name in ("decide", "replan_after_touchdown", "continue_without_touchdown", "replan"):
+        setattr(supervisor, name, _whole(getattr(supervisor, name), parts.plans))
     for workspace in (*controller.qp._workspaces, *controller.qp._braked):
         workspace.solve = _timed(workspace.solve, parts.solves)  # type: ignore[method-assign]
 

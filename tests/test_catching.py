@@ -13,8 +13,8 @@ from template_control.embedding.planners.planner import BreakingPlanner, Free
 from template_control.embedding.replanning import free_controls
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.rollout import ReplanOptions
-from template_control.embedding.state import Learnt, Sensed
-from template_control.embedding.supervisor import StridePlanning
+from template_control.embedding.state import EstimatorState, TemplateState
+from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON, RUN_ON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
@@ -30,7 +30,7 @@ from template_control.slip.scenario.scenario_route import ScenarioRoute
 P = SlipParameters()
 WALK = walking_gait(P, 1.1)
 FAST, SLOW = np.array([2.0, 0.98]), np.array([1.3, 0.98])
-NOTHING = Learnt(load=1.0, trim=0.0, lean=0.0)
+NOTHING = EstimatorState(load=1.0, trim=0.0, lean=0.0)
 
 
 def catching(**options):
@@ -176,30 +176,30 @@ def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
 
 def pushed(speed, route):
     """Plan a walking step, push the robot 60 ms later, and plan again: planning and node then."""
-    planning = StridePlanning(route, default_planners(route), ReplanOptions())
-    planning.begin(VLO)
-    sensed = Sensed(VLO.state(WALK.vlo), np.zeros(2))
-    node = planning.decide(VLO, sensed, 0.0, NOTHING)
-    u = planning.reports[0].decision.controls
+    supervisor = StrideSupervisor(route, default_planners(route), ReplanOptions())
+    supervisor.begin(VLO)
+    sensed = TemplateState(VLO.state(WALK.vlo), np.zeros(2))
+    node = supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    u = supervisor.reports[0].decision.controls
     sensed.state[:] = simulate_stride(P, node.name, sensed.state, u).sample(0.06)[0, :4]
     sensed.state[2] += speed
-    assert planning.surprised(speed, 0.06, 0.06)
-    return planning, planning.reconsider(node, sensed, 0.06, 0.06)
+    assert supervisor.deviates(speed, 0.06, 0.06)
+    return supervisor, supervisor.replan(node, sensed, 0.06, 0.06)
 
 
 def test_a_push_within_a_step_is_answered_by_a_walk_or_by_a_run():
-    planning, node = pushed(0.2, catching())
+    supervisor, node = pushed(0.2, catching())
     assert node.name == "SS_av^w"
-    assert planning.reports[0].goal.stride == "w"
-    planning, node = pushed(0.9, catching())
+    assert supervisor.reports[0].goal.stride == "w"
+    supervisor, node = pushed(0.9, catching())
     assert node.name == "SS_av^wr"
-    report = planning.reports[0]
-    assert (len(planning.reports), report.goal.stride) == (1, "wr")
+    report = supervisor.reports[0]
+    assert (len(supervisor.reports), report.goal.stride) == (1, "wr")
     assert report.decision.feasible
     assert report.target[2] == 0.0, "of an apex"
-    assert planning.path.outcome is Outcome.SECTION
-    planning.steady(node, Sensed(VLO.state(WALK.vlo), np.zeros(2)))
-    assert planning.ground.assist == 0.0, "a planner that knows no slopes has no assist"
+    assert supervisor.path.outcome is Outcome.SECTION
+    supervisor.choose_assist(node, TemplateState(VLO.state(WALK.vlo), np.zeros(2)))
+    assert supervisor.ground.assist == 0.0, "a planner that knows no slopes has no assist"
     _, node = pushed(0.9, SteadyRoute.of(WALK))
     assert node.name == "SS_av^w", "this route knows no other way"
 

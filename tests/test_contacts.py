@@ -91,9 +91,9 @@ def test_axes_that_turn_do_not_forget_a_wall(robot, default_gait):
     wall = np.array([[0.0, WEIGHT], [-0.5 * WEIGHT, 0.1 * WEIGHT]])
     for _ in range(2 * DOUBT):
         controller.tick(q, v, np.ones(2, dtype=bool), DT, wall)
-    np.testing.assert_array_equal(controller.sensing.now.contact, [True, False])
+    np.testing.assert_array_equal(controller.observer.now.contact, [True, False])
     assert controller._lean(0.05, 0), "the axes turn"
-    np.testing.assert_array_equal(controller.sensing.now.contact, [True, False])
+    np.testing.assert_array_equal(controller.observer.now.contact, [True, False])
 
 
 def flawed(steps, seed, embedding=None, share=0.02):

@@ -10,7 +10,7 @@ from template_control.embedding.learners.momentum import LoadEstimate
 from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.modes import GuardOptions, RobotGuards
 from template_control.embedding.phases import Clock
-from template_control.embedding.state import Sensed
+from template_control.embedding.state import TemplateState
 from template_control.errors import GaitError, RobotError
 from template_control.robot.start import state_at_vlo
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
@@ -35,9 +35,9 @@ def test_joined_path_is_continuous_and_knows_its_events(gait):
     for t, row in zip(times, states, strict=True):
         sample(*path.curve, t, row)
     assert np.max(np.abs(np.diff(states[:, :2], axis=0))) < 0.01
-    touchdown, liftoff = path.due(Event.TOUCHDOWN), path.due(Event.REAR_LIFTOFF)
-    assert touchdown < liftoff < path.due(Event.VLO)
-    assert path.due(Event.VLO) == pytest.approx(gait.step_duration, abs=1e-9)
+    touchdown, liftoff = path.time_of(Event.TOUCHDOWN), path.time_of(Event.REAR_LIFTOFF)
+    assert touchdown < liftoff < path.time_of(Event.VLO)
+    assert path.time_of(Event.VLO) == pytest.approx(gait.step_duration, abs=1e-9)
     np.testing.assert_allclose(path.section_state, gait.vlo, atol=1e-7)
     # The front leg lands first; then the one that is the rear leg's at the start.
     rear, front = path.landings
@@ -52,11 +52,11 @@ def test_events_that_are_over_are_not_due_again(gait):
         P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], gait.controls
     )
     path = join([stride, stride])
-    first = path.due(Event.TOUCHDOWN)
+    first = path.time_of(Event.TOUCHDOWN)
     passed = path.after(Event.TOUCHDOWN, 0)
-    assert path.due(Event.TOUCHDOWN, passed) == pytest.approx(first + stride.duration)
+    assert path.time_of(Event.TOUCHDOWN, passed) == pytest.approx(first + stride.duration)
     passed = path.after(Event.TOUCHDOWN, passed)
-    assert path.due(Event.TOUCHDOWN, passed) == np.inf
+    assert path.time_of(Event.TOUCHDOWN, passed) == np.inf
     assert path.after(Event.TOUCHDOWN, passed) == passed
 
 
@@ -70,7 +70,7 @@ def test_running_path_knows_where_either_foot_lands():
     reach = P.rest_length * np.cos(u[0])
     assert rear.x == pytest.approx(down[0].state[0] + reach)
     assert front.x == pytest.approx(down[1].state[0] + reach)
-    assert rear.time < path.due(Event.APEX) < front.time
+    assert rear.time < path.time_of(Event.APEX) < front.time
 
 
 @given(time=st.floats(0.0, 0.32), scale=st.floats(0.97, 1.03))
@@ -104,7 +104,7 @@ def test_template_forces_accelerate_the_template(gait):
 
 
 def test_guards_feel_what_the_template_sees():
-    sensed = Sensed(
+    sensed = TemplateState(
         np.array([0.0, 0.97, 1.1, 0.0]),
         np.array([0.0, 0.6]),
         np.array([True, True]),
@@ -135,7 +135,7 @@ def test_touchdown_is_the_placed_leg_s():
     running = AUTOMATON.start("r").edge(Event.TOUCHDOWN)
     for leg, edge, other in ((0, running, walking), (1, walking, running)):
         contact = np.array([leg == 0, leg == 1])
-        sensed = Sensed(contact=contact, toes=np.array([0.3, 0.3]))
+        sensed = TemplateState(contact=contact, toes=np.array([0.3, 0.3]))
         assert guards.fired(edge, sensed, np.inf)
         assert not guards.fired(other, sensed, np.inf)
 

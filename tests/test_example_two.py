@@ -8,7 +8,7 @@ import pytest
 from template_control.embedding.modes import GuardOptions, RobotGuards
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.state import Sensed
+from template_control.embedding.state import TemplateState
 from template_control.paper.example_two import (
     EARLIER,
     PLANNERS,
@@ -67,7 +67,7 @@ def test_the_template_alone_shows_what_a_map_costs(paper_gait):
 
 
 def test_liftoff_waits_for_the_predefined_direction():
-    ahead = Sensed(np.array([0.4, 0.9, 1.0, 0.0]), np.array([0.0, 0.6]))
+    ahead = TemplateState(np.array([0.4, 0.9, 1.0, 0.0]), np.array([0.0, 0.6]))
     beta = np.arctan2(0.9, 0.4)
     liftoff = AUTOMATON.node("DS_sd^w").edge(Event.REAR_LIFTOFF)
     for angle, lifts in ((beta + 1e-6, True), (beta - 1e-6, False)):

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.free.lateral import STEEPER, Outlook, hurried, outlook
+from template_control.embedding.free.lateral import (
+    STEEPER,
+    LateralForecast,
+    early_touchdown,
+    lateral_forecast,
+)
 from template_control.embedding.planners.planner import Decision
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
 from template_control.slip.lateral.placing import LateralAim, Placement
@@ -26,10 +31,10 @@ def chosen(outlooks, feasible=(True, True, True)):
     seen = {ANGLE: outlooks[0]}
     seen |= {ANGLE + more: out for more, out in zip(STEEPER, outlooks[1:], strict=True)}
     done = dict(zip((ANGLE + more for more in STEEPER), feasible, strict=True))
-    best = hurried(
+    best = early_touchdown(
         first,
         lambda least: decision(least, done[least]),
-        lambda d: Outlook(*seen[float(d.controls[Slot.TOUCHDOWN_ANGLE])]),
+        lambda d: LateralForecast(*seen[float(d.controls[Slot.TOUCHDOWN_ANGLE])]),
     )
     return round(float(best.controls[Slot.TOUCHDOWN_ANGLE]) - ANGLE, 6), best.nominal
 
@@ -62,7 +67,7 @@ def test_an_outlook_is_what_the_bounds_leave():
         stretch=1.0,
     )
     found = Placement(0.6, 0.75, 0.1, 0.3, np.array([0.5, 0.2]), np.array([-0.2, -0.5]))
-    seen = outlook(found, aim)
+    seen = lateral_forecast(found, aim)
     assert seen.beyond == pytest.approx(0.15)
     left = found.expected + found.slope * 0.6 - (0.6, 0.0) - aim.state
     assert seen.price == pytest.approx(3.0 * left[0] ** 2 + 5.0 * left[1] ** 2)

@@ -32,7 +32,7 @@ def feel(friction, seconds, force, speed, standing=FIRST):
     """The first foot feels a force and moves, for some time; whether anything was learnt."""
     forces, speeds = np.zeros((2, 2, len(force)))
     forces[0], speeds[0] = force, speed
-    changes = [friction.feel(standing, forces, speeds, DT) for _ in range(round(seconds / DT))]
+    changes = [friction.update(standing, forces, speeds, DT) for _ in range(round(seconds / DT))]
     return any(changes)
 
 

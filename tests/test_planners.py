@@ -14,10 +14,15 @@ from template_control.embedding.learners.momentum import (
 )
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
-from template_control.embedding.replanning import AGILITY, SOONEST, SOONEST_SHARE, angle_later
+from template_control.embedding.replanning import (
+    AGILITY,
+    SOONEST,
+    SOONEST_SHARE,
+    touchdown_angle_after,
+)
 from template_control.embedding.rollout import ReplanOptions, RoutePlanners
-from template_control.embedding.state import Learnt, Sensed
-from template_control.embedding.supervisor import StridePlanning
+from template_control.embedding.state import EstimatorState, TemplateState
+from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
@@ -126,12 +131,14 @@ def test_unreachable_state_is_said(planner, gait):
     assert not decision.nominal
 
 
-NOTHING = Learnt(load=1.0, trim=0.0, lean=0.0)
+NOTHING = EstimatorState(load=1.0, trim=0.0, lean=0.0)
 
 
 def planned(gait, options=None):
     """The planning of a walk that keeps its gait."""
-    return StridePlanning(SteadyRoute.of(gait), {"w": LqrPlanner(gait)}, options or ReplanOptions())
+    return StrideSupervisor(
+        SteadyRoute.of(gait), {"w": LqrPlanner(gait)}, options or ReplanOptions()
+    )
 
 
 @pytest.mark.parametrize(("before", "speed_kept"), [("w", True), ("rw", False)])
@@ -154,32 +161,32 @@ def test_a_walk_after_a_run_forgets_what_its_steps_added_to_the_speed(gait, befo
 
 
 def test_overdue_ground_keeps_the_template_in_single_stance(gait):
-    planning = planned(gait)
-    sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
+    supervisor = planned(gait)
+    sensed = TemplateState(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
     node = AUTOMATON.node(STRIDE_START["w"])
-    planning.decide(VLO, sensed, 0.0, NOTHING)
-    touchdown = planning.due(Event.TOUCHDOWN)
-    assert not planning.overdue(node, touchdown + 0.009)
-    assert planning.overdue(node, touchdown + 0.011)
-    stride = simulate_stride(P, node.name, sensed.state, planning.reports[0].decision.controls)
+    supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    touchdown = supervisor.time_of(Event.TOUCHDOWN)
+    assert not supervisor.touchdown_overdue(node, touchdown + 0.009)
+    assert supervisor.touchdown_overdue(node, touchdown + 0.011)
+    stride = simulate_stride(P, node.name, sensed.state, supervisor.reports[0].decision.controls)
     sensed.state[:] = stride.sample(touchdown - 1e-6)[0][:4]
-    planning.reach_on(node, sensed, touchdown)
-    assert planning.reaching
-    assert planning.due(Event.TOUCHDOWN) > 0.03, "not at once"
-    assert not planning.overdue(node, 1.0), "once is enough"
-    assert not planning.surprised(1.0, 1.0, 10.0)
+    supervisor.continue_without_touchdown(node, sensed, touchdown)
+    assert supervisor.without_touchdown
+    assert supervisor.time_of(Event.TOUCHDOWN) > 0.03, "not at once"
+    assert not supervisor.touchdown_overdue(node, 1.0), "once is enough"
+    assert not supervisor.deviates(1.0, 1.0, 10.0)
 
 
 def test_a_template_that_would_take_off_is_planned_from_the_ground(gait):
-    planning = planned(gait)
+    supervisor = planned(gait)
     high = np.array([1.1, 0.999, 0.4])
-    assert not planning.planners["w"].decide(high).feasible
-    sensed = Sensed(np.array([0.0, high[1], high[0], high[2]]), np.zeros(2))
-    planning.decide(VLO, sensed, 0.0, NOTHING)
-    report = planning.reports[0]
+    assert not supervisor.planners["w"].decide(high).feasible
+    sensed = TemplateState(np.array([0.0, high[1], high[0], high[2]]), np.zeros(2))
+    supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    report = supervisor.reports[0]
     assert not report.decision.feasible, "the record keeps the truth"
     np.testing.assert_array_equal(report.state, high)
-    assert np.isfinite(planning.due(Event.TOUCHDOWN))
+    assert np.isfinite(supervisor.time_of(Event.TOUCHDOWN))
 
 
 @settings(max_examples=20, deadline=None)
@@ -188,83 +195,83 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
     gait, later, faster, higher
 ):
     node = AUTOMATON.node(STRIDE_START["w"])
-    planning = planned(gait)
-    sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
-    planning.decide(VLO, sensed, 0.0, NOTHING)
-    u = planning.reports[0].decision.controls
+    supervisor = planned(gait)
+    sensed = TemplateState(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
+    supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    u = supervisor.reports[0].decision.controls
     z = gait.vlo + [faster, higher, 0.0]
     disturbed = simulate_stride(P, node.name, VLO.state(z), u)
     assume(later < disturbed.time_of(Event.TOUCHDOWN))
     sensed.state[:] = disturbed.sample(later)[0][:4]
-    left = planning.due(Event.TOUCHDOWN) - later
+    left = supervisor.time_of(Event.TOUCHDOWN) - later
     change = AGILITY * left**2
     # The foot needs some time until it is down, if it had so much.
     soonest = max(min(left, SOONEST, SOONEST_SHARE * gait.step_duration), 0.002)
-    most = min(u[0] + change, angle_later(sensed, P, u[Slot.K_SC], soonest))
-    planning.reconsider(node, sensed, later, later)
+    most = min(u[0] + change, touchdown_angle_after(sensed, P, u[Slot.K_SC], soonest))
+    supervisor.replan(node, sensed, later, later)
     expected = LqrPlanner(gait).decide(z, angles=(min(u[0] - change, most), most)).controls
-    np.testing.assert_allclose(planning.reports[0].decision.controls, expected, rtol=1e-6)
-    assert planning.due(Event.TOUCHDOWN) >= 0.9 * soonest
-    assert len(planning.reports) == 1
+    np.testing.assert_allclose(supervisor.reports[0].decision.controls, expected, rtol=1e-6)
+    assert supervisor.time_of(Event.TOUCHDOWN) >= 0.9 * soonest
+    assert len(supervisor.reports) == 1
 
 
 @pytest.mark.parametrize("time", [0.0, 0.02, 0.06])
 def test_a_leg_at_a_later_angle_lands_then(gait, time):
     node = STRIDE_START["w"]
     early = simulate_stride(P, node, VLO.state(gait.vlo), gait.controls).sample(0.05)[0][:4]
-    sensed, u = Sensed(early, np.zeros(2)), gait.controls.copy()
-    u[Slot.TOUCHDOWN_ANGLE] = angle_later(sensed, P, u[Slot.K_SC], time) - 1e-9
+    sensed, u = TemplateState(early, np.zeros(2)), gait.controls.copy()
+    u[Slot.TOUCHDOWN_ANGLE] = touchdown_angle_after(sensed, P, u[Slot.K_SC], time) - 1e-9
     landed = simulate_stride(P, node, early, u).time_of(Event.TOUCHDOWN)
     assert landed == pytest.approx(time, abs=1e-6 + 2.0 * time**2), "the series ends there"
 
 
 def test_a_step_is_not_planned_anew_with_a_touchdown_that_is_over(gait):
     """The template's foot cannot land below the ground: it would never, and the robot's stay up."""
-    node, planning = AUTOMATON.node(STRIDE_START["w"]), planned(gait)
-    sensed = Sensed(VLO.state(gait.vlo), np.zeros(2))
-    planning.decide(VLO, sensed, 0.0, NOTHING)
-    touchdown = planning.due(Event.TOUCHDOWN)
-    u = planning.reports[0].decision.controls
+    node, supervisor = AUTOMATON.node(STRIDE_START["w"]), planned(gait)
+    sensed = TemplateState(VLO.state(gait.vlo), np.zeros(2))
+    supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    touchdown = supervisor.time_of(Event.TOUCHDOWN)
+    u = supervisor.reports[0].decision.controls
     landing = simulate_stride(P, node.name, sensed.state, u).sample(touchdown - 1e-6)[0][:4]
     sensed.state[:] = landing + [0.0, -0.004, 0.15, 0.0]
-    planning.reconsider(node, sensed, touchdown, touchdown)
-    assert 0.0 <= planning.due(Event.TOUCHDOWN) < 0.005
+    supervisor.replan(node, sensed, touchdown, touchdown)
+    assert 0.0 <= supervisor.time_of(Event.TOUCHDOWN) < 0.005
 
 
 def test_surprise_is_a_large_deviation_some_time_after_the_last_plan(gait):
-    planning = planned(gait, ReplanOptions(speed=0.05, interval=0.02))
-    assert planning.surprised(-0.06, phase_time=0.1, now=0.1)
-    assert not planning.surprised(0.04, phase_time=0.1, now=0.1)
-    assert not planning.surprised(0.06, phase_time=0.01, now=0.1)
-    assert not planning.surprised(0.06, phase_time=0.1, now=0.01)
+    supervisor = planned(gait, ReplanOptions(speed=0.05, interval=0.02))
+    assert supervisor.deviates(-0.06, phase_time=0.1, now=0.1)
+    assert not supervisor.deviates(0.04, phase_time=0.1, now=0.1)
+    assert not supervisor.deviates(0.06, phase_time=0.01, now=0.1)
+    assert not supervisor.deviates(0.06, phase_time=0.1, now=0.01)
 
 
 def test_a_step_that_does_not_go_on_is_tried_again_and_again(gait):
-    planning = planned(gait)
-    sensed = Sensed(VLO.state(np.array([0.2, 0.85, 0.0])), np.zeros(2))  # it falls back
-    node = planning.decide(VLO, sensed, 0.0, NOTHING)
-    assert not planning.reports[0].decision.feasible
-    assert not planning.surprised(0.0, phase_time=0.01, now=0.01), "this was just planned"
-    assert planning.surprised(0.0, phase_time=0.03, now=0.03)
+    supervisor = planned(gait)
+    sensed = TemplateState(VLO.state(np.array([0.2, 0.85, 0.0])), np.zeros(2))  # it falls back
+    node = supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    assert not supervisor.reports[0].decision.feasible
+    assert not supervisor.deviates(0.0, phase_time=0.01, now=0.01), "this was just planned"
+    assert supervisor.deviates(0.0, phase_time=0.03, now=0.03)
     stride = simulate_stride(P, node.name, VLO.state(gait.vlo), gait.controls)
     sensed.state[:] = stride.sample(0.05)[0][:4]
-    planning.reconsider(node, sensed, 0.03, 0.03)
-    assert planning.reports[0].decision.feasible
-    assert not planning.surprised(0.0, phase_time=0.03, now=0.06)
+    supervisor.replan(node, sensed, 0.03, 0.03)
+    assert supervisor.reports[0].decision.feasible
+    assert not supervisor.deviates(0.0, phase_time=0.03, now=0.06)
 
 
 def test_a_stride_may_have_come_here_on_the_legs_of_the_gait(gait):
     """With legs so stiff the CoM was in the air before."""
-    node, planning = AUTOMATON.node(STRIDE_START["w"]), planned(gait)
-    sensed = Sensed(VLO.state(gait.vlo), np.zeros(2))
-    planning.decide(VLO, sensed, 0.0, NOTHING)
-    stiff = planning.reports[0].decision.controls.copy()
+    node, supervisor = AUTOMATON.node(STRIDE_START["w"]), planned(gait)
+    sensed = TemplateState(VLO.state(gait.vlo), np.zeros(2))
+    supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    stiff = supervisor.reports[0].decision.controls.copy()
     stiff[Slot.K_SC] *= 4.0
-    planning.hold(replace(planning.reports[0].decision, controls=stiff))
+    supervisor.set_decision(replace(supervisor.reports[0].decision, controls=stiff))
     stride = simulate_stride(P, node.name, VLO.state(gait.vlo), gait.controls)
     sensed.state[:] = stride.sample(0.1)[0][:4]
-    planning.reconsider(node, sensed, 0.1, 0.1)
-    decision = planning.reports[0].decision
+    supervisor.replan(node, sensed, 0.1, 0.1)
+    decision = supervisor.reports[0].decision
     assert decision.feasible
     np.testing.assert_allclose(decision.predicted, gait.vlo, atol=1e-3)
 
@@ -320,10 +327,10 @@ def test_trim_goes_against_the_drift_that_no_control_takes_away(gait):
     np.testing.assert_allclose(n @ b, 0.0, atol=1e-6)
     # Such a drift must show in dy/dt at VLO, and in nothing else.
     np.testing.assert_allclose((n @ (np.eye(3) - a))[:2], 0.0, atol=1e-6)
-    planning = planned(gait)
-    sensed = Sensed(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
-    planning.decide(VLO, sensed, 0.0, NOTHING)
-    plan = planning.path
+    supervisor = planned(gait)
+    sensed = TemplateState(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
+    supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    plan = supervisor.path
     trim = MomentumTrim(P)
     trim.end_stride(plan.section_state + 1.0, True)  # nothing was expected yet
     assert trim.acceleration == 0.0
@@ -338,7 +345,7 @@ def test_trim_goes_against_the_drift_that_no_control_takes_away(gait):
         trim.end_stride(plan.section_state - [0.0024, 0.0, 0.0], True)
     assert trim.acceleration == 0.0
     # A robot whose drift yields to the trim settles within the dead zone.
-    duration = plan.due(Event.REAR_LIFTOFF) - plan.due(Event.TOUCHDOWN)
+    duration = plan.time_of(Event.REAR_LIFTOFF) - plan.time_of(Event.TOUCHDOWN)
     for _ in range(100):
         drift = 0.01 + trim.acceleration * duration
         trim.end_stride(plan.section_state + [drift, 0.0, 0.0], True)

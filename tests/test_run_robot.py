@@ -12,7 +12,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PHASES
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.state import Sensed
+from template_control.embedding.state import TemplateState
 from template_control.errors import ParameterError
 from template_control.robot.start import state_in
 from template_control.robustness.disturbances import Situation
@@ -133,39 +133,40 @@ def test_a_route_at_an_apex_finds_its_planner():
 
 
 @pytest.fixture
-def planning(robot, gait):
+def supervisor(robot, gait):
     """Planning of a run whose first stride is decided."""
     controller = EmbeddingController(robot, RunningPlanner(gait))
     state_in(robot, apex_pose(robot, ApexStart(gait.apex, gait, SWING)))
     controller.start()
-    return controller.planning
+    return controller.supervisor
 
 
-def test_in_flight_the_path_knows_where_both_feet_land(planning, gait):
-    sensed = Sensed(state=np.array([0.0, gait.apex[1] - 0.004, 3.0, 0.28]))
-    planning.follow(AUTOMATON.node("F_ba^r"), sensed, 0.1)
-    first, second = planning.landing(0), planning.landing(1)
+def test_in_flight_the_path_knows_where_both_feet_land(supervisor, gait):
+    sensed = TemplateState(state=np.array([0.0, gait.apex[1] - 0.004, 3.0, 0.28]))
+    supervisor.follow(AUTOMATON.node("F_ba^r"), sensed, 0.1)
+    first, second = supervisor.landing(0), supervisor.landing(1)
     assert second.x - first.x == pytest.approx(gait.step_length, abs=0.02)
     assert second.time - first.time == pytest.approx(gait.step_duration, abs=0.02)
 
 
 @pytest.mark.parametrize("early", [-0.004, 0.006])
-def test_stiffnesses_follow_from_where_the_foot_has_landed(planning, gait, early):
+def test_stiffnesses_follow_from_where_the_foot_has_landed(supervisor, gait, early):
     angle = gait.controls[Slot.TOUCHDOWN_ANGLE] - 0.01
     height = P.rest_length * np.sin(angle)
     fall = np.sqrt(2.0 * P.gravity * (gait.apex[1] - height))
     # The foot lands where the leg would come to l0, this much sooner.
     x = -P.rest_length * np.cos(angle) - early * 3.0
     y = height + early * fall - 0.5 * P.gravity * early**2
-    sensed = Sensed(state=np.array([x, y, 3.0, -fall + P.gravity * early]))
-    before = planning.reports[-1].decision.controls
-    planning.land(AUTOMATON.node("SS_sc^r"), sensed, 0.05)
-    after = planning.reports[-1].decision.controls
+    sensed = TemplateState(state=np.array([x, y, 3.0, -fall + P.gravity * early]))
+    before = supervisor.reports[-1].decision.controls
+    node = AUTOMATON.node("SS_sc^r")
+    supervisor.replan_after_touchdown(node, sensed, 0.05, 0.0, choose=True)
+    after = supervisor.reports[-1].decision.controls
     assert after[Slot.TOUCHDOWN_ANGLE] == pytest.approx(angle, abs=1e-9)
     # From a flatter leg a stiffer one would throw the CoM over its apex.
     assert after[Slot.K_SC] < 0.97 * before[Slot.K_SC]
-    assert planning.path.outcome is Outcome.SECTION
-    np.testing.assert_allclose(planning.path.section_state, [*gait.apex, 0.0], atol=0.03)
+    assert supervisor.path.outcome is Outcome.SECTION
+    np.testing.assert_allclose(supervisor.path.section_state, [*gait.apex, 0.0], atol=0.03)
 
 
 @pytest.mark.slow(seconds=11)

@@ -54,18 +54,18 @@ def test_what_was_measured_stays_so_where_planning_fails(robot):
     controller = EmbeddingController(robot, RunningPlanner(gait))
     state_in(robot, pose)
     controller.start(pose.rear, pose.swung)
-    measured = controller.sensing.now.state[2:].copy()
-    controller.sensing.unhit[:] = 7.0, -3.0
+    measured = controller.observer.now.state[2:].copy()
+    controller.observer.pre_impact_velocity[:] = 7.0, -3.0
     seen = []
 
-    def fail(node, sensed, now, *height):
+    def fail(node, sensed, now, height, *, choose):
         seen.append(sensed.state[2:].copy())
         raise RuntimeError
 
-    controller.planning.land = controller.planning.land_off = fail
+    controller.supervisor.replan_after_touchdown = fail
     controller._enter("DS_sc^wp")
-    assert controller.station.control.unhit
+    assert controller.mode.control.use_pre_impact_velocity
     with pytest.raises(RuntimeError):
-        controller._land(Leg.FRONT)
+        controller._touch_down(Leg.FRONT)
     np.testing.assert_array_equal(seen, [[7.0, -3.0]])
-    np.testing.assert_array_equal(controller.sensing.now.state[2:], measured)
+    np.testing.assert_array_equal(controller.observer.now.state[2:], measured)

@@ -52,7 +52,16 @@ def parts(options):
 
 @pytest.mark.parametrize("options", TUNINGS, ids=lambda o: type(o).__name__)
 def test_every_tuned_number_has_a_dimension(options):
-    named = {"leg", "map_kind", "swings", "unloads", "momentum_speed", "weighs", "trims", "clock"}
+    named = {
+        "leg",
+        "map_kind",
+        "swings",
+        "unload_legs",
+        "momentum_speed",
+        "estimate_load",
+        "trim_momentum",
+        "clock",
+    }
     for part in parts(options):
         known = dimensions_of(part)
         for f in fields(part):

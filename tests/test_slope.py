@@ -10,7 +10,7 @@ import template_control as tc
 from template_control.embedding.ground import SlopeEstimate, SlopeFrame
 from template_control.embedding.learners.momentum import uncontrolled
 from template_control.embedding.leg_forces import leg_forces
-from template_control.embedding.state import Sensed
+from template_control.embedding.state import TemplateState
 from template_control.errors import GaitError
 from template_control.slip import MapKind, ReturnMap, on_slope, simulate_stride, with_push_off
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
@@ -169,7 +169,7 @@ def test_axes_turn_about_a_place_and_back():
     energy = 0.5 * v @ robot.mass_matrix @ v
     place = robot.foot_position[0].copy()
     frame = SlopeFrame(robot)
-    frame.lean(0.1, place)
+    frame.tilt(0.1, place)
     inside, speed = frame.enter(q, v)
     robot.update(inside, speed)
     np.testing.assert_allclose(frame.world(robot.com.copy()), com, atol=1e-12)
@@ -218,19 +218,19 @@ def standing(level_gait):
 @pytest.mark.parametrize("speed", [1.0, 1.2])
 def test_two_legs_take_a_drift_away(level_gait, standing, speed):
     """From a touchdown that is too slow or fast, without another angle or stiffness."""
-    planning = standing(tc.LqrPlanner(level_gait)).planning
+    supervisor = standing(tc.LqrPlanner(level_gait)).supervisor
     z = level_gait.vlo * [speed / level_gait.vlo[0], 1.0, 1.0]
     p, u = level_gait.parameters, level_gait.controls
     landed = simulate_stride(p, STRIDE_START["w"], VLO.state(z), u).events[0].state
     toe = landed[0] + p.rest_length * np.cos(u[Slot.TOUCHDOWN_ANGLE])
-    sensed = Sensed(state=landed, toes=np.array([0.0, toe]))
-    report = planning.reports[-1]
-    planning.reports[-1] = replace(report, decision=replace(report.decision, controls=u))
-    rest, node = planning._rest, AUTOMATON.node("DS_sc^w")
-    before, _ = rest.ahead(node, sensed)(u)
-    planning.steady(node, sensed)
-    after, _ = rest.ahead(node, sensed)(u)
-    assert np.sign(planning.ground.assist) == np.sign(level_gait.vlo[0] - speed)
+    sensed = TemplateState(state=landed, toes=np.array([0.0, toe]))
+    report = supervisor.reports[-1]
+    supervisor.reports[-1] = replace(report, decision=replace(report.decision, controls=u))
+    rollout, node = supervisor._rollout, AUTOMATON.node("DS_sc^w")
+    before, _ = rollout.ahead(node, sensed)(u)
+    supervisor.choose_assist(node, sensed)
+    after, _ = rollout.ahead(node, sensed)(u)
+    assert np.sign(supervisor.ground.assist) == np.sign(level_gait.vlo[0] - speed)
     drifts = uncontrolled(level_gait) @ np.array([before, after] - level_gait.vlo).T
     assert abs(drifts[1]) < 0.1 * abs(drifts[0])
 
@@ -254,10 +254,10 @@ class Level:
 def test_a_planner_that_knows_no_slope_keeps_the_axes(level_gait, standing):
     planner = tc.LqrPlanner(level_gait)
     assert isinstance(planner, tc.embedding.SlopePlanner)
-    assert standing(planner).planning.on_slope(0.05) == 0.05
+    assert standing(planner).supervisor.on_slope(0.05) == 0.05
     level = Level(planner)
     assert not isinstance(level, tc.embedding.SlopePlanner)
-    assert standing(level).planning.on_slope(0.05) == 0.0
+    assert standing(level).supervisor.on_slope(0.05) == 0.0
 
 
 @pytest.mark.slow(seconds=25)

@@ -8,8 +8,8 @@ import pytest
 import template_control as tc
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.rollout import ReplanOptions
-from template_control.embedding.state import Learnt, Sensed
-from template_control.embedding.supervisor import StridePlanning
+from template_control.embedding.state import EstimatorState, TemplateState
+from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON, BREAKS
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.walking_by_speed import walking_gait
@@ -21,7 +21,7 @@ from template_control.slip.scenario.route import SteadyRoute
 P = SlipParameters()
 WALK = walking_gait(P, 1.1)
 STILL = np.array([0.0, 0.97, 0.0])
-NOTHING = Learnt(load=1.0, trim=0.0, lean=0.0)
+NOTHING = EstimatorState(load=1.0, trim=0.0, lean=0.0)
 CURVED = {"DS_bl^ww", "DS_br^ws", "SS_bt^sb", "DS_br^sb"}
 
 
@@ -85,56 +85,58 @@ def test_the_same_legs_stand_where_a_walk_breaks_into_another_stride(kind):
 def slow(node, place, toes, speed):
     """Plan a step, put the robot into a double or single stance, slow, and plan again."""
     route = catching()
-    planning = StridePlanning(
+    supervisor = StrideSupervisor(
         route, default_planners(route), ReplanOptions(), AUTOMATON, frozenset(CURVED)
     )
-    planning.begin(VLO)
-    planning.decide(VLO, Sensed(VLO.state(WALK.vlo), np.zeros(2)), 0.0, NOTHING)
-    assert planning.surprised(-0.5, 0.3, 0.3)
+    supervisor.begin(VLO)
+    supervisor.decide(VLO, TemplateState(VLO.state(WALK.vlo), np.zeros(2)), 0.0, NOTHING)
+    assert supervisor.deviates(-0.5, 0.3, 0.3)
     sensed = standing(place, toes, speed)
-    return planning, planning.reconsider(AUTOMATON.node(node), sensed, 0.3, 0.3)
+    return supervisor, supervisor.replan(AUTOMATON.node(node), sensed, 0.3, 0.3)
 
 
 def standing(place, toes, speed):
     """The CoM at ``place``, 0.955 m high."""
-    return Sensed(np.array([place, 0.955, speed, 0.0]), np.array(toes), acceleration=np.zeros(2))
+    return TemplateState(
+        np.array([place, 0.955, speed, 0.0]), np.array(toes), acceleration=np.zeros(2)
+    )
 
 
 @pytest.mark.parametrize("node", BREAKS["ww"])
 def test_a_slow_double_stance_is_carried_to_the_next_vlo(node):
-    planning, after = slow(node, 0.3, (0.0, 0.5), 0.6)
+    supervisor, after = slow(node, 0.3, (0.0, 0.5), 0.6)
     assert after.name == "DS_bl^ww"
-    report = planning.reports[-1]
-    assert (len(planning.reports), report.goal.stride) == (1, "ww")
+    report = supervisor.reports[-1]
+    assert (len(supervisor.reports), report.goal.stride) == (1, "ww")
     assert report.decision.feasible
     np.testing.assert_array_equal(report.target, WALK.vlo)
-    assert planning.path.outcome is Outcome.SECTION
+    assert supervisor.path.outcome is Outcome.SECTION
     _, after = slow(node, 0.3, (0.0, 0.5), float(WALK.vlo[0]))
     assert after.name == node, "fast enough, it walks"
 
 
 @pytest.mark.parametrize("node", BREAKS["sb"])
 def test_a_walk_that_falls_back_sets_its_foot_down_behind(node):
-    planning, after = slow(node, -0.29, (0.0, -0.5), 0.7)
+    supervisor, after = slow(node, -0.29, (0.0, -0.5), 0.7)
     assert after.name == "SS_bt^sb"
-    report = planning.reports[-1]
+    report = supervisor.reports[-1]
     assert report.goal.stride == "sb"
     np.testing.assert_array_equal(report.target, report.goal.target)
-    foothold = planning.landing(planning.feet[1]).x
+    foothold = supervisor.landing(supervisor.feet[1]).x
     assert foothold < -0.29, "behind the CoM"
     _, after = slow(node, -0.19, (0.0, -0.5), 0.84)
     assert after.name == node, "it passes over its foot"
 
 
 def test_a_double_stance_that_falls_back_comes_to_a_stand():
-    planning, after = slow("DS_sd^w", 0.1, (0.0, 0.45), -0.2)
+    supervisor, after = slow("DS_sd^w", 0.1, (0.0, 0.45), -0.2)
     assert after.name == "DS_br^ws"
-    assert planning.reports[-1].goal.stride == "ws"
-    assert planning.reports[-1].decision.feasible
+    assert supervisor.reports[-1].goal.stride == "ws"
+    assert supervisor.reports[-1].decision.feasible
     pushed = standing(0.05, (0.0, 0.45), -0.5)
-    after = planning.reconsider(after, pushed, 0.1, 0.4)
+    after = supervisor.replan(after, pushed, 0.1, 0.4)
     assert after.name == "DS_al^sb", "pushed on, it steps"
-    assert planning.reports[-1].goal.stride == "sb"
+    assert supervisor.reports[-1].goal.stride == "sb"
 
 
 def strides(record):

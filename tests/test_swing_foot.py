@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from template_control.embedding.controller import FeetInAir
+from template_control.embedding.controller import SwingController
 from template_control.embedding.swing import (
     HIGH_SWING,
     Feet,
@@ -149,16 +149,16 @@ def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(reaching):
     swing = feet.swing[1]
     swing.start(np.array([0.57, -0.004]), np.array([0.0, -0.2]))
     landing = SimpleNamespace(x=0.7, time=0.13)
-    in_air = FeetInAir(
+    in_air = SwingController(
         SimpleNamespace(foot_position=np.array([[0.0, 0.0], [0.57, -0.006]]), leg_length=1.0),
         feet,
         SimpleNamespace(blocked=lambda foot: True),
         SimpleNamespace(furthest=np.zeros(2)),
     )
-    planning = SimpleNamespace(reaching=reaching, landing=lambda foot: landing)
+    supervisor = SimpleNamespace(reaching=reaching, landing=lambda foot: landing)
     station = SimpleNamespace(swings=(Leg.FRONT,), awaited=Leg.FRONT)
     for _ in range(10):
-        in_air.advance(station, planning, None, 0.0, np.array([0.25, 0.9]), 1e-3)
+        in_air.advance(station, supervisor, None, 0.0, np.array([0.25, 0.9]), 1e-3)
     assert swing.x[0] == 0.57
     assert (swing.y[0] < -0.006) if reaching else (swing.y[0] > 0.0)
 

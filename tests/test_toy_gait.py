@@ -98,10 +98,10 @@ PHASES = {
         swings=(Leg.REAR,),
         clock=Clock.TIME,
         momentum_speed=False,
-        weighs=False,
+        estimate_load=False,
     ),
     Phase.SS: PhaseControl(
-        tasks=(ComTask((0.01, 10.0)), MomentumTask(), TUCKED), clock=Clock.TIME, weighs=False
+        tasks=(ComTask((0.01, 10.0)), MomentumTask(), TUCKED), clock=Clock.TIME, estimate_load=False
     ),
 }
 

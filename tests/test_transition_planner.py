@@ -18,8 +18,8 @@ from template_control.embedding.planners.transition import (
 )
 from template_control.embedding.replanning import free_controls
 from template_control.embedding.rollout import ReplanOptions
-from template_control.embedding.state import Learnt, Sensed
-from template_control.embedding.supervisor import StridePlanning
+from template_control.embedding.state import EstimatorState, TemplateState
+from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator, simulate_stride
@@ -218,18 +218,18 @@ class IntoARun:
 
 
 def test_a_push_within_a_transition_gets_other_stiffnesses():
-    planning = StridePlanning(IntoARun(), {"wr": walk_to_run(), "r": RUNNING}, ReplanOptions())
-    planning.begin(VLO)
+    supervisor = StrideSupervisor(IntoARun(), {"wr": walk_to_run(), "r": RUNNING}, ReplanOptions())
+    supervisor.begin(VLO)
     speed, height, vertical = WALK.vlo
-    start = Sensed(np.array([0.0, height, speed, vertical]), np.zeros(2))
-    planning.decide(VLO, start, 0.0, Learnt(load=1.0, trim=0.0, lean=0.0))
-    before = planning.reports[-1].decision.controls.copy()
+    start = TemplateState(np.array([0.0, height, speed, vertical]), np.zeros(2))
+    supervisor.decide(VLO, start, 0.0, EstimatorState(load=1.0, trim=0.0, lean=0.0))
+    before = supervisor.reports[-1].decision.controls.copy()
     node, state, toes = middle("wr", WALK.vlo, VLO, before, Event.REAR_LIFTOFF)
-    pushed = Sensed(state - [0.0, 0.0, 0.2, 0.0], np.array(toes))
+    pushed = TemplateState(state - [0.0, 0.0, 0.2, 0.0], np.array(toes))
     as_before = StrideSimulator(P).run(node, pushed.state, before, tuple(toes))
     assert as_before.outcome is not Outcome.SECTION, "it does not leave the ground"
-    planning.reconsider(AUTOMATON.node(node), pushed, 0.1, 0.5)
-    after = planning.reports[-1].decision.controls
+    supervisor.replan(AUTOMATON.node(node), pushed, 0.1, 0.5)
+    after = supervisor.reports[-1].decision.controls
     # The energy that the push took comes back from a leg that becomes stiffer at its bottom.
     assert (
         after[Slot.K_SD_WR] / after[Slot.K_SC_WR]
@@ -237,7 +237,7 @@ def test_a_push_within_a_transition_gets_other_stiffnesses():
     )
     kept = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
     np.testing.assert_array_equal(after[kept], before[kept])
-    assert planning.path.outcome is Outcome.SECTION
+    assert supervisor.path.outcome is Outcome.SECTION
 
 
 def test_where_the_rest_cannot_be_done_the_controls_stay():

@@ -13,7 +13,7 @@ from template_control.embedding.replanning import (
     END_TOLERANCE,
     choose_legs,
 )
-from template_control.embedding.state import Sensed
+from template_control.embedding.state import TemplateState
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import StrideSimulator
@@ -31,7 +31,7 @@ SCALE = Scale.of(tc.SlipParameters())
 def test_an_early_contact_counts_in_front_of_the_com(place, due, expected):
     guards = RobotGuards(tc.SlipParameters(), GuardOptions())
     edge = AUTOMATON.start("w").edge(Event.TOUCHDOWN)
-    sensed = Sensed(contact=np.array([False, True]), toes=np.array([-0.3, place]))
+    sensed = TemplateState(contact=np.array([False, True]), toes=np.array([-0.3, place]))
     assert guards.fired(edge, sensed, due) is expected
 
 

@@ -91,7 +91,7 @@ def test_the_file_holds_what_the_run_used_and_repeats_it(line, held, tmp_path):
         kinds = type(written.planner)
         used = [
             planner.options
-            for planner in controller.planning.planners.values()
+            for planner in controller.supervisor.planners.values()
             if type(getattr(planner, "options", None)) is kinds
         ]
         assert scaled(written.planner, scale) in used

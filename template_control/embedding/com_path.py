@@ -92,7 +92,7 @@ class TemplatePath:
     outcome: Outcome
     duration: float
 
-    def due(self, event: Event, passed: int = 0) -> float:
+    def time_of(self, event: Event, passed: int = 0) -> float:
         """Time of the next ``event`` [s], inf if there is none.
 
         Args:
@@ -101,8 +101,8 @@ class TemplatePath:
         """
         return next((time for time, found in self.events[passed:] if found is event), np.inf)
 
-    def dues(self, passed: int) -> list[float]:
-        """As :meth:`due`, of every :class:`Event` by its number."""
+    def event_times(self, passed: int) -> list[float]:
+        """As :meth:`time_of`, of every :class:`Event` by its number."""
         found = [np.inf] * NUM_EVENTS
         for time, event in reversed(self.events[passed:]):
             found[event] = time

@@ -19,12 +19,12 @@ from template_control.embedding.contacts import EARLY, SINKING, ContactMonitor
 from template_control.embedding.ground import SlopingGround
 from template_control.embedding.learners.learners import Learners
 from template_control.embedding.leg_forces import unload_cap
-from template_control.embedding.modes import PLACED, Place, RobotGuards, Station, stations
+from template_control.embedding.modes import PLACED, Mode, PathClock, RobotGuards, modes
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
-from template_control.embedding.state import SectionReport, Sensing, rolled
-from template_control.embedding.supervisor import StridePlanning
+from template_control.embedding.state import SectionReport, StateObserver, rolled
+from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
@@ -56,8 +56,8 @@ class EmbeddingController:
         ParameterError: if there are several planners and no route.
 
     Attributes:
-        station: where on the automaton the robot is, and what that asks for.
-        planning: the stride's decision and the path that follows it.
+        mode: where on the automaton the robot is, and what that asks for.
+        supervisor: the stride's decision and the path that follows it.
         swings: shapes of the swings in phases that have none of their own.
         feet: roles and swings of the feet.
         place: the robot's place on that path, and the template there.
@@ -65,7 +65,7 @@ class EmbeddingController:
         contacts: which feet stand.
         ground: its slope, as the feet tell it.
         frame: axes that lean with the ground.
-        sensing: the robot's state in the template's terms.
+        observer: the robot's state in the template's terms.
         references: what the tasks read.
         time: since the start [s].
         qp: the whole-body problem.
@@ -96,49 +96,49 @@ class EmbeddingController:
         self.references = References(pitch=o.trunk_pitch)
         self.swings = o.swings(robot, scale)
         self.feet = Feet(self.swings.other, self.references.foot)
-        self.place = Place(self.parameters, self.references.com)
+        self.path_clock = PathClock(self.parameters, self.references.com)
         self.time = 0.0
-        self.sensing = Sensing(robot, self.feet, self.references.com[4:])
+        self.observer = StateObserver(robot, self.feet, self.references.com[4:])
         self._early, self._sinking = EARLY * scale.time, SINKING * scale.speed
         self.contacts = ContactMonitor(o.contacts, robot.mass * robot.gravity)
         self._guards = RobotGuards(self.parameters, o.guards)
-        self._stations = stations(automaton, robot.nv, o.phases)
-        curved = {name for name, station in self._stations.items() if station.control.curved}
-        self.planning = StridePlanning(route, planners, o.replan, automaton, curved)
-        self.station = next(iter(self._stations.values()))
-        self._unfelt = False  # the ground under feet that both stand where a run begins
+        self._modes = modes(automaton, robot.nv, o.phases)
+        curved = {name for name, mode in self._modes.items() if mode.control.follow_curve}
+        self.supervisor = StrideSupervisor(route, planners, o.replan, automaton, curved)
+        self.mode = next(iter(self._modes.values()))
+        self._slope_unknown = False  # the ground under feet that both stand where a run begins
         self.qp = WholeBodyQp(robot, o)
-        self._in_air = FeetInAir(robot, self.feet, self.contacts, self.references)
+        self._swing_controller = SwingController(robot, self.feet, self.contacts, self.references)
 
     @property
     def node(self) -> Node:
         """The automaton's node the robot is in."""
-        return self.station.node
+        return self.mode.node
 
     @property
     def planner(self) -> Planner:
         """Chooses the present stride's controls."""
-        return self.planning.planner
+        return self.supervisor.planner
 
     @property
     def reports(self) -> list[SectionReport]:
         """One report a section, the start's included."""
-        return self.planning.reports
+        return self.supervisor.reports
 
     @property
     def template_com(self) -> tuple[float, float]:
         """The template's CoM at the robot's phase, in the world [m]."""
-        x, y = self.place.reference.tolist()[:2]
-        return self.frame.point(self._origin + x, self.sensing.ground + y)
+        x, y = self.path_clock.reference.tolist()[:2]
+        return self.frame.point(self._origin + x, self.observer.ground + y)
 
     @property
     def _origin(self) -> float:
         """Where the template's rear toe is in the world: at the foot, if that stands [m]."""
-        return float(self.sensing.now.toes[0]) if self.station.stance else self.planning.toe
+        return float(self.observer.now.toes[0]) if self.mode.stance else self.supervisor.toe
 
     def first_pitch(self) -> float:
         """Of the trunk where the route begins [rad]."""
-        goal = self.planning.first_goal()
+        goal = self.supervisor.first_goal()
         return self.options.lean.pitch(goal, self.options.trunk_pitch)
 
     def start(
@@ -154,30 +154,30 @@ class EmbeddingController:
             rear: the foot that is the rear leg's.
             swung: time since rear and front foot left the ground [s], for those in the air; None:
                 they are in the middle of their swings.
-            first: planner and node that ``planning.begin`` has returned for this run; None: it is
+            first: planner and node that ``supervisor.begin`` has returned for this run; None: it is
                 called here.
 
         Raises:
             ParameterError: if the route begins with a stride for which there is no planner.
         """
-        section = self.planning.route.section
-        planner, node = first or self.planning.begin(section)
+        section = self.supervisor.route.section
+        planner, node = first or self.supervisor.begin(section)
         self.learners.lean.reset()
         self.frame.reset()
         self._enter(node.name)
         self.feet.begin(rear)
         half = 0.5 * planner.gait.step_duration
-        for leg in self.station.swings:
-            self._lift(self.feet.of[leg], (swung or (half, half))[leg])
+        for leg in self.mode.swings:
+            self._lift(self.feet.foot_of_leg[leg], (swung or (half, half))[leg])
         if node.stance:
             # Of two feet on the ground the front one landed last.
-            self.feet.landed = self.feet.of[self.station.stance[-1]]
-        self.sensing.begin(bool(node.stance))
+            self.feet.landed = self.feet.foot_of_leg[self.mode.stance[-1]]
+        self.observer.begin(bool(node.stance))
         self.ground.begin(self.feet.landed)
         self.contacts.begin()
         self._sense()
         self._decide(section)
-        self._unfelt = len(self.station.stance) > 1
+        self._slope_unknown = len(self.mode.stance) > 1
 
     def tick(
         self,
@@ -207,21 +207,21 @@ class EmbeddingController:
             force = self.frame.inward(force)
         self.contacts.update(contact, force, self._expected(), dt)
         if force is not None:
-            self._feel_friction(force, dt)
+            self._update_friction(force, dt)
         self.feet.swing_time += dt
         self._sense()
-        if self._unfelt:
-            self._feel_ground()
+        if self._slope_unknown:
+            self._find_first_slope()
         self._advance()
         q, v = self.frame.enter(q, v)
-        self._plan_again()
+        self._replan()
         speed = self.robot.com_velocity[0]
-        self.place.move(self.station, self.planning, self.sensing.now, speed, dt)
+        self.path_clock.move(self.mode, self.supervisor, self.observer.now, speed, dt)
         self._swing(q, v, dt)
         self._track(q, v, dt)
-        self.sensing.foresee(dt)
+        self.observer.predict_velocity(dt)
         self.time += dt
-        solution = self.qp.solve(self.station.tasks, self._stance(), self.learners.load.factor)
+        solution = self.qp.solve(self.mode.tasks, self._stance(), self.learners.load.factor)
         if self.frame.angle != 0.0:
             outward = self.frame.outward(solution.acceleration)
             solution = solution._replace(acceleration=outward)
@@ -229,14 +229,14 @@ class EmbeddingController:
 
     # -- modes and plans ----
 
-    def _feel_ground(self) -> None:
+    def _find_first_slope(self) -> None:
         """Both feet stand where a run begins: the line through them is the ground."""
-        self._unfelt = False
-        other, landed = (self.feet.of[leg] for leg in self.station.stance)
+        self._slope_unknown = False
+        other, landed = (self.feet.foot_of_leg[leg] for leg in self.mode.stance)
         self.ground.stand(other, landed)
-        if self._lean(self.ground.slope.slope, landed):
-            self.planning.follow(self.node, self.sensing.now, self.time)
-            self.place.restart()
+        if self._tilt_axes(self.ground.slope.slope, landed):
+            self.supervisor.follow(self.node, self.observer.now, self.time)
+            self.path_clock.restart()
 
     def _expected(self) -> list[bool | None]:
         """Whether each foot is to touch the ground now; None: it is due to land.
@@ -244,163 +244,164 @@ class EmbeddingController:
         An overdue foot is no longer due: where it meets the ground then, nothing has foretold.
         """
         expected: list[bool | None] = [False, False]
-        for leg in self.station.stance:
-            expected[self.feet.of[leg]] = True
-        planning, awaited = self.planning, self.station.awaited
-        if awaited is not None and not planning.reaching:
-            foot, due = self.feet.of[awaited], planning.due(Event.TOUCHDOWN) - self.place.time
+        for stance in self.mode.stance:
+            expected[self.feet.foot_of_leg[stance]] = True
+        supervisor, leg = self.supervisor, self.mode.next_touchdown_leg
+        if leg is not None and not supervisor.without_touchdown:
+            foot = self.feet.foot_of_leg[leg]
+            due = supervisor.time_of(Event.TOUCHDOWN) - self.path_clock.time
             if due <= self._early and self.robot.foot_velocity[foot, 1] >= -self._sinking:
                 expected[foot] = None
         return expected
 
     def _sense(self) -> None:
-        control, standing = self.station.control, self.contacts.standing
-        stands = bool(self.station.stance)
-        self.sensing.read(standing, stands, control.momentum_speed, control.rolls)
+        control, standing = self.mode.control, self.contacts.standing
+        stands = bool(self.mode.stance)
+        self.observer.read(standing, stands, control.momentum_speed, control.rolling_contact)
 
     def _advance(self) -> None:
         """Take the first edge of the present node that the robot fires."""
-        for edge in self.station.ways:
-            due = self.planning.dues[edge.event] - self.place.time
-            if self._guards.fired(edge, self.sensing.now, due):
-                self._take(edge)
+        for edge in self.mode.outgoing_edges:
+            due = self.supervisor.event_times[edge.event] - self.path_clock.time
+            if self._guards.fired(edge, self.observer.now, due):
+                self._traverse(edge)
                 return
 
-    def _take(self, edge: Edge) -> None:
+    def _traverse(self, edge: Edge) -> None:
         """Go along an edge: roles and swings of the feet, plan, node."""
-        before, stood, roles = self.station, self._standing(), self.feet.of
-        self.planning.pass_event(edge.event)
+        before, stood, roles = self.mode, self._standing(), self.feet.foot_of_leg
+        self.supervisor.pass_event(edge.event)
         self._enter(str(edge.target))
         self.feet.apply(edge.reset)
         lifted = stood - self._standing()
         # What the ground does next is not known; the best guess is its slope so far.
-        leans = bool(lifted and self.station.stance) and self._lean(
-            self.ground.slope.slope, self.feet.of[self.station.stance[0]]
+        leans = bool(lifted and self.mode.stance) and self._tilt_axes(
+            self.ground.slope.slope, self.feet.foot_of_leg[self.mode.stance[0]]
         )
         for foot in lifted:
             self._lift(foot)
-        sensing, stance = self.sensing, self.station.stance
+        observer, stance = self.observer, self.mode.stance
         if self.feet.landed in lifted and stance:
             # A step back: the other foot is the one on the ground.
-            sensing.stand_on(self.feet.of[stance[0]])
-        if lifted or self.feet.of != roles:
-            sensing.take_roles(self.station.control.rolls)
-            self.planning.stand_on(self.feet.of[Leg.REAR])
-        momentum = self.station.control.momentum_speed
+            observer.stand_on(self.feet.foot_of_leg[stance[0]])
+        if lifted or self.feet.foot_of_leg != roles:
+            observer.take_roles(self.mode.control.rolling_contact)
+            self.supervisor.set_rear_toe(self.feet.foot_of_leg[Leg.REAR])
+        momentum = self.mode.control.momentum_speed
         if momentum is not before.control.momentum_speed:
-            sensing.read_speed(momentum)
+            observer.read_speed(momentum)
         if leans or (lifted and not stance):
             # In flight no force moves the CoM: its path, and all footholds on it, are certain.
-            self.planning.follow(self.node, sensing.now, self.time)
-            self.place.restart()
+            self.supervisor.follow(self.node, observer.now, self.time)
+            self.path_clock.restart()
         placed = PLACED.get(edge.reset)
         if placed is not None:
-            self._land(placed)
+            self._touch_down(placed)
         if edge.section:
             self._decide(section_of(edge.event))
 
     def _enter(self, node: str) -> None:
-        self.station = self._stations[node]
+        self.mode = self._modes[node]
 
     def _lift(self, foot: int, swung: float = 0.0) -> None:
         """A swing keeps the shape with which it began, whatever the next stride's is."""
-        goal = self.reports[-1].goal if self.reports else self.planning.first_goal()
-        self.feet.swing[foot].options = self.station.swing or self.swings.towards(goal)
+        goal = self.reports[-1].goal if self.reports else self.supervisor.first_goal()
+        self.feet.swing[foot].options = self.mode.swing or self.swings.towards(goal)
         self.feet.lift(foot, self.robot, swung)
 
     def _standing(self) -> set[int]:
-        return {self.feet.of[leg] for leg in self.station.stance}
+        return {self.feet.foot_of_leg[leg] for leg in self.mode.stance}
 
-    def _land(self, leg: Leg) -> None:
+    def _touch_down(self, leg: Leg) -> None:
         """The template's ground is now that of the foot which has landed.
 
-        Where the table says ``unhit``, the path goes on with the speed before it hit the ground.
+        Where the table says ``use_pre_impact_velocity``, the path goes on with the speed before it.
         """
-        leans = self._feel_slope(self.feet.of[leg])
-        higher, s = self.sensing.land(leg), self.sensing.now
+        leans = self._update_slope(self.feet.foot_of_leg[leg])
+        higher, s = self.observer.land(leg), self.observer.now
         if leans:
-            self.planning.steady(self.node, s)
-        if self.station.control.unhit:
-            s = replace(s, state=np.concatenate((s.state[:2], self.sensing.unhit)))
-        choose = self.station.control.lands
-        replan = self.planning.replan_after_touchdown
+            self.supervisor.choose_assist(self.node, s)
+        if self.mode.control.use_pre_impact_velocity:
+            s = replace(s, state=np.concatenate((s.state[:2], self.observer.pre_impact_velocity)))
+        choose = self.mode.control.replan_at_touchdown
+        replan = self.supervisor.replan_after_touchdown
         self._enter(replan(self.node, s, self.time, higher, choose=choose).name)
-        self.place.restart()
+        self.path_clock.restart()
 
-    def _feel_slope(self, foot: int) -> bool:
+    def _update_slope(self, foot: int) -> bool:
         """A foot has landed: learn the slope; if it is off, take the line through both feet."""
-        off = self.robot.foot_position[foot, 1] - self.sensing.ground
+        off = self.robot.foot_position[foot, 1] - self.observer.ground
         self.ground.land(foot)
-        leans = abs(off) > self.planning.height_error
-        return leans and self._lean(self.ground.slope.last, foot)
+        leans = abs(off) > self.supervisor.height_error
+        return leans and self._tilt_axes(self.ground.slope.last, foot)
 
-    def _lean(self, slope: float, foot: int) -> bool:
+    def _tilt_axes(self, slope: float, foot: int) -> bool:
         """Turn the axes about a foot, as far as the planner knows slopes; whether they turned."""
-        leans = self.ground.lean(slope, foot, self.planning, self.sensing)
+        leans = self.ground.tilt(slope, foot, self.supervisor, self.observer)
         if leans:
             self._sense()
         return leans
 
     def _decide(self, section: Section) -> None:
-        s, learners = self.sensing.now, self.learners
+        s, learners = self.observer.now, self.learners
         if self.reports:
             learners.end_stride(section, s.state, self.reports[-1].decision.nominal)
-        self._enter(self.planning.decide(section, s, self.time, learners.learnt).name)
-        learners.begin_stride(self.planning, self.station.trimmed)
-        self.place.restart()
+        self._enter(self.supervisor.decide(section, s, self.time, learners.state).name)
+        learners.begin_stride(self.supervisor, self.mode.trimmed)
+        self.path_clock.restart()
 
-    def _plan_again(self) -> None:
+    def _replan(self) -> None:
         """Plan from here where a touchdown is overdue or the robot has left its path."""
-        s, planning, place = self.sensing.now, self.planning, self.place
-        if planning.overdue(self.node, place.time):
-            planning.reach_on(self.node, s, self.time)
-        elif planning.surprised(s.state[2] - place.reference[2], place.time, self.time):
-            self._enter(planning.reconsider(self.node, s, place.time, self.time).name)
+        s, supervisor, clock = self.observer.now, self.supervisor, self.path_clock
+        if supervisor.touchdown_overdue(self.node, clock.time):
+            supervisor.continue_without_touchdown(self.node, s, self.time)
+        elif supervisor.deviates(s.state[2] - clock.reference[2], clock.time, self.time):
+            self._enter(supervisor.replan(self.node, s, clock.time, self.time).name)
             self.learners.lean.aim(self.reports[-1].goal)
         else:
             return
-        self.place.restart()
+        self.path_clock.restart()
 
     # -- references and forces ----
 
-    def _feel_friction(self, force: Array, dt: float) -> None:
+    def _update_friction(self, force: Array, dt: float) -> None:
         """Let the cones be as narrow as the friction that sliding feet have felt."""
         friction = self.learners.friction
-        if friction.feel(self.contacts.standing, force, self.robot.contact_velocity, dt):
+        if friction.update(self.contacts.standing, force, self.robot.contact_velocity, dt):
             self.qp.friction = replace(self.options, friction=friction.coefficient).cone
 
     def _swing(self, q: Array, v: Array, dt: float) -> None:
         """Move the references of the feet in the air towards their footholds."""
         hips, self.references.hip_speed = self.robot.hips(q, v)
-        station, time = self.station, self.place.time
-        self._in_air.advance(station, self.planning, self.sensing, time, hips, dt)
+        mode, time = self.mode, self.path_clock.time
+        self._swing_controller.advance(mode, self.supervisor, self.observer, time, hips, dt)
 
     def _track(self, q: Array, v: Array, dt: float) -> None:
         """Let the phase's tasks write what they ask for."""
-        s, references, station = self.sensing.now, self.references, self.station
+        s, references, mode = self.observer.now, self.references, self.mode
         references.com_now[:] = s.state
         references.com_now[0] -= s.toes[0]
-        references.com_push = self.learners.trim.acceleration if station.control.trims else 0.0
+        references.com_push = self.learners.trim.acceleration if mode.control.trim_momentum else 0.0
         pitch, turning = self.robot.trunk(q, v)
         references.pitch_now[0], references.pitch_now[1] = pitch, turning
         tilt = self.frame.angle  # the trunk is held by the vertical
         references.pitch = self.learners.lean.advance(pitch - tilt, dt) + tilt
-        references.feet = self.feet.of
-        station.tasks.write(self.robot, references)
-        if station.control.weighs and station.com is not None:
-            self.learners.load.observe(station.com.lift(references), dt)
+        references.feet = self.feet.foot_of_leg
+        mode.tasks.write(self.robot, references)
+        if mode.control.estimate_load and mode.com is not None:
+            self.learners.load.observe(mode.com.lift(references), dt)
 
     def _stance(self) -> Stance:
         """The feet on the ground, the template's forces on them, and how far they unload."""
-        station, forces, feet = self.station, self.place.forces, self.feet.of
-        for leg in station.control.unloads:
+        mode, forces, feet = self.mode, self.path_clock.forces, self.feet.foot_of_leg
+        for leg in mode.control.unload_legs:
             weight = self.robot.mass * self.robot.gravity
-            station.cap[leg] = unload_cap(forces[leg, 1], weight)
-        legs = station.stance
-        return Stance(tuple([feet[leg] for leg in legs]), forces[: len(legs)].ravel(), station.cap)
+            mode.cap[leg] = unload_cap(forces[leg, 1], weight)
+        legs = mode.stance
+        return Stance(tuple([feet[leg] for leg in legs]), forces[: len(legs)].ravel(), mode.cap)
 
 
-class FeetInAir:
+class SwingController:
     """Moves the swings' references from tick to tick.
 
     Args:
@@ -418,9 +419,9 @@ class FeetInAir:
 
     def advance(
         self,
-        station: Station,
-        planning: StridePlanning,
-        sensing: Sensing,
+        mode: Mode,
+        supervisor: StrideSupervisor,
+        observer: StateObserver,
         time: float,
         hips: Array,
         dt: float,
@@ -428,19 +429,19 @@ class FeetInAir:
         """Move the references of the feet that swing.
 
         Args:
-            station: of the robot.
-            planning: which knows where the feet land.
-            sensing: the robot's state, and the ground's height.
+            mode: of the robot.
+            supervisor: which knows where the feet land.
+            observer: the robot's state, and the ground's height.
             time: along the path [s].
             hips: (2,) x and y [m].
             dt: duration of the tick [s].
         """
         robot, feet = self._robot, self._feet
-        late, hip = self._overdue(station, planning), hips.tolist()
-        for leg in station.swings:
-            foot = feet.of[leg]
+        late, hip = self._late_foot(mode, supervisor), hips.tolist()
+        for leg in mode.swings:
+            foot = feet.foot_of_leg[leg]
             swing = feet.swing[foot]
-            landing = planning.landing(foot)
+            landing = supervisor.landing(foot)
             foothold, due = landing.x, landing.time - time
             overdue = foot == late
             if self._contacts.blocked(foot):
@@ -452,16 +453,18 @@ class FeetInAir:
                 if not isfinite(foothold):
                     # The template cannot complete the stride; the gait's own foothold is the
                     # best guess.
-                    gait = planning.planner.gait
-                    foothold = sensing.now.toes[Leg.REAR] + gait.step_length
+                    gait = supervisor.planner.gait
+                    foothold = observer.now.toes[Leg.REAR] + gait.step_length
                     due = gait.step_duration - feet.swing_time[foot]
-                if station.control.rolls:
-                    angle = float(planning.reports[-1].decision.controls[Slot.TOUCHDOWN_ANGLE])
+                if mode.control.rolling_contact:
+                    angle = float(supervisor.reports[-1].decision.controls[Slot.TOUCHDOWN_ANGLE])
                     foothold = rolled(foothold, angle, robot.foot_radius)
-                swing.advance(foothold, due, dt, sensing.ground)
+                swing.advance(foothold, due, dt, observer.ground)
             self._references.furthest[foot] = swing.furthest(hip, robot.leg_length)
 
-    def _overdue(self, station: Station, planning: StridePlanning) -> int | None:
+    def _late_foot(self, mode: Mode, supervisor: StrideSupervisor) -> int | None:
         """The foot that should have found the ground by now."""
-        leg = station.awaited
-        return None if leg is None or not planning.reaching else self._feet.of[leg]
+        leg = mode.next_touchdown_leg
+        return (
+            None if leg is None or not supervisor.without_touchdown else self._feet.foot_of_leg[leg]
+        )

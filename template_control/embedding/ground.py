@@ -14,8 +14,8 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.state import Sensing
-from template_control.embedding.supervisor import StridePlanning
+from template_control.embedding.state import StateObserver
+from template_control.embedding.supervisor import StrideSupervisor
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
 
@@ -134,7 +134,7 @@ class SlopeFrame:
         """Whether the robot's kind can be looked at in other axes."""
         return self._planar is not None
 
-    def lean(self, angle: float, place: Array) -> None:
+    def tilt(self, angle: float, place: Array) -> None:
         """Take other axes.
 
         Args:
@@ -199,10 +199,10 @@ class SlopingGround:
     Attributes:
         frame: the axes.
         slope: the estimate.
-        told: the robot's configuration and velocity in the world, as they were measured last.
+        raw_state: the robot's configuration and velocity in the world, as they were measured last.
     """
 
-    told: tuple[Array, Array]
+    raw_state: tuple[Array, Array]
 
     def __init__(self, robot: Biped, length: float) -> None:
         self._robot = robot
@@ -222,34 +222,36 @@ class SlopingGround:
         self.slope.stand(self._foothold(foot), self._foothold(other))
 
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """As :meth:`.SlopeFrame.enter`; what is told is kept."""
-        self.told = q, v
+        """As :meth:`.SlopeFrame.enter`; what was measured is kept."""
+        self.raw_state = q, v
         return self.frame.enter(q, v)
 
     def land(self, foot: int) -> None:
         """A foot has landed: learn the slope."""
         self.slope.land(self._foothold(foot), self._foothold(1 - foot))
 
-    def lean(self, slope: float, foot: int, planning: StridePlanning, sensing: Sensing) -> bool:
+    def tilt(
+        self, slope: float, foot: int, supervisor: StrideSupervisor, observer: StateObserver
+    ) -> bool:
         """Turn the axes about a foot, and read the robot's model in them.
 
         Args:
             slope: of the ground [rad].
             foot: that keeps its coordinates.
-            planning: which is asked what slope it plans for.
-            sensing: whose state has to be read again if the axes have turned.
+            supervisor: which is asked what slope it plans for.
+            observer: whose state has to be read again if the axes have turned.
 
         Returns:
             Whether they turned.
         """
         robot, frame = self._robot, self.frame
-        slope = planning.on_slope(slope) if frame.turns else 0.0
+        slope = supervisor.on_slope(slope) if frame.turns else 0.0
         if slope == frame.angle:
             return False
-        unhit = frame.outward(sensing.unhit)
-        frame.lean(slope, robot.foot_position[foot].copy())
-        sensing.unhit[:] = frame.inward(unhit)
-        robot.update(*frame.enter(*self.told))
+        pre_impact_velocity = frame.outward(observer.pre_impact_velocity)
+        frame.tilt(slope, robot.foot_position[foot].copy())
+        observer.pre_impact_velocity[:] = frame.inward(pre_impact_velocity)
+        robot.update(*frame.enter(*self.raw_state))
         return True
 
     def _foothold(self, foot: int) -> tuple[float, float]:

@@ -26,8 +26,8 @@ from template_control.checks.ranges import Range
 from template_control.embedding.com_path import LOCATE, Locate
 from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.phases import Clock, PhaseControl, Phases, phase_control
-from template_control.embedding.state import Sensed
-from template_control.embedding.supervisor import StridePlanning
+from template_control.embedding.state import TemplateState
+from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import SwingOptions
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -94,48 +94,48 @@ class RobotGuards:
         """Of a touchdown, before it is due [s]."""
         return _EARLIEST * Scale.of(self.parameters).time
 
-    def fired(self, edge: Edge, sensed: Sensed, due: float) -> bool:
+    def fired(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
         """Whether the edge's event has happened.
 
         Args:
             edge: a way out of the present node.
             sensed: the robot now.
-            due: time until the template's path comes to that event [s].
+            time_to_go: time until the template's path comes to that event [s].
         """
         felt = _FELT[edge.event]
         if felt is not None:
-            return felt(self, edge, sensed, due)
+            return felt(self, edge, sensed, time_to_go)
         return self._value(edge.event, sensed) >= 0.0
 
-    def _value(self, event: Event, sensed: Sensed) -> float:
+    def _value(self, event: Event, sensed: TemplateState) -> float:
         # In Python, on its own numbers: quicker than passing arrays to compiled code.
         state, toes = sensed.state.tolist(), sensed.toes.tolist()
         return float(guard.py_func(int(event), state, toes, self.parameters.rest_length, 0.0))
 
-    def _touchdown(self, edge: Edge, sensed: Sensed, due: float) -> bool:
+    def _touchdown(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
         leg = PLACED[edge.reset]
         foot = sensed.feet[leg]
         if not sensed.contact[foot] or sensed.swing_time[foot] <= self._shortest_time:
             return False
-        return bool(sensed.toes[leg] > sensed.state[0]) or due <= self._earliest
+        return bool(sensed.toes[leg] > sensed.state[0]) or time_to_go <= self._earliest
 
-    def _rear_liftoff(self, edge: Edge, sensed: Sensed, due: float) -> bool:
+    def _rear_liftoff(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
         stretch = self._value(edge.event, sensed)
         if stretch > _OVERSTRETCH * self.parameters.rest_length:
             return True
-        if stretch > 0.0 and due == np.inf:
+        if stretch > 0.0 and time_to_go == np.inf:
             return True  # the template's leg would not push any more
         angle = self.options.liftoff_angle
         if angle is None:
-            return due <= 0.0
+            return time_to_go <= 0.0
         beta = np.arctan2(sensed.state[1], sensed.state[0] - sensed.toes[0])
         return bool(beta <= angle)
 
-    def _due(self, edge: Edge, sensed: Sensed, due: float) -> bool:
-        return due <= 0.0
+    def _due(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
+        return time_to_go <= 0.0
 
 
-_NOT_GEOMETRIC: dict[Event, Callable[[RobotGuards, Edge, Sensed, float], bool]] = {
+_NOT_GEOMETRIC: dict[Event, Callable[[RobotGuards, Edge, TemplateState, float], bool]] = {
     Event.TOUCHDOWN: RobotGuards._touchdown,
     Event.REAR_LIFTOFF: RobotGuards._rear_liftoff,
     Event.FRONT_LIFTOFF: RobotGuards._due,
@@ -146,7 +146,7 @@ _FELT = [_NOT_GEOMETRIC.get(event) for event in Event]
 
 
 @dataclass(frozen=True)
-class Station:
+class Mode:
     """Where the robot is on the automaton, and what that asks for.
 
     Attributes:
@@ -154,14 +154,14 @@ class Station:
         control: the phase's entry in the table.
         tasks: the rows of the phase's tasks.
         com: the task that follows the template's CoM; None where there is none.
-        ways: edges to other nodes, in order.
+        outgoing_edges: edges to other nodes, in order.
         stance: legs that carry.
         swings: legs in the air that have a foothold to go to.
         swing: shape of their swings; None: the robot's.
         locate: finds the robot's place on the path.
         cap: (len(stance),) largest normal force of each stance foot, inf without [N]; the
             controller overwrites those of the legs that unload.
-        awaited: the leg that is to touch down; None where none is.
+        next_touchdown_leg: the leg that is to touch down; None where none is.
         trimmed: whether the momentum trim acts somewhere in the stride.
     """
 
@@ -169,18 +169,18 @@ class Station:
     control: PhaseControl
     tasks: TaskStack
     com: ComTask | None
-    ways: tuple[Edge, ...]
+    outgoing_edges: tuple[Edge, ...]
     stance: tuple[int, ...]
     swings: tuple[int, ...]
     swing: SwingOptions | None
     locate: Locate
     cap: Array
-    awaited: Leg | None
+    next_touchdown_leg: Leg | None
     trimmed: bool
 
 
-def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station]:
-    """Make a station for each node, by its name.
+def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:
+    """Make a mode for each node, by its name.
 
     Args:
         automaton: whose nodes.
@@ -201,32 +201,32 @@ def stations(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Station
     trimmed = {
         node.name
         for start in automaton.starts.values()
-        if any(phase_control(phases, other).trims for other in automaton.stride(start))
+        if any(phase_control(phases, other).trim_momentum for other in automaton.stride(start))
         for node in automaton.stride(start)
     }
     found = {}
     for node in automaton.nodes:
         control = phase_control(phases, node)
         touchdown = node.edge(Event.TOUCHDOWN)
-        found[node.name] = Station(
+        found[node.name] = Mode(
             node=node,
             control=control,
             tasks=TaskStack(control.tasks, nv),
             com=next((task for task in control.tasks if isinstance(task, ComTask)), None),
-            ways=tuple(edge for edge in node.edges if isinstance(edge.target, str)),
+            outgoing_edges=tuple(edge for edge in node.edges if isinstance(edge.target, str)),
             # Plain numbers: an enumeration's members are slow to index with.
             stance=tuple(int(leg) for leg in node.stance),
             swings=tuple(int(leg) for leg in control.swings),
             swing=control.swing,
             locate=LOCATE[control.clock],
             cap=np.full(len(node.stance), np.inf),
-            awaited=PLACED[touchdown.reset] if touchdown is not None else None,
+            next_touchdown_leg=PLACED[touchdown.reset] if touchdown is not None else None,
             trimmed=node.name in trimmed,
         )
     return found
 
 
-class Place:
+class PathClock:
     """Where on the path the robot is; it persists from tick to tick.
 
     Args:
@@ -254,27 +254,32 @@ class Place:
         self._fresh = True
 
     def move(
-        self, station: Station, planning: StridePlanning, sensed: Sensed, speed: float, dt: float
+        self,
+        mode: Mode,
+        supervisor: StrideSupervisor,
+        sensed: TemplateState,
+        speed: float,
+        dt: float,
     ) -> None:
         """Go on to where the robot is now.
 
         Args:
-            station: of the robot.
-            planning: whose path is followed.
+            mode: of the robot.
+            supervisor: whose path is followed.
             sensed: the robot's state.
             speed: dx/dt of its CoM [m/s].
             dt: since the last tick [s].
         """
-        s, path, toe = sensed, planning.path, planning.toe
+        s, path, toe = sensed, supervisor.path, supervisor.toe
         x, y = s.state[0] + self.offset - s.toes[0], s.state[1]
         # Since the last tick, unless the path begins at this one. A direction needs a guess only.
-        passed = 0.0 if self._fresh and station.control.clock is Clock.TIME else dt
+        passed = 0.0 if self._fresh and mode.control.clock is Clock.TIME else dt
         self._fresh = False
-        self.time, row = station.locate(*path.curve, x, y, self.time + passed, self.reference)
+        self.time, row = mode.locate(*path.curve, x, y, self.time + passed, self.reference)
         self.offset += (s.state[2] - speed) * dt
         segment = path.curve.meta[row]
-        if planning.ground is not self._ground:
-            self._ground = ground = planning.ground
+        if supervisor.ground is not self._ground:
+            self._ground = ground = supervisor.ground
             self._body[1:3], self._body[4] = ground.gravity_parts, ground.assist
         leg_forces(segment, toe, self.reference, self._body, self.forces)
         if segment[3] != toe:

@@ -38,34 +38,35 @@ class PhaseControl(Checked):
         clock: how the robot is located on the path.
         momentum_speed: whether the sensed speed includes the angular momentum about the CoM;
             this needs a stance foot.
-        unloads: legs whose normal force is kept near the template's, so that they have no load
-            left to lift off with.
-        weighs: whether the load estimate observes this phase.
-        trims: whether the momentum trim acts in this phase.
+        unload_legs: legs whose normal force is kept near the template's, so that they have no
+            load left to lift off with.
+        estimate_load: whether the load estimate observes this phase.
+        trim_momentum: whether the momentum trim acts in this phase.
         swing: shape of the swings that begin in this phase; None: the robot's.
-        curved: whether the CoM follows the planner's curve in time, and not the template's springs.
-        lands: whether the stiffnesses that are still free are chosen again as the phase begins,
-            from where the foot has landed.
-        rolls: whether the template's toe stays in one place while the foot rolls
-            (:func:`~template_control.embedding.references.rolling.unrolled`); else it moves with
-            the foot's lowest point.
-        unhit: whether the path from a touchdown begins with the speed before the foot hit the
-            ground. How much of the impact is over when it is felt varies from step to step; the
-            template lands without one.
+        follow_curve: whether the CoM follows the planner's curve in time, and not the template's
+            springs.
+        replan_at_touchdown: whether the stiffnesses that are still free are chosen again as the
+            phase begins, from where the foot has landed.
+        rolling_contact: whether the template's toe stays in one place while the foot rolls
+            (:func:`~template_control.embedding.state.unrolled`); else it moves with the foot's
+            lowest point.
+        use_pre_impact_velocity: whether the path from a touchdown begins with the velocity before
+            the foot hit the ground. How much of the impact is over when it is felt varies from
+            step to step; the template lands without one.
     """
 
     tasks: tuple[Task, ...]
     swings: tuple[Leg, ...] = ()
     clock: Clock = Clock.DIRECTION
     momentum_speed: bool = True
-    unloads: tuple[Leg, ...] = ()
-    weighs: bool = True
-    trims: bool = False
+    unload_legs: tuple[Leg, ...] = ()
+    estimate_load: bool = True
+    trim_momentum: bool = False
     swing: SwingOptions | None = None
-    lands: bool = False
-    rolls: bool = False
-    unhit: bool = False
-    curved: bool = False
+    replan_at_touchdown: bool = False
+    rolling_contact: bool = False
+    use_pre_impact_velocity: bool = False
+    follow_curve: bool = False
 
 
 Phases = Mapping[Phase | str, PhaseControl]
@@ -85,11 +86,13 @@ _RUNNING_STANCE = PhaseControl(
 
 # A stride that is made once has nothing to be trimmed by, and a planner with push-off leaves the
 # trim nothing to do.
-_UNTRIMMED = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,))
+_UNTRIMMED = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unload_legs=(Leg.REAR,))
 
 # Nobody walks: time passes, and both feet carry.
-_STANDING = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, curved=True)
-_LIFTING_OFF = replace(_STANDING, unloads=(Leg.REAR,), weighs=False)
+_STANDING = PhaseControl(
+    tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, follow_curve=True
+)
+_LIFTING_OFF = replace(_STANDING, unload_legs=(Leg.REAR,), estimate_load=False)
 
 _SINGLE_STANCE = PhaseControl(
     # Height before the swing foot: near VLO its pull on the ground would need more normal
@@ -99,7 +102,7 @@ _SINGLE_STANCE = PhaseControl(
     swings=(Leg.FRONT,),
 )
 # A step from a stand may go back, and nearly rest over its foot: directions tell no time.
-_STEPPING = replace(_SINGLE_STANCE, clock=Clock.TIME, curved=True)
+_STEPPING = replace(_SINGLE_STANCE, clock=Clock.TIME, follow_curve=True)
 
 PHASES: Phases = {
     Phase.F: PhaseControl(
@@ -108,35 +111,35 @@ PHASES: Phases = {
         swings=(Leg.REAR, Leg.FRONT),
         clock=Clock.TIME,
         momentum_speed=False,
-        weighs=False,
+        estimate_load=False,
         swing=_RUNNING_SWING,
     ),
-    "SS_sc^r": replace(_RUNNING_STANCE, lands=True),
+    "SS_sc^r": replace(_RUNNING_STANCE, replan_at_touchdown=True),
     "SS_sd^r": _RUNNING_STANCE,
     Phase.SS: _SINGLE_STANCE,
     Phase.DS: PhaseControl(
-        tasks=(ComTask((1.0, 3.0)), PostureTask()), unloads=(Leg.REAR,), trims=True
+        tasks=(ComTask((1.0, 3.0)), PostureTask()), unload_legs=(Leg.REAR,), trim_momentum=True
     ),
-    "SS_av^wp": replace(_SINGLE_STANCE, rolls=True),
-    "DS_sc^wp": replace(_UNTRIMMED, rolls=True, unhit=True),
-    "DS_sd^wp": replace(_UNTRIMMED, rolls=True),
-    "SS_bv^wp": replace(_SINGLE_STANCE, rolls=True),
-    "DS_sc^wr": replace(_UNTRIMMED, lands=True),
+    "SS_av^wp": replace(_SINGLE_STANCE, rolling_contact=True),
+    "DS_sc^wp": replace(_UNTRIMMED, rolling_contact=True, use_pre_impact_velocity=True),
+    "DS_sd^wp": replace(_UNTRIMMED, rolling_contact=True),
+    "SS_bv^wp": replace(_SINGLE_STANCE, rolling_contact=True),
+    "DS_sc^wr": replace(_UNTRIMMED, replan_at_touchdown=True),
     "DS_sd^wr": _UNTRIMMED,
-    "SS_sc^wr": replace(_RUNNING_STANCE, lands=True),
+    "SS_sc^wr": replace(_RUNNING_STANCE, replan_at_touchdown=True),
     "SS_sd^wr": _RUNNING_STANCE,
-    "SS_sc^rw": replace(_RUNNING_STANCE, lands=True),
+    "SS_sc^rw": replace(_RUNNING_STANCE, replan_at_touchdown=True),
     "SS_sd^rw": _RUNNING_STANCE,
     "DS_ar^s": _STANDING,
-    "DS_br^ws": replace(_STANDING, weighs=False),
+    "DS_br^ws": replace(_STANDING, estimate_load=False),
     "DS_ar^sw": _LIFTING_OFF,
     "DS_bl^ww": _LIFTING_OFF,
     "DS_al^sf": _LIFTING_OFF,
     "SS_bt^sf": _STEPPING,
-    "DS_br^sf": replace(_STANDING, weighs=False),
-    "DS_al^sb": replace(_LIFTING_OFF, unloads=(Leg.FRONT,)),
+    "DS_br^sf": replace(_STANDING, estimate_load=False),
+    "DS_al^sb": replace(_LIFTING_OFF, unload_legs=(Leg.FRONT,)),
     "SS_bt^sb": _STEPPING,
-    "DS_br^sb": replace(_STANDING, weighs=False),
+    "DS_br^sb": replace(_STANDING, estimate_load=False),
 }
 """What walking and running need in each phase; transitions may start from it."""
 

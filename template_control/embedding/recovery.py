@@ -16,8 +16,8 @@ from template_control.embedding.planners.planner import (
     decided,
 )
 from template_control.embedding.replanning import free_controls
-from template_control.embedding.rollout import RestOfStride
-from template_control.embedding.state import SectionReport, Sensed
+from template_control.embedding.rollout import TemplateRollout
+from template_control.embedding.state import SectionReport, TemplateState
 from template_control.slip.automaton.automaton import BREAKS, STEP_OUT
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
@@ -33,11 +33,11 @@ Array = NDArray[np.float64]
 _LEGS = (0.4, 0.6, 0.8, 1.1)
 
 
-def find_break(
-    rest: RestOfStride,
+def find_recovery(
+    rollout: TemplateRollout,
     node: Node,
     report: SectionReport,
-    sensed: Sensed,
+    sensed: TemplateState,
     *,
     excess: float,
     turn: float,
@@ -45,7 +45,7 @@ def find_break(
     """Another stride from here.
 
     Args:
-        rest: of the present stride.
+        rollout: of the present stride.
         node: of the automaton, the robot's.
         report: of the present stride.
         sensed: the robot's state.
@@ -56,20 +56,20 @@ def find_break(
         The node that the robot is in then, and the report with the new stride in it; None where
         the route knows no other stride, or the template does not complete it.
     """
-    route, automaton = rest.planners.route, rest.automaton
+    route, automaton = rollout.planners.route, rollout.automaton
     if not isinstance(route, BreakingRoute):
         return None
     for goal in asked(route.instead, report.goal, float(sensed.state[2]), excess):
         name = node.name
         if goal.stride != report.goal.stride:
             name = BREAKS.get(goal.stride, {}).get(name, "")
-        if name not in automaton.index or goal.stride not in rest.planners.planners:
+        if name not in automaton.index or goal.stride not in rollout.planners.planners:
             continue
         end = section_of(automaton.sections(name)[1])
-        if end is REST and _goes_on(rest, node, report, sensed):
+        if end is REST and _goes_on(rollout, node, report, sensed):
             continue  # a stand is for a walk that gets no further
         other = automaton.node(name)
-        decision = _decision(rest, other, replace(report, goal=goal), sensed, turn)
+        decision = _decision(rollout, other, replace(report, goal=goal), sensed, turn)
         if decision is not None and decision.feasible:
             target = end.padded(goal.target)
             asked(route.take, goal)
@@ -77,58 +77,60 @@ def find_break(
     return None
 
 
-def _goes_on(rest: RestOfStride, node: Node, report: SectionReport, sensed: Sensed) -> bool:
+def _goes_on(
+    rollout: TemplateRollout, node: Node, report: SectionReport, sensed: TemplateState
+) -> bool:
     """Whether the template completes the present stride from here, with these legs or others."""
-    ahead, u = rest.ahead(node, sensed), report.decision.controls
+    ahead, u = rollout.ahead(node, sensed), report.decision.controls
     legs = [u]
-    free = free_controls(rest.automaton, node)
+    free = free_controls(rollout.automaton, node)
     for share in _LEGS:
         other = u.copy()
-        other[free] = share * rest.ground.leg_stiffness
+        other[free] = share * rollout.ground.leg_stiffness
         legs.append(other)
     return any(ahead(other)[1] is Outcome.SECTION for other in legs)
 
 
 def _decision(
-    rest: RestOfStride, node: Node, report: SectionReport, sensed: Sensed, turn: float
+    rollout: TemplateRollout, node: Node, report: SectionReport, sensed: TemplateState, turn: float
 ) -> Decision | None:
     """What is decided where the goal of ``report`` begins at ``node``; None by no such planner.
 
     Its decision is the one of the stride that is left.
     """
     goal, present = report.goal, report.decision
-    planner = rest.planners.of(goal)
-    if node.name in rest.curved:
-        return _along_curve(rest, node, sensed, goal, present)
+    planner = rollout.planners.of(goal)
+    if node.name in rollout.curved:
+        return _along_curve(rollout, node, sensed, goal, present)
     if not isinstance(planner, BreakingPlanner):
         return None
-    slots = free_controls(rest.automaton, node)
+    slots = free_controls(rollout.automaton, node)
     if node.edge(Event.TOUCHDOWN) is not None:
         slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
-    ahead = rest.ahead(node, sensed)
+    ahead = rollout.ahead(node, sensed)
     free = Free(slots, turn)
     return decided(planner.break_into, ahead, present.controls, goal.target, free)
 
 
 def _along_curve(
-    rest: RestOfStride, node: Node, sensed: Sensed, goal: StrideGoal, present: Decision
+    rollout: TemplateRollout, node: Node, sensed: TemplateState, goal: StrideGoal, present: Decision
 ) -> Decision:
     """What the planner of ``goal`` decides where a curve leads from here to its section."""
-    wanted = section_of(rest.automaton.sections(node.name)[1]).padded(goal.target)
+    wanted = section_of(rollout.automaton.sections(node.name)[1]).padded(goal.target)
     u = np.zeros(NUM_SLOTS)
     begun = replace(present, predicted=wanted, nominal=False, controls=u)
-    planner = rest.planners.of(goal)
-    decision, stride = rest.curve(node.name, sensed, sensed.state, planner, begun)
+    planner = rollout.planners.of(goal)
+    decision, stride = rollout.curve(node.name, sensed, sensed.state, planner, begun)
     return replace(decision, feasible=decision.feasible and stride.completed, lasting=True)
 
 
-def follow_curve(
-    rest: RestOfStride, node: str, sensed: Sensed, state: Array, report: SectionReport
+def curve_or_step(
+    rollout: TemplateRollout, node: str, sensed: TemplateState, state: Array, report: SectionReport
 ) -> tuple[SectionReport, Stride]:
     """The curve of the stride's planner from here, or else the first step that leads to rest.
 
     Args:
-        rest: of the present stride.
+        rollout: of the present stride.
         node: of the automaton, where a curve carries the robot.
         sensed: the robot, for its toes and the acceleration wanted so far.
         state: (4,) x, y, dx/dt, dy/dt.
@@ -138,16 +140,16 @@ def follow_curve(
         The report with what holds from now on, and the stride from here. Its first node is
         another one where a step is made instead.
     """
-    planner = rest.planners.of(report.goal)
-    decision, stride = rest.curve(node, sensed, state, planner, report.decision)
+    planner = rollout.planners.of(report.goal)
+    decision, stride = rollout.curve(node, sensed, state, planner, report.decision)
     if not decision.feasible:
         for kind in STEP_OUT.get(node, ()):
-            other = rest.planners.planners.get(kind)
+            other = rollout.planners.planners.get(kind)
             if not isinstance(other, CurvePlanner):
                 continue
-            start = rest.automaton.starts[kind]
+            start = rollout.automaton.starts[kind]
             first = decided(other.decide, REST.of(state))
-            instead, step = rest.curve(start, sensed, state, other, first)
+            instead, step = rollout.curve(start, sensed, state, other, first)
             if instead.feasible:
                 goal = replace(report.goal, stride=kind)
                 return replace(report, goal=goal, decision=instead), step

@@ -23,8 +23,8 @@ from template_control.embedding.planners.planner import (
     lands,
 )
 from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
-from template_control.embedding.rollout import RestOfStride
-from template_control.embedding.state import SectionReport, Sensed
+from template_control.embedding.rollout import TemplateRollout
+from template_control.embedding.state import SectionReport, TemplateState
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.gaits.gait import Gait
@@ -79,7 +79,9 @@ def free_controls(automaton: Automaton, node: Node) -> list[int]:
     return sorted({int(k) for n in later for k in (n.rear, n.front) if k is not None})
 
 
-def angle_later(sensed: Sensed, parameters: SlipParameters, stiffness: float, time: float) -> float:
+def touchdown_angle_after(
+    sensed: TemplateState, parameters: SlipParameters, stiffness: float, time: float
+) -> float:
     """Touchdown angle of a front leg that comes to l0 some time from now [rad].
 
     The height then comes from its Taylor series to the second order.
@@ -98,7 +100,7 @@ def angle_later(sensed: Sensed, parameters: SlipParameters, stiffness: float, ti
     return asin(min(max(later / length, 0.0), 1.0))
 
 
-def flown_angle(sensed: Sensed, parameters: SlipParameters) -> float:
+def ballistic_touchdown_angle(sensed: TemplateState, parameters: SlipParameters) -> float:
     """Angle of the template's leg as it comes to l0 on the ballistic path through the robot [rad].
 
     The robot's foot meets the ground a little before or after.
@@ -210,33 +212,37 @@ def reachable_turn(scale: Scale, time_to_go: float) -> float:
 
 
 def reachable_angles(
-    rest: RestOfStride, node: Node, sensed: Sensed, report: SectionReport, time_to_go: float
+    rollout: TemplateRollout,
+    node: Node,
+    sensed: TemplateState,
+    report: SectionReport,
+    time_to_go: float,
 ) -> tuple[float, float]:
     """Least and greatest touchdown angle that the swing foot can still land with [rad].
 
     Args:
-        rest: of the present stride.
+        rollout: of the present stride.
         node: of the automaton, the robot's.
         sensed: the robot's state.
         report: of the present stride.
         time_to_go: until the touchdown is due [s].
     """
-    planners, u = rest.planners, report.decision.controls
-    change, angle = reachable_turn(rest.scale, time_to_go), float(u[Slot.TOUCHDOWN_ANGLE])
+    planners, u = rollout.planners, report.decision.controls
+    change, angle = reachable_turn(rollout.scale, time_to_go), float(u[Slot.TOUCHDOWN_ANGLE])
     most = angle + change
     if node.rear is not None and node.edge(Event.TOUCHDOWN) is not None:
         step = planners.of(report.goal).gait.step_duration
-        soonest = min(SOONEST * rest.scale.time, SOONEST_SHARE * step)
+        soonest = min(SOONEST * rollout.scale.time, SOONEST_SHARE * step)
         time = max(min(time_to_go, soonest), _AT_ONCE)
         stiffness = float(u[node.rear])
-        most = min(most, angle_later(sensed, planners.route.parameters, stiffness, time))
+        most = min(most, touchdown_angle_after(sensed, planners.route.parameters, stiffness, time))
     return min(angle - change, most), most
 
 
-def all_controls(
-    rest: RestOfStride,
+def choose_all_controls(
+    rollout: TemplateRollout,
     node: Node,
-    sensed: Sensed,
+    sensed: TemplateState,
     report: SectionReport,
     angles: tuple[float, float],
 ) -> Decision | None:
@@ -245,7 +251,7 @@ def all_controls(
     Where no stride goes on from there, the gait's legs may have led to here from another one.
 
     Args:
-        rest: of the present stride.
+        rollout: of the present stride.
         node: of the automaton, the first one of a stride.
         sensed: the robot's state.
         report: of the present stride.
@@ -254,10 +260,10 @@ def all_controls(
     Returns:
         None where the template cannot have come from a section.
     """
-    planner = rest.planners.of(report.goal)
+    planner = rollout.planners.of(report.goal)
 
     def decide(so_far: Array) -> Decision | None:
-        z = rest.back_to_section(node, so_far, sensed)
+        z = rollout.backward_to_section(node, so_far, sensed)
         return None if z is None else decided(planner.decide, z, report.goal.target, angles)
 
     decision = decide(report.decision.controls)
@@ -268,13 +274,13 @@ def all_controls(
     return decision if other is None else other
 
 
-def stiffnesses(
-    rest: RestOfStride, node: Node, sensed: Sensed, report: SectionReport
+def choose_stiffnesses(
+    rollout: TemplateRollout, node: Node, sensed: TemplateState, report: SectionReport
 ) -> Decision | None:
     """Let the planner choose the stiffnesses that the rest of the stride depends on.
 
     Args:
-        rest: of the present stride.
+        rollout: of the present stride.
         node: of the automaton, the robot's.
         sensed: the robot's state.
         report: of the present stride.
@@ -282,55 +288,61 @@ def stiffnesses(
     Returns:
         None of a planner that has no ``land``.
     """
-    planner = rest.planners.of(report.goal)
+    planner = rollout.planners.of(report.goal)
     if not lands(planner):
         return None
-    free = free_controls(rest.automaton, node)
-    ahead = rest.ahead(node, sensed)
+    free = free_controls(rollout.automaton, node)
+    ahead = rollout.ahead(node, sensed)
     return decided(planner.land, ahead, report.decision, report.goal.target, free)
 
 
 def choose_after_touchdown(
-    rest: RestOfStride, node: Node, sensed: Sensed, report: SectionReport
+    rollout: TemplateRollout, node: Node, sensed: TemplateState, report: SectionReport
 ) -> Decision | None:
     """What is still free as a foot lands, chosen from where it did.
 
-    Arguments as for :func:`stiffnesses`.
+    Arguments as for :func:`choose_stiffnesses`.
 
     Returns:
         None where what was decided holds on.
     """
-    decision = stiffnesses(rest, node, sensed, report)
+    decision = choose_stiffnesses(rollout, node, sensed, report)
     if decision is not None:
         return decision
-    angle = flown_angle(sensed, rest.planners.route.parameters)
-    start = rest.automaton.start(report.goal.stride)
-    return all_controls(rest, start, sensed, report, (angle, angle))
+    angle = ballistic_touchdown_angle(sensed, rollout.planners.route.parameters)
+    start = rollout.automaton.start(report.goal.stride)
+    return choose_all_controls(rollout, start, sensed, report, (angle, angle))
 
 
 def choose_on_unexpected_ground(
-    rest: RestOfStride, node: Node, sensed: Sensed, report: SectionReport, height_error: float
+    rollout: TemplateRollout,
+    node: Node,
+    sensed: TemplateState,
+    report: SectionReport,
+    height_error: float,
 ) -> Decision:
     """The stiffnesses after a foot has landed on ground that is higher or lower than expected.
 
     Args:
-        rest: of the present stride.
+        rollout: of the present stride.
         node: of the automaton, the robot's.
         sensed: the robot's state.
         report: of the present stride.
         height_error: of the ground over the other foot's [m].
     """
-    planner = rest.planners.of(report.goal)
-    free = free_controls(rest.automaton, node)
-    nominal, ahead = planner.gait.controls, rest.ahead(node, sensed)
+    planner = rollout.planners.of(report.goal)
+    free = free_controls(rollout.automaton, node)
+    nominal, ahead = planner.gait.controls, rollout.ahead(node, sensed)
     target = report.target[: len(report.goal.target)]
     # After a step up the end nearest to the gait is the best: three steps later the walk is
     # back. The cheapest one goes on with a stride of half the speed.
     price = planner.price if height_error < 0.0 and isinstance(planner, PricingPlanner) else None
-    return choose_legs(ahead, report.decision, target, free, nominal, rest.scale, price)
+    return choose_legs(ahead, report.decision, target, free, nominal, rollout.scale, price)
 
 
-def steady(rest: RestOfStride, node: Node, sensed: Sensed, report: SectionReport) -> None:
+def choose_assist(
+    rollout: TemplateRollout, node: Node, sensed: TemplateState, report: SectionReport
+) -> None:
     """Let the template run on with the assist that its step needs from here.
 
     For the speed at the step's end, where a foot has landed off: near a symmetric gait neither the
@@ -338,23 +350,23 @@ def steady(rest: RestOfStride, node: Node, sensed: Sensed, report: SectionReport
     on a slope.
 
     Args:
-        rest: of the present stride; it keeps the assist until it stands on other ground.
+        rollout: of the present stride; it keeps the assist until it stands on other ground.
         node: of the automaton, the robot's.
         sensed: the robot's state.
         report: of the present stride.
     """
-    bound = _ASSIST * rest.scale.factor(ACCELERATION)
-    gait: Gait = rest.planners.of(report.goal).gait
-    ground, left_alone = rest.ground, uncontrolled(gait)
+    bound = _ASSIST * rollout.scale.factor(ACCELERATION)
+    gait: Gait = rollout.planners.of(report.goal).gait
+    ground, left_alone = rollout.ground, uncontrolled(gait)
     controls = report.decision.controls
 
     def drift(change: float) -> float | None:
         """Of the step with another assist, as a forward speed [m/s]; None if it does not end."""
-        rest.stand_on(replace(ground, assist=ground.assist + change))
-        end, outcome = rest.ahead(node, sensed)(controls)
+        rollout.set_ground(replace(ground, assist=ground.assist + change))
+        end, outcome = rollout.ahead(node, sensed)(controls)
         return float(left_alone @ (end - gait.state)) if outcome is Outcome.SECTION else None
 
-    rest.stand_on(replace(ground, assist=ground.assist + _change(drift, bound)))
+    rollout.set_ground(replace(ground, assist=ground.assist + _change(drift, bound)))
 
 
 def _change(drift: Callable[[float], float | None], bound: float) -> float:

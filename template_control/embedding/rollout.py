@@ -23,7 +23,7 @@ from template_control.embedding.planners.planner import (
     curved,
     decided,
 )
-from template_control.embedding.state import Learnt, SectionReport, Sensed
+from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Outcome
@@ -146,7 +146,7 @@ class RoutePlanners:
         section: Section,
         z: Array,
         now: float,
-        learnt: Learnt,
+        estimators: EstimatorState,
         reports: Sequence[SectionReport],
     ) -> tuple[SectionReport, Array, bool]:
         """Learn from the stride that ended, ask the route for the next one, and plan it.
@@ -155,7 +155,7 @@ class RoutePlanners:
             section: that was reached.
             z: (n,) state there.
             now: time [s].
-            learnt: what the controller has learnt, for the report.
+            estimators: what the controller has learnt, for the report.
             reports: of the strides so far; none at the start.
 
         Returns:
@@ -184,7 +184,7 @@ class RoutePlanners:
             target=end.padded(goal.target),
             decision=decision,
             offset=check(f"{type(planner).__name__}.offset", planner.offset, Triple).copy(),
-            learnt=learnt,
+            estimators=estimators,
             plan_seconds=seconds,
         )
         return report, start, wanted is not None
@@ -214,7 +214,7 @@ class RoutePlanners:
         return decision, z
 
 
-class RestOfStride:
+class TemplateRollout:
     """Runs the template from the robot's state.
 
     Args:
@@ -234,7 +234,7 @@ class RestOfStride:
         self.scale = Scale.of(self._parameters)
         self._simulator = self._mirrored = StrideSimulator(self._parameters, automaton)
 
-    def stand_on(self, ground: SlipParameters) -> bool:
+    def set_ground(self, ground: SlipParameters) -> bool:
         """Run the template on other ground.
 
         Args:
@@ -256,7 +256,7 @@ class RestOfStride:
         """The template on its present ground."""
         return self._simulator.parameters
 
-    def onward(self, node: str, sensed: Sensed, state: Array, u: Array) -> Stride:
+    def forward(self, node: str, sensed: TemplateState, state: Array, u: Array) -> Stride:
         """The template's stride from ``node`` on.
 
         Args:
@@ -268,7 +268,7 @@ class RestOfStride:
         return self._simulator.run(node, state, u, _toes(sensed))
 
     def curve(
-        self, node: str, sensed: Sensed, state: Array, planner: Planner, decision: Decision
+        self, node: str, sensed: TemplateState, state: Array, planner: Planner, decision: Decision
     ) -> tuple[Decision, Stride]:
         """The planner's curve from here; what it decides on the way holds from now on.
 
@@ -324,7 +324,7 @@ class RestOfStride:
             more -= 1
         return strides, whole and all(stride.completed for stride in strides)
 
-    def ahead(self, node: Node, sensed: Sensed) -> Ahead:
+    def ahead(self, node: Node, sensed: TemplateState) -> Ahead:
         """Where the present stride ends from here, by its controls.
 
         Args:
@@ -340,7 +340,9 @@ class RestOfStride:
 
         return ahead
 
-    def back_to_section(self, node: Node, controls: Array, sensed: Sensed) -> Array | None:
+    def backward_to_section(
+        self, node: Node, controls: Array, sensed: TemplateState
+    ) -> Array | None:
         """The section state from which the template would have come to where the robot is.
 
         The template's dynamics are the same forward and backward: its past is the mirror
@@ -367,5 +369,5 @@ class RestOfStride:
         return section.mirror(section.of(past.state))
 
 
-def _toes(sensed: Sensed) -> tuple[float, float]:
+def _toes(sensed: TemplateState) -> tuple[float, float]:
     return float(sensed.toes[0]), float(sensed.toes[1])

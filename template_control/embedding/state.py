@@ -48,7 +48,7 @@ def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
 
 
 @dataclass
-class Sensed:
+class TemplateState:
     """What the robot feels, in the template's terms; overwritten at every tick.
 
     Attributes:
@@ -72,7 +72,7 @@ class Sensed:
     acceleration: Array = field(default_factory=lambda: np.zeros(2))
 
 
-class Sensing:
+class StateObserver:
     """Reads the robot's state on the template's ground, which the foot that landed last stands on.
 
     Args:
@@ -83,36 +83,39 @@ class Sensing:
     Attributes:
         now: what was read last.
         ground: height of the template's ground [m].
-        unhit: (2,) dx/dt and dy/dt of this tick if nothing has hit the robot since the last one.
+        pre_impact_velocity: (2,) dx/dt and dy/dt of this tick if nothing has hit the robot since
+            the last one.
     """
 
     def __init__(self, robot: Biped, feet: Feet, acceleration: Array) -> None:
         self._robot, self._feet = robot, feet
-        self.now = Sensed(swing_time=feet.swing_time, acceleration=acceleration)
+        self.now = TemplateState(swing_time=feet.swing_time, acceleration=acceleration)
         self.ground = 0.0
-        self.unhit = np.zeros(2)
+        self.pre_impact_velocity = np.zeros(2)
         self._rear_shift = 0.0
 
     def begin(self, stands: bool) -> None:
         """Begin a run; where no foot stands, the ground is at height 0."""
-        self.now.feet = self._feet.of
+        self.now.feet = self._feet.foot_of_leg
         self.ground = self._height(self._feet.landed) if stands else 0.0
 
-    def read(self, contact: NDArray[np.bool_], stands: bool, momentum: bool, rolls: bool) -> None:
+    def read(
+        self, contact: NDArray[np.bool_], stands: bool, momentum: bool, rolling_contact: bool
+    ) -> None:
         """Read the state of this tick.
 
         Args:
             contact: (2,) whether each foot touches the ground.
             stands: whether a foot carries; the ground is under the one that landed last.
             momentum: as for :meth:`read_speed`.
-            rolls: whether the toes stay in one place while the feet roll.
+            rolling_contact: whether the toes stay in one place while the feet roll.
         """
         r, s = self._robot, self.now
         if stands:
             self.ground = self._height(self._feet.landed)
         s.state[0], s.state[1] = r.com[0], r.com[1] - self.ground
         s.state[3] = r.com_velocity[1]
-        self._read_toes(rolls)
+        self._read_toes(rolling_contact)
         s.contact = contact
         self.read_speed(momentum)
 
@@ -135,27 +138,27 @@ class Sensing:
         if not isfinite(s.state[2]):  # the robot's own state is, but for its height over the foot
             raise DivergedError(f"the forward speed of {r.name} is not finite")
 
-    def foresee(self, dt: float) -> None:
-        """Reckon with the speed that the next tick has in ``dt`` if nothing hits the robot."""
+    def predict_velocity(self, dt: float) -> None:
+        """Predict the velocity that the next tick has in ``dt`` if nothing hits the robot."""
         _, _, dx, dy = self.now.state.tolist()
         ddx, ddy = self.now.acceleration.tolist()
-        self.unhit[0], self.unhit[1] = dx + ddx * dt, dy + ddy * dt
+        self.pre_impact_velocity[0], self.pre_impact_velocity[1] = dx + ddx * dt, dy + ddy * dt
 
-    def take_roles(self, rolls: bool) -> None:
+    def take_roles(self, rolling_contact: bool) -> None:
         """The feet have changed their roles, or one of them has lifted off.
 
         Args:
-            rolls: as for :meth:`read`.
+            rolling_contact: as for :meth:`read`.
         """
         self._rear_shift = 0.0
-        self.now.feet = self._feet.of
-        self._read_toes(rolls)
+        self.now.feet = self._feet.foot_of_leg
+        self._read_toes(rolling_contact)
 
-    def _read_toes(self, rolls: bool) -> None:
+    def _read_toes(self, rolling_contact: bool) -> None:
         r, s = self._robot, self.now
-        for leg, foot in enumerate(self._feet.of):
+        for leg, foot in enumerate(self._feet.foot_of_leg):
             toe = float(r.foot_position[foot, 0])
-            s.toes[leg] = unrolled(toe, s.state, r.foot_radius) if rolls else toe
+            s.toes[leg] = unrolled(toe, s.state, r.foot_radius) if rolling_contact else toe
         s.toes[Leg.REAR] += self._rear_shift
 
     def stand_on(self, foot: int) -> None:
@@ -172,7 +175,7 @@ class Sensing:
         Returns:
             How much higher the ground is now [m].
         """
-        s, foot = self.now, self._feet.of[leg]
+        s, foot = self.now, self._feet.foot_of_leg[leg]
         self._feet.landed = foot
         higher = self._rise(foot)
         height = s.state[1] - higher
@@ -194,7 +197,7 @@ class Sensing:
 
 
 @dataclass(frozen=True)
-class Learnt:
+class EstimatorState:
     """What the controller's learners know at a section.
 
     Attributes:
@@ -220,7 +223,7 @@ class SectionReport:
         target: (3,) dx/dt, y, dy/dt where it is to lead.
         decision: the planner's choice for it.
         offset: (3,) the planner's offset estimate.
-        learnt: what the learners knew.
+        estimators: what the learners knew.
         plan_seconds: wall-clock time of the plan.
     """
 
@@ -231,7 +234,7 @@ class SectionReport:
     target: Array
     decision: Decision
     offset: Array
-    learnt: Learnt
+    estimators: EstimatorState
     plan_seconds: float
 
     @property

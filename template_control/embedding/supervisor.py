@@ -23,19 +23,19 @@ from template_control.embedding.planners.planner import (
     PricingPlanner,
     SlopePlanner,
 )
-from template_control.embedding.recovery import find_break, follow_curve
+from template_control.embedding.recovery import curve_or_step, find_recovery
 from template_control.embedding.replanning import (
     HEIGHT_ERROR,
-    all_controls,
     choose_after_touchdown,
+    choose_all_controls,
+    choose_assist,
     choose_on_unexpected_ground,
+    choose_stiffnesses,
     reachable_angles,
     reachable_turn,
-    steady,
-    stiffnesses,
 )
-from template_control.embedding.rollout import ReplanOptions, RestOfStride, RoutePlanners
-from template_control.embedding.state import Learnt, SectionReport, Sensed
+from template_control.embedding.rollout import ReplanOptions, RoutePlanners, TemplateRollout
+from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot
@@ -50,7 +50,7 @@ _TOUCHDOWN = int(Event.TOUCHDOWN)
 _ANGLE_DROP = 0.15  # [rad] by which the touchdown angle of an overdue touchdown is taken lower
 
 
-class StridePlanning:
+class StrideSupervisor:
     """Decides at the sections, keeps the decision and the path, and plans again on the way.
 
     Args:
@@ -63,9 +63,9 @@ class StridePlanning:
     Attributes:
         reports: one a section, the start's included.
         path: the template's, from the last plan on.
-        dues: time on the path at which each :class:`Event` comes next [s], inf if it does not.
+        event_times: time on the path of the next occurrence of each :class:`Event` [s], else inf.
         feet: that were the rear and the front leg's where the path starts.
-        reaching: the swing foot is overdue, and the path goes on without it.
+        without_touchdown: the swing foot is overdue, and the path goes on without it.
         arrived: the route has ended.
         height_error: of the ground under a foot that has landed, from which on it is unexpected
             [m].
@@ -88,18 +88,20 @@ class StridePlanning:
         self.curved = curved
         self.parameters: SlipParameters = route.parameters
         self.reports: list[SectionReport] = []
-        self.dues = [np.inf] * NUM_EVENTS
+        self.event_times = [np.inf] * NUM_EVENTS
         self.feet = (0, 1)
-        self.reaching = False
+        self.without_touchdown = False
         self.arrived = False
         self._passed = 0  # so many of the path's events are over
         self._planned_at = 0.0
-        self._whole = True  # the template completes the path's strides, and goes on
-        self._broken = False  # into the present stride
-        self._excess = 0.0  # speed at the stride's section less the wanted, and what came on top
+        self._viable = True  # the template completes the path's strides, and goes on
+        self._recovering = False  # into the present stride
+        self._speed_excess = (
+            0.0  # speed at the stride's section less the wanted, and what came on top
+        )
         self._planners = RoutePlanners(route, planners, automaton)
-        self._rest = RestOfStride(self._planners, automaton, curved)
-        self.height_error = HEIGHT_ERROR * self._rest.scale.length
+        self._rollout = TemplateRollout(self._planners, automaton, curved)
+        self.height_error = HEIGHT_ERROR * self._rollout.scale.length
 
     def begin(self, section: Section) -> tuple[Planner, Node]:
         """Planner and first node of the stride that the route begins with, at ``section``.
@@ -110,7 +112,7 @@ class StridePlanning:
             ParameterError: if the route is empty, or there is no planner for that stride.
         """
         self._planners.reset()
-        self._rest.stand_on(self.parameters)
+        self._rollout.set_ground(self.parameters)
         self.reports.clear()
         self.arrived = False
         goal = self.first_goal()
@@ -131,23 +133,25 @@ class StridePlanning:
 
     # -- decisions ----
 
-    def decide(self, section: Section, sensed: Sensed, now: float, learnt: Learnt) -> Node:
+    def decide(
+        self, section: Section, sensed: TemplateState, now: float, estimators: EstimatorState
+    ) -> Node:
         """At a section: learn from the stride that ended, choose the next one's controls.
 
         Args:
             section: that was reached.
             sensed: the robot's state.
             now: time [s].
-            learnt: what the controller has learnt, for the report.
+            estimators: what the controller has learnt, for the report.
 
         Returns:
             The node that the stride begins in.
         """
         z = section.of(sensed.state)
-        report, start, goes_on = self._planners.decide(section, z, now, learnt, self.reports)
+        report, start, goes_on = self._planners.decide(section, z, now, estimators, self.reports)
         self.arrived = self.arrived or not goes_on
-        self._broken = False
-        self._excess = float(z[0] - report.goal.target[0])
+        self._recovering = False
+        self._speed_excess = float(z[0] - report.goal.target[0])
         self.reports.append(report)
         node = self.automaton.start(report.goal.stride)
         state = sensed.state.copy()
@@ -155,10 +159,12 @@ class StridePlanning:
             state[:4] = section.state(start, state[0])
         node = self._follow(node, state, sensed, now)
         if not report.decision.lasting and not self.arrived:
-            return self._break(node, sensed, 0.0, now) or node
+            return self._recover(node, sensed, 0.0, now) or node
         return node
 
-    def _break(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node | None:
+    def _recover(
+        self, node: Node, sensed: TemplateState, phase_time: float, now: float
+    ) -> Node | None:
         """Break into another stride where the present one cannot go on.
 
         Arguments as for :meth:`reconsider`.
@@ -167,33 +173,33 @@ class StridePlanning:
             The node that the robot is in then, with the path from there; None where the route
             knows no other stride, or the template does not complete it.
         """
-        rest, report = self._rest, self.reports[-1]
-        turn = reachable_turn(rest.scale, self.due(Event.TOUCHDOWN) - phase_time)
-        found = find_break(rest, node, report, sensed, excess=self._excess, turn=turn)
+        rollout, report = self._rollout, self.reports[-1]
+        turn = reachable_turn(rollout.scale, self.time_of(Event.TOUCHDOWN) - phase_time)
+        found = find_recovery(rollout, node, report, sensed, excess=self._speed_excess, turn=turn)
         if found is None:
             return None
         node, self.reports[-1] = found
-        self._broken = True
+        self._recovering = True
         return self.follow(node, sensed, now)
 
-    def overdue(self, node: Node, phase_time: float) -> bool:
+    def touchdown_overdue(self, node: Node, phase_time: float) -> bool:
         """Whether the swing foot should have found the ground by now.
 
         Args:
             node: of the automaton, the robot's.
             phase_time: time along the path [s].
         """
-        late = phase_time > self.dues[_TOUCHDOWN] + self.options.patience
-        return late and not self.reaching and node.edge(Event.TOUCHDOWN) is not None
+        late = phase_time > self.event_times[_TOUCHDOWN] + self.options.patience
+        return late and not self.without_touchdown and node.edge(Event.TOUCHDOWN) is not None
 
-    def reach_on(self, node: Node, sensed: Sensed, now: float) -> None:
+    def continue_without_touchdown(self, node: Node, sensed: TemplateState, now: float) -> None:
         """The ground is lower than was thought: the template goes on without a touchdown.
 
         Arguments as for :meth:`follow`.
         """
         self.follow(node, sensed, now, _ANGLE_DROP)
 
-    def surprised(self, deviation: float, phase_time: float, now: float) -> bool:
+    def deviates(self, deviation: float, phase_time: float, now: float) -> bool:
         """Whether a disturbance has carried the robot away from its path.
 
         A path that leads nowhere is one as well, where the robot has broken into its stride, no
@@ -205,14 +211,14 @@ class StridePlanning:
             now: time [s].
         """
         o = self.options
-        if self.reaching or now - self._planned_at <= o.interval:
+        if self.without_touchdown or now - self._planned_at <= o.interval:
             return False
         if abs(deviation) > o.speed and phase_time > o.interval:
-            self._excess += deviation
+            self._speed_excess += deviation
             return True
-        return not self._whole and (self._broken or self._gave_up())
+        return not self._viable and (self._recovering or self._retry_planning())
 
-    def _gave_up(self) -> bool:
+    def _retry_planning(self) -> bool:
         """Whether no stride went on, or the planner knows what the next ones are worth.
 
         Such a planner may find another way. One along a curve is left to it.
@@ -221,7 +227,7 @@ class StridePlanning:
             return False
         return not self.reports[-1].decision.feasible or isinstance(self.planner, PricingPlanner)
 
-    def reconsider(self, node: Node, sensed: Sensed, phase_time: float, now: float) -> Node:
+    def replan(self, node: Node, sensed: TemplateState, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.
 
         From then on the stiffnesses of what is left are, to a planner that has ``land``.
@@ -235,30 +241,30 @@ class StridePlanning:
         Returns:
             The node that the robot is in then.
         """
-        rest, report = self._rest, self.reports[-1]
-        if self._broken:
-            other = self._break(node, sensed, phase_time, now)
+        rollout, report = self._rollout, self.reports[-1]
+        if self._recovering:
+            other = self._recover(node, sensed, phase_time, now)
             if other is not None:
                 return other
             if not isinstance(self.planner, BreakingPlanner):
-                self.hold(stiffnesses(rest, node, sensed, report))
+                self.set_decision(choose_stiffnesses(rollout, node, sensed, report))
             return self.follow(node, sensed, now)
         lasting = True
         if node.name != self.automaton.starts[report.goal.stride] or node.name in self.curved:
-            self.hold(stiffnesses(rest, node, sensed, report))
+            self.set_decision(choose_stiffnesses(rollout, node, sensed, report))
         else:
-            to_go = self.due(Event.TOUCHDOWN) - phase_time
-            angles = reachable_angles(rest, node, sensed, report, to_go)
-            decision = all_controls(rest, node, sensed, report, angles)
-            self.hold(decision)
+            to_go = self.time_of(Event.TOUCHDOWN) - phase_time
+            angles = reachable_angles(rollout, node, sensed, report, to_go)
+            decision = choose_all_controls(rollout, node, sensed, report, angles)
+            self.set_decision(decision)
             lasting = decision is None or decision.lasting
         node = self.follow(node, sensed, now)
-        if lasting and self._whole:
+        if lasting and self._viable:
             return node
-        return self._break(node, sensed, 0.0, now) or node
+        return self._recover(node, sensed, 0.0, now) or node
 
     def replan_after_touchdown(
-        self, node: Node, sensed: Sensed, now: float, height_error: float, *, choose: bool
+        self, node: Node, sensed: TemplateState, now: float, height_error: float, *, choose: bool
     ) -> Node:
         """Plan from where a foot has landed.
 
@@ -273,14 +279,16 @@ class StridePlanning:
         Returns:
             As :meth:`follow`.
         """
-        rest, report = self._rest, self.reports[-1]
+        rollout, report = self._rollout, self.reports[-1]
         if choose:
-            self.hold(choose_after_touchdown(rest, node, sensed, report))
+            self.set_decision(choose_after_touchdown(rollout, node, sensed, report))
         elif abs(height_error) > self.height_error and node.name not in self.curved:
-            self.hold(choose_on_unexpected_ground(rest, node, sensed, report, height_error))
+            self.set_decision(
+                choose_on_unexpected_ground(rollout, node, sensed, report, height_error)
+            )
         return self.follow(node, sensed, now)
 
-    def hold(self, decision: Decision | None) -> None:
+    def set_decision(self, decision: Decision | None) -> None:
         """From now on this decision holds for the present stride, if it is one.
 
         Args:
@@ -310,27 +318,29 @@ class StridePlanning:
             # No spring carries along a curve, but in the strides after it.
             assists = (answer.assist for answer in answers.values())
             ground = replace(ground, assist=next(filter(None, assists), 0.0))
-        if self._rest.stand_on(ground):
-            self.hold(replace(report.decision, nominal=False))
+        if self._rollout.set_ground(ground):
+            self.set_decision(replace(report.decision, nominal=False))
         return ground.slope
 
     @property
     def ground(self) -> SlipParameters:
         """The template on its present ground."""
-        return self._rest.ground
+        return self._rollout.ground
 
-    def steady(self, node: Node, sensed: Sensed) -> None:
+    def choose_assist(self, node: Node, sensed: TemplateState) -> None:
         """Choose the assist of a double stance that begins on ground that was not expected.
 
         Arguments as for :meth:`follow`. The assist is a slope's: it is left to planners of slopes.
         """
         planner = self.planner
         if isinstance(planner, SlopePlanner) and not isinstance(planner, CurvePlanner):
-            steady(self._rest, node, sensed, self.reports[-1])
+            choose_assist(self._rollout, node, sensed, self.reports[-1])
 
     # -- the path ----
 
-    def follow(self, node: Node, sensed: Sensed, now: float, angle_drop: float = 0.0) -> Node:
+    def follow(
+        self, node: Node, sensed: TemplateState, now: float, angle_drop: float = 0.0
+    ) -> Node:
         """Template path from here to the touchdown after the next section.
 
         Args:
@@ -345,28 +355,28 @@ class StridePlanning:
         return self._follow(node, sensed.state, sensed, now, angle_drop)
 
     def _follow(
-        self, node: Node, state: Array, sensed: Sensed, now: float, angle_drop: float = 0.0
+        self, node: Node, state: Array, sensed: TemplateState, now: float, angle_drop: float = 0.0
     ) -> Node:
         report = self.reports[-1]
         u = report.decision.controls
         if angle_drop:
             u = u.copy()
             u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
-        self.reaching = angle_drop > 0.0
+        self.without_touchdown = angle_drop > 0.0
         if node.name in self.curved:
-            self.reports[-1], first = follow_curve(self._rest, node.name, sensed, state, report)
+            self.reports[-1], first = curve_or_step(self._rollout, node.name, sensed, state, report)
             node = self.automaton.node(first.start)
         else:
-            first = self._rest.onward(node.name, sensed, state, u)
-        strides, self._whole = self._rest.strides(node, first, report.goal, now)
-        self.path, self.feet = join(strides, self._rest.scale.time), sensed.feet
+            first = self._rollout.forward(node.name, sensed, state, u)
+        strides, self._viable = self._rollout.strides(node, first, report.goal, now)
+        self.path, self.feet = join(strides, self._rollout.scale.time), sensed.feet
         self._look_ahead(0)
         self._planned_at = now
         return node
 
-    def due(self, event: Event) -> float:
+    def time_of(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
-        return self.dues[event]
+        return self.event_times[event]
 
     def pass_event(self, event: Event) -> None:
         """The robot has fired ``event``."""
@@ -375,7 +385,7 @@ class StridePlanning:
     def _look_ahead(self, passed: int) -> None:
         """So many of the path's events are over: note when each comes next."""
         self._passed = passed
-        self.dues = self.path.dues(passed)
+        self.event_times = self.path.event_times(passed)
 
     def landing(self, foot: int) -> Landing:
         """Where and when on the path a foot next touches down."""
@@ -386,6 +396,6 @@ class StridePlanning:
         """x of the template's rear toe [m]."""
         return float(self.path.curve.look[0])
 
-    def stand_on(self, foot: int) -> None:
+    def set_rear_toe(self, foot: int) -> None:
         """The template's rear toe is now the one that was this foot's at the start of the path."""
         self.path.curve.look[0] = self.path.toes[self.feet.index(foot)]

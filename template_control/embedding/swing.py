@@ -285,14 +285,14 @@ class Feet:
     """
 
     def __init__(self, options: SwingOptions, reference: Array) -> None:
-        self.of: tuple[int, int] = (0, 1)
+        self.foot_of_leg: tuple[int, int] = (0, 1)
         self.swing = tuple(SwingFoot(options, place) for place in reference)
         self.swing_time = np.full(2, np.inf)
         self.landed = 0
 
     def begin(self, rear: int) -> None:
         """Make foot ``rear`` the rear leg's, and put the template's ground under it."""
-        self.of = (rear, 1 - rear)
+        self.foot_of_leg = (rear, 1 - rear)
         self.landed = rear
 
     def lift(self, foot: int, robot: Biped, swung: float = 0.0) -> None:
@@ -309,7 +309,7 @@ class Feet:
     def apply(self, reset: Reset) -> None:
         """Change the roles as the automaton's reset does."""
         if reset in _EXCHANGES:
-            self.of = (self.of[Leg.FRONT], self.of[Leg.REAR])
+            self.foot_of_leg = (self.foot_of_leg[Leg.FRONT], self.foot_of_leg[Leg.REAR])
 
 
 _EXCHANGES = (Reset.SHIFT, Reset.SWAP)

@@ -172,8 +172,8 @@ class PlanarBackend(RobotBackend):
                 f"{self.robot.name} is held in its plane, and a push has a direction: leave it out,"
                 " or take a free robot"
             )
-        robot, route, pose = self.robot, controller.planning.route, o.pose
-        first = planner, node = controller.planning.begin(route.section)
+        robot, route, pose = self.robot, controller.supervisor.route, o.pose
+        first = planner, node = controller.supervisor.begin(route.section)
         z = route.start if o.start is None else np.array(o.start)
         if pose is None and route.section == APEX:
             pose = self._apex_pose(controller, z[: APEX.dimension], planner, node)
@@ -184,7 +184,7 @@ class PlanarBackend(RobotBackend):
             controller.start(pose.rear, pose.swung, first=first)
             return q, v
         # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
-        shape = controller.swings.towards(controller.planning.first_goal())
+        shape = controller.swings.towards(controller.supervisor.first_goal())
         swing = np.array([0.0, shape.clearance])
         pitch = controller.first_pitch()
         q, v = state_at_vlo(robot, z, 0, swing, np.array([2.0 * z[0], 0.0]), pitch)
@@ -197,7 +197,7 @@ class PlanarBackend(RobotBackend):
         """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
         o, pitch = controller.options, controller.first_pitch()
         swing = phase_control(o.phases, node).swing or controller.swings.other
-        automaton = controller.planning.automaton
+        automaton = controller.supervisor.automaton
         return apex_pose(self.robot, ApexStart(z, planner.gait, swing, pitch, automaton))
 
     def _standing_pose(self, controller: EmbeddingController, o: SimulationOptions) -> Pose:
@@ -206,7 +206,7 @@ class PlanarBackend(RobotBackend):
         Raises:
             ParameterError: if it is steeper than a start can be made on.
         """
-        pose = standing_pose(controller.planning.route.parameters, ground=o.plant.ground_height)
+        pose = standing_pose(controller.supervisor.route.parameters, ground=o.plant.ground_height)
         (rear, low), (front, high) = pose.feet.tolist()
         slope, believed = atan2(high - low, front - rear), STEEPEST
         if not -believed <= slope <= min(believed, _UPHILL):
@@ -277,22 +277,22 @@ class FloatingBackend(RobotBackend):
         Raises:
             ParameterError: if the run begins elsewhere, or the options have a planar pose.
         """
-        route = controller.planning.route
+        route = controller.supervisor.route
         if o.pose is not None or route.section != VLO or not isinstance(controller, FreeController):
             raise ParameterError(
                 f"{self.robot.name} walks free: its run begins at VLO, without a pose"
             )
         z = route.start if o.start is None else np.array(o.start)
-        planner, node = controller.planning.begin(VLO)
-        sideways, course = controller.sideways, o.course
-        sideways.wish = LateralWish(
-            course.step_width or sideways.wish.width,
+        planner, node = controller.supervisor.begin(VLO)
+        lateral, course = controller.lateral, o.course
+        lateral.wish = LateralWish(
+            course.step_width or lateral.wish.width,
             turn=course.rate(0.0) * planner.gait.step_duration,
         )
         controller.turning = course.rate
-        sideways.reset(planner.gait)
-        away, drift = sideways.cycle.states[SIDES[_REAR].row]
-        width = sideways.wish.width
+        lateral.reset(planner.gait)
+        away, drift = lateral.cycle.states[SIDES[_REAR].row]
+        width = lateral.wish.width
         # Mid-swing: the other foot passes the stance foot at twice the CoM's speed.
         pose = FloatingBasePose(
             com=np.array([0.0, 0.5 * width + away, z[1]]),

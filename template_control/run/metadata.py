@@ -25,7 +25,7 @@ def about(controller: EmbeddingController, o: SimulationOptions) -> dict[str, An
         o: how the run goes.
     """
     robot = controller.robot
-    nodes = controller.planning.automaton.nodes
+    nodes = controller.supervisor.automaton.nodes
     found = {
         "robot": robot.name,
         "urdf": robot.urdf,
@@ -58,7 +58,7 @@ def outcome(recorder: Recorder, time_step: float, reason: str, seconds: float) -
     found = {
         **_gait(recorder.controller),
         "fall_reason": reason,
-        "arrived": recorder.controller.planning.arrived,
+        "arrived": recorder.controller.supervisor.arrived,
         "wall_seconds": seconds,
         "duration": recorder.ticks * time_step,
         "ticks": recorder.ticks,
@@ -82,7 +82,7 @@ def _gait(controller: EmbeddingController) -> dict[str, Any]:
         "template": gait.parameters,
         "gait_state": gait.state,
         "gait_controls": gait.controls,
-        "gait_flight_share": flight_share(gait, controller.planning.automaton),
+        "gait_flight_share": flight_share(gait, controller.supervisor.automaton),
         "gait_mean_speed": gait.step_length / gait.step_duration,
         "planner": type(planner).__name__,
     }

@@ -155,7 +155,7 @@ class Recorder:
         self._clocks: dict[int, Array] = {}
         self._counted: dict[int, _Counted] = {}
         self._before = 0.0
-        self._node_index = controller.planning.automaton.index
+        self._node_index = controller.supervisor.automaton.index
         self.ticks = 0
 
     def tick(self, true: Truth, solution: Solution, seconds: float) -> None:
@@ -169,31 +169,31 @@ class Recorder:
         time, q, v, contact_force, push = true
         c, r = self.controller, self.controller.robot
         template_x, template_y = c.template_com
-        feet, station = c.feet.of, c.station
+        feet, mode = c.feet.foot_of_leg, c.mode
         row = self.ticks - self._block_start
         self._numbers[row] = (
             time,
             r.angular_momentum,
             template_x,
             template_y,
-            *c.frame.outward(c.place.reference[2:4]).tolist(),
+            *c.frame.outward(c.path_clock.reference[2:4]).tolist(),
             self._node_index[c.node.name],
             feet[Leg.REAR],
             solution.solved,
             push,
-            bool(station.stance),
+            bool(mode.stance),
             time - self._before,
             seconds,
             solution.solve_seconds,
         )
-        forces = contact_force, c.frame.outward(c.place.forces)
+        forces = contact_force, c.frame.outward(c.path_clock.forces)
         state = (q, v, solution.torque, r.com, r.com_velocity, r.foot_position, *forces)
         for column, value in zip(self._whole, state, strict=True):
             column[row] = value
         r.joint_positions(self._joint[row])
         swing = self._swing[row]
         swing[:] = np.nan
-        for leg in station.control.swings:
+        for leg in mode.control.swings:
             swing[feet[leg]] = c.frame.world(c.references.foot[feet[leg], :, 0])
         self._before = time
         self.ticks += 1
@@ -270,8 +270,8 @@ class Recorder:
             section_offset=np.array([r.offset for r in reports]),
             section_nominal=np.array([r.decision.nominal for r in reports]),
             section_feasible=np.array([r.decision.feasible for r in reports]),
-            section_load=np.array([r.learnt.load for r in reports]),
-            section_trim=np.array([r.learnt.trim for r in reports]),
+            section_load=np.array([r.estimators.load for r in reports]),
+            section_trim=np.array([r.estimators.trim for r in reports]),
             tick_seconds=clocks[:, 0].copy(),
             solve_seconds=clocks[:, 1].copy(),
             plan_seconds=np.array([r.plan_seconds for r in reports]),
@@ -333,9 +333,9 @@ class FloatingRecorder(Recorder):
         if not sampled:
             return
         side = np.full(2, np.nan)
-        for leg in c.station.control.swings:
-            side[c.feet.of[leg]] = c.references.side[c.feet.of[leg], 0]
-        sway = c.sway() - (robot.space.foot[c.feet.of[Leg.REAR], 1], 0.0)
+        for leg in c.mode.control.swings:
+            side[c.feet.foot_of_leg[leg]] = c.references.side[c.feet.foot_of_leg[leg], 0]
+        sway = c.lateral_state() - (robot.space.foot[c.feet.foot_of_leg[Leg.REAR], 1], 0.0)
         feet = robot.to_world(robot.space.foot)
         parts = (robot.to_world(robot.space.com), feet, world, robot.roll_pitch_yaw())
         row = np.concatenate((*parts, robot.heading, sway, side), axis=None)

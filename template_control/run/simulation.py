@@ -144,7 +144,7 @@ def simulate(
     controller = _controller(backend, route, planners, o.tuning(free), automaton)
     recorder = backend.recorder(controller, o.record_every)
     last = _last_step(controller, o)
-    parts = (route, controller.planning.route, *controller.planning.planners.values())
+    parts = (route, controller.supervisor.route, *controller.supervisor.planners.values())
     with exclusive(robot, *parts):
         _check_template(robot, controller.parameters)
         q, v = backend.start(controller, o)
@@ -252,7 +252,7 @@ def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
     """
     if o.steps is not None:
         return o.steps  # the options have looked at the pushes
-    if not controller.planning.route.endless:
+    if not controller.supervisor.route.endless:
         return np.inf
     check_pushes(o.pushes, STEPS)
     return STEPS
@@ -270,7 +270,7 @@ def _loop(
     progress: Callable[[int], None] | None,
 ) -> str:
     """Run until the ``last`` step is done ("") or the robot falls (why)."""
-    robot, planning = controller.robot, controller.planning
+    robot, supervisor = controller.robot, controller.supervisor
     dt = o.plant.time_step
     delay = TorqueDelay(o.delay_ticks)
     q, v, forces = robot.neutral(), np.zeros(robot.nv), np.zeros((2, robot.directions))
@@ -278,7 +278,7 @@ def _loop(
     thrown = o.falls.thrown * controller.parameters.speed_unit
     done, tick, failures = 0, 0, QpFailures(robot.name)
     begun: list[tuple[float, float]] = []
-    while done < last and not planning.arrived:
+    while done < last and not supervisor.arrived:
         now = tick * dt
         plant.read(q, v)
         plant.contact_forces(forces)

@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.kernels import FREE
-from template_control.embedding.free.lateral import BEYOND, SIDES, Outlook, Sideways, hurried
+from template_control.embedding.free.lateral import (
+    BEYOND,
+    SIDES,
+    LateralForecast,
+    LateralPlanner,
+    early_touchdown,
+)
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.planners.planner import Decision, Planner, Planners, decided
 from template_control.embedding.swing import quintic_step
@@ -67,7 +73,7 @@ class FreeController(EmbeddingController):
         super().__init__(robot, planners, unscaled, route, automaton)
         ready(FREE)
         wish = LateralWish(self.options.step_width)
-        self.sideways = Sideways(self.parameters, unscaled.lateral, wish)
+        self.lateral = LateralPlanner(self.parameters, unscaled.lateral, wish)
         self._reach = BEYOND * Scale.of(self.parameters).length
         self.turning: Callable[[float], float] = lambda time: 0.0
 
@@ -79,8 +85,8 @@ class FreeController(EmbeddingController):
         first: tuple[Planner, Node] | None = None,
     ) -> None:
         """As :meth:`~template_control.embedding.controller.EmbeddingController.start`."""
-        first = first or self.planning.begin(self.planning.route.section)
-        self.sideways.reset(first[0].gait)
+        first = first or self.supervisor.begin(self.supervisor.route.section)
+        self.lateral.reset(first[0].gait)
         super().start(rear, swung, first=first)
 
     def tick(
@@ -97,61 +103,61 @@ class FreeController(EmbeddingController):
         """
         solution = super().tick(q, v, contact, dt)
         if force is not None:
-            self._feel_friction(self.robot.faced(force), dt)
+            self._update_friction(self.robot.faced(force), dt)
         return solution
 
     # -- sections, touchdowns, liftoffs --------------------------------------------------
 
     def _decide(self, section: Section) -> None:
-        sideways, first = self.sideways, not self.reports
-        stance = self.feet.of[Leg.REAR]
+        lateral, first = self.lateral, not self.reports
+        stance = self.feet.foot_of_leg[Leg.REAR]
         if not first:
             if self.reports[-1].decision.nominal:
-                sideways.end_step(SIDES[stance], self._foot_side(stance), self.sway())
-            if sideways.wish.turn:
-                self._turn(sideways.wish.turn, self.robot.space.foot[stance, :2].copy())
+                lateral.end_step(SIDES[stance], self._foot_side(stance), self.lateral_state())
+            if lateral.wish.turn:
+                self._turn(lateral.wish.turn, self.robot.space.foot[stance, :2].copy())
         super()._decide(section)
         turn = self.turning(self.time) * self.planner.gait.step_duration
-        sideways.wish = replace(sideways.wish, turn=turn)
-        sideways.walk(self.planner.gait)
-        sideways.aim(SIDES[stance])
-        self._hurry(section)
-        sideways.expect(self.planning.due(Event.TOUCHDOWN))
+        lateral.wish = replace(lateral.wish, turn=turn)
+        lateral.walk(self.planner.gait)
+        lateral.aim(SIDES[stance])
+        self._advance_touchdown(section)
+        lateral.expect(self.supervisor.time_of(Event.TOUCHDOWN))
 
-    def _hurry(self, section: Section) -> None:
+    def _advance_touchdown(self, section: Section) -> None:
         """Let the step that begins at a section end sooner, where its foothold is out of reach."""
-        planning, sensed = self.planning, self.sensing.now
-        report, z, planner = planning.reports[-1], section.of(sensed.state), self.planner
+        supervisor, sensed = self.supervisor, self.observer.now
+        report, z, planner = supervisor.reports[-1], section.of(sensed.state), self.planner
 
         def decide(least: float) -> Decision:
             return decided(planner.decide, z, report.goal.target, (least, inf))
 
-        def look(decision: Decision) -> Outlook:
-            if decision is not planning.reports[-1].decision:
+        def look(decision: Decision) -> LateralForecast:
+            if decision is not supervisor.reports[-1].decision:
                 self._follow(decision)
-            feet = np.array([self._foot_side(foot) for foot in planning.feet])
-            return self.sideways.outlook(planning.path, 0.0, self.sway(), feet)
+            feet = np.array([self._foot_side(foot) for foot in supervisor.feet])
+            return self.lateral.forecast(supervisor.path, 0.0, self.lateral_state(), feet)
 
-        best = hurried(report.decision, decide, look, self._reach)
-        if best is not planning.reports[-1].decision:
+        best = early_touchdown(report.decision, decide, look, self._reach)
+        if best is not supervisor.reports[-1].decision:
             self._follow(best)
 
     def _follow(self, decision: Decision) -> None:
         """Take another decision for the present step, and the path that follows it."""
-        planning, sensed = self.planning, self.sensing.now
-        planning.hold(decision)
-        self._enter(planning.follow(self.node, sensed, self.time).name)
-        self.place.restart()
+        supervisor, sensed = self.supervisor, self.observer.now
+        supervisor.set_decision(decision)
+        self._enter(supervisor.follow(self.node, sensed, self.time).name)
+        self.path_clock.restart()
 
-    def _land(self, leg: Leg) -> None:
-        self.sideways.touch_down(self.time - self.reports[-1].time)
-        super()._land(leg)
+    def _touch_down(self, leg: Leg) -> None:
+        self.lateral.touch_down(self.time - self.reports[-1].time)
+        super()._touch_down(leg)
 
     def _lift(self, foot: int, swung: float = 0.0) -> None:
         super()._lift(foot, swung)
         speed = float(self.robot.contact_velocity[foot, _SIDE])
         self.references.side[foot] = self._foot_side(foot), speed, 0.0
-        self.sideways.aim(SIDES[1 - foot])
+        self.lateral.aim(SIDES[1 - foot])
 
     def _turn(self, angle: float, about: Array) -> None:
         """Turn the heading frame about a point of it; what is kept in it turns back."""
@@ -164,18 +170,18 @@ class FreeController(EmbeddingController):
             ahead[:], side[:] = c * ahead + s * side, c * side - s * ahead
             ahead[0] += about[0]
             side[0] += about[1]
-        self.robot.update(*self.ground.told)
+        self.robot.update(*self.ground.raw_state)
         self._sense()
 
     def _foot_side(self, foot: int) -> float:
         return float(self.robot.space.foot[foot, _SIDE])
 
-    def sway(self) -> Array:
+    def lateral_state(self) -> Array:
         """(2,) y of the CoM, and dy/dt with the angular momentum as the forward speed has it."""
         s = self.robot.space
-        height = self.sensing.now.state[1]
+        height = self.observer.now.state[1]
         speed = s.com_velocity[_SIDE]
-        if self.station.control.momentum_speed:
+        if self.mode.control.momentum_speed:
             speed = speed - s.momentum[0] / (self.robot.mass * height)
         return np.array([s.com[_SIDE], speed])
 
@@ -183,13 +189,15 @@ class FreeController(EmbeddingController):
 
     def _swing(self, q: Array, v: Array, dt: float) -> None:
         super()._swing(q, v, dt)
-        planning = self.planning
-        for leg in self.station.swings:
-            foot = self.feet.of[leg]
+        supervisor = self.supervisor
+        for leg in self.mode.swings:
+            foot = self.feet.foot_of_leg[leg]
             shape, side = self.feet.swing[foot].options, self.references.side[foot]
-            due = planning.landing(foot).time - self.place.time
-            feet = np.array([self._foot_side(foot) for foot in planning.feet])
-            target = self.sideways.foothold(planning.path, self.place.time, self.sway(), feet)
+            due = supervisor.landing(foot).time - self.path_clock.time
+            feet = np.array([self._foot_side(foot) for foot in supervisor.feet])
+            target = self.lateral.foothold(
+                supervisor.path, self.path_clock.time, self.lateral_state(), feet
+            )
             # Without a touchdown on the path there is no time in which to get there.
             if not shape.horizon < due < inf or not isfinite(target):
                 side[1:] = 0.0

@@ -50,8 +50,8 @@ STEEPER = (0.02, 0.04, 0.06)
 _GAIN = 0.8  # share that a steeper angle must leave of the error's price to be taken
 
 
-class Outlook(NamedTuple):
-    """What is expected of a step sideways.
+class LateralForecast(NamedTuple):
+    """What is expected of a step to the side.
 
     Attributes:
         beyond: how far the wanted foothold is beyond its bounds [m]; NaN where none is known.
@@ -62,7 +62,7 @@ class Outlook(NamedTuple):
     price: float
 
 
-def outlook(found: Placement, aim: LateralAim) -> Outlook:
+def lateral_forecast(found: Placement, aim: LateralAim) -> LateralForecast:
     """What is expected of a foothold.
 
     Args:
@@ -70,13 +70,13 @@ def outlook(found: Placement, aim: LateralAim) -> Outlook:
         aim: what it was chosen for.
     """
     error = found.state(found.y) - aim.state
-    return Outlook(abs(found.wanted - found.y), float(error @ aim.cost @ error))
+    return LateralForecast(abs(found.wanted - found.y), float(error @ aim.cost @ error))
 
 
-def hurried(
+def early_touchdown(
     decision: Decision,
     decide: Callable[[float], Decision],
-    look: Callable[[Decision], Outlook],
+    look: Callable[[Decision], LateralForecast],
     reach: float = BEYOND,
 ) -> Decision:
     """The decision for a step, with a steeper touchdown where the foothold is out of reach.
@@ -84,7 +84,7 @@ def hurried(
     Args:
         decision: for the step as it would be.
         decide: the step with a touchdown angle of at least so much [rad].
-        look: what is expected of a decision sideways.
+        look: what is expected of a decision to the side.
         reach: a foothold that is wanted further than this beyond its bounds is out of it [m].
 
     Returns:
@@ -109,7 +109,7 @@ SIDES = (Side.LEFT, Side.RIGHT)
 """Of each foot, in the order of the robot's ``feet``."""
 
 
-class Sideways:
+class LateralPlanner:
     """The lateral half of the walk; all positions are y in the heading frame.
 
     Args:
@@ -202,13 +202,13 @@ class Sideways:
         """
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
 
-    def outlook(self, path: TemplatePath, time: float, com: Array, feet: Array) -> Outlook:
+    def forecast(self, path: TemplatePath, time: float, com: Array, feet: Array) -> LateralForecast:
         """What is to be expected of the next foothold.
 
         Args:
             path, time, com, feet: as for :meth:`foothold`.
         """
-        return outlook(self._find(path, time, com, feet), self._aim)
+        return lateral_forecast(self._find(path, time, com, feet), self._aim)
 
     def foothold(self, path: TemplatePath, time: float, com: Array, feet: Array) -> float:
         """y of the next foothold [m]; NaN where none is known.

@@ -19,7 +19,7 @@ from template_control.whole_body.tasks import (
 # every double stance.
 _DOUBLE = PhaseControl(
     tasks=(ComTask((30.0, 30.0)), OrientationTask((4.0, 4.0, 0.4)), SpareJointTask()),
-    unloads=(Leg.REAR,),
+    unload_legs=(Leg.REAR,),
 )
 
 FREE_PHASES: Phases = {
@@ -35,7 +35,7 @@ FREE_PHASES: Phases = {
         swings=(Leg.REAR, Leg.FRONT),
         clock=Clock.TIME,
         momentum_speed=False,
-        weighs=False,
+        estimate_load=False,
     ),
     Phase.SS: PhaseControl(
         # As in the plane; and the CoM's y is left to the place of the feet.
@@ -48,7 +48,7 @@ FREE_PHASES: Phases = {
         ),
         swings=(Leg.FRONT,),
     ),
-    Phase.DS: replace(_DOUBLE, trims=True),
+    Phase.DS: replace(_DOUBLE, trim_momentum=True),
     # A planner with push-off leaves the trim nothing to do.
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,

@@ -92,7 +92,7 @@ class FrictionEstimate:
         self._speed = SLIDING_SPEED * scale.speed
         self._slides = (_Slide(), _Slide())
 
-    def feel(self, standing: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
+    def update(self, standing: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
         """Look at how the feet move, and what acts on them.
 
         Args:

@@ -9,8 +9,8 @@ from template_control.embedding.learners.friction import FrictionEstimate
 from template_control.embedding.learners.lean import TrunkLean
 from template_control.embedding.learners.momentum import LoadEstimate, MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.state import Learnt
-from template_control.embedding.supervisor import StridePlanning
+from template_control.embedding.state import EstimatorState
+from template_control.embedding.supervisor import StrideSupervisor
 from template_control.robot.biped import Biped
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
@@ -44,9 +44,9 @@ class Learners:
         )
 
     @property
-    def learnt(self) -> Learnt:
+    def state(self) -> EstimatorState:
         """What they know now."""
-        return Learnt(self.load.factor, self.trim.acceleration, self.lean.correction)
+        return EstimatorState(self.load.factor, self.trim.acceleration, self.lean.correction)
 
     def end_stride(self, section: Section, state: Array, nominal: bool) -> None:
         """Learn from the stride that has just ended.
@@ -60,16 +60,16 @@ class Learners:
         self.trim.end_stride(section.padded(section.of(state)), nominal)
         self.lean.end_stride(nominal)
 
-    def begin_stride(self, planning: StridePlanning, trimmed: bool) -> None:
+    def begin_stride(self, supervisor: StrideSupervisor, trimmed: bool) -> None:
         """Take note of the stride that begins.
 
         Args:
-            planning: which has decided it.
+            supervisor: which has decided it.
             trimmed: whether the momentum trim acts somewhere in it.
         """
-        reports = planning.reports
+        reports = supervisor.reports
         if len({report.goal.stride for report in reports[-2:]}) > 1:
             # A walk after a run stands up; one that leant had other drifts.
             self.trim.forget()
         self.lean.aim(reports[-1].goal)
-        self.trim.expect(planning.path if trimmed else None, planning.planner.gait)
+        self.trim.expect(supervisor.path if trimmed else None, supervisor.planner.gait)

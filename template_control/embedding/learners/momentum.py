@@ -136,7 +136,7 @@ class MomentumTrim:
         path = self._path
         if path is None or not nominal:
             return
-        duration = path.due(Event.REAR_LIFTOFF) - path.due(Event.TOUCHDOWN)
+        duration = path.time_of(Event.REAR_LIFTOFF) - path.time_of(Event.TOUCHDOWN)
         if not np.isfinite(duration):
             return
         largest = _LARGEST_DRIFT * self._speed
