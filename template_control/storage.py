@@ -59,7 +59,7 @@ def to_jsonable(value: Any, describe: Callable[[Any], Any] | None = None) -> Any
 
 
 @contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
+def atomic_path(path: str | Path) -> Iterator[Path]:
     """Where to write a file, so that what was there is replaced by a whole one or stays.
 
     Args:
@@ -116,8 +116,8 @@ class Files:
             self._trouble = KeyboardInterrupt("interrupted: not all files are written")
         return None
 
-    def tell(self) -> None:
-        """Once the table is printed.
+    def raise_pending(self) -> None:
+        """Raise what went wrong, once the table is printed.
 
         Raises:
             TemplateControlError: if a file could not be written.
@@ -142,7 +142,7 @@ def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
     arrays = {f.name: getattr(record, f.name) for f in fields(record) if f.name != "metadata"}
     text = json.dumps({"format": kind, **record.metadata})
     write = np.savez if quick else np.savez_compressed
-    with replacing(path) as place, place.open("wb") as file:
+    with atomic_path(path) as place, place.open("wb") as file:
         write(file, metadata=np.array(text), **arrays)
     return Path(path)
 
@@ -270,7 +270,7 @@ def write_text(path: str | Path, text: str) -> Path:
     Raises:
         RecordError: if the file cannot be written.
     """
-    with replacing(path) as place:
+    with atomic_path(path) as place:
         place.write_text(text, encoding="utf-8")
     return Path(path)
 

@@ -1,8 +1,13 @@
-"""Where commands print: text as it is, whatever is in it."""
+"""Terminal output: text as it is, whatever is in it, and progress bars."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from rich.console import Console
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 
 def plain_console(stderr: bool = False) -> Console:
@@ -14,3 +19,33 @@ def plain_console(stderr: bool = False) -> Console:
         stderr: print there, not on standard output.
     """
     return Console(stderr=stderr, markup=False, emoji=False)
+
+
+def bar(console: Console, note: str = "", **options: Any) -> Progress:
+    """Progress bar of tasks that are counted.
+
+    Args:
+        console: where it is drawn.
+        note: rich's format of a text after the count, such as ``{task.fields[failed]} failed``.
+        options: of :class:`rich.progress.Progress`.
+    """
+    # Here, because whoever only asks for help should not wait for it.
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    return Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        *([TextColumn(note)] if note else []),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        **options,
+    )

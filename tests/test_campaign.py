@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from template_control import settings
+from template_control.cli import campaign as command
 from template_control.cli.main import main
-from template_control.cli.trials import campaign as command
 from template_control.errors import ParameterError
 from template_control.robustness import (
     FLOATING_MIX,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from template_control.cli import report as kept
 from template_control.cli.go import _print, summarise_route
 from template_control.cli.main import main
-from template_control.cli.report import kept
 from template_control.run.record import Record
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.scenario_figures import (

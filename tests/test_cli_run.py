@@ -11,8 +11,8 @@ import pytest
 from matplotlib.image import imread
 
 import template_control as tc
+from template_control.cli import report as kept
 from template_control.cli.main import main
-from template_control.cli.report import kept
 from template_control.run.record import Record
 from template_control.run.summary import summarise
 from template_control.slip.gaits.running_gait import running_gait

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from template_control.cli import report as kept
 from template_control.cli.main import main
-from template_control.cli.report import kept
 from template_control.errors import RecordError
 from template_control.robot.library import robot_path
 from template_control.run.config import RunConfig

@@ -14,7 +14,7 @@ import pytest
 import template_control as tc
 from template_control import settings
 from template_control.cli.main import main
-from template_control.cli.options.config import prepared
+from template_control.cli.run_options import prepared
 from template_control.run.config import RunConfig
 from template_control.run.record import Record
 from template_control.run.specs import GaitSpec, OwnPlanner, RobotSpec

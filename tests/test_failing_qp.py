@@ -10,7 +10,7 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.cli.report.run_table import failures_text
+from template_control.cli.report import failures_text
 from template_control.robustness.severity_sweep import trial
 from template_control.run.failures import QpFailures
 from template_control.run.summary import summarise

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import template_control as tc
-from template_control.cli.options.world import simulation_choice
+from template_control.cli.world_options import simulation_choice
 from template_control.errors import ParameterError
 from template_control.plant.free.bullet import FreeBulletPlant
 from template_control.plant.free.mujoco import FreeMujocoPlant

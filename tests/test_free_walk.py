@@ -8,8 +8,8 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.cli.options.world import simulation_choice
-from template_control.cli.report.run_table import in_space
+from template_control.cli.report import floating_rows
+from template_control.cli.world_options import simulation_choice
 from template_control.errors import ParameterError
 from template_control.robot.library import load_floating_robot
 from template_control.run.data_frame import columns
@@ -154,7 +154,7 @@ def test_a_joint_past_its_limit_is_told():
         },
     }
     rows = {}
-    in_space(figures, rows.__setitem__)
+    floating_rows(figures, rows.__setitem__)
     assert rows["hip angle"] == "-0.50 to +0.20 of -0.4 to 0.4 rad, past its limit"
     assert rows["knee angle"] == "+0.10 to +1.00 of 0 to 2 rad"
 

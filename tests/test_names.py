@@ -6,7 +6,7 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.cli.report.run_table import print_table
+from template_control.cli.report import print_table
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment

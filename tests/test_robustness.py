@@ -9,7 +9,7 @@ import pytest
 
 import template_control as tc
 from template_control import settings
-from template_control.cli.trials import robustness as command
+from template_control.cli import robustness as command
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.plant.mujoco import MujocoOptions

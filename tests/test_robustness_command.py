@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from template_control.cli import robustness as command
 from template_control.cli.main import build_parser, main
-from template_control.cli.options.robot import robot_choice
-from template_control.cli.trials import robustness as command
+from template_control.cli.run_options import robot_choice
 from template_control.robot.library import robot_path
 from template_control.robustness import disturbances, severity_sweep
 from template_control.robustness.disturbances import DISTURBANCES
@@ -165,7 +165,7 @@ def test_the_snippet_of_the_documentation_runs(capfd):
 @pytest.mark.slow(seconds=15)
 @pytest.mark.usefixtures("brief")
 def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
-    others = {"--gait", "--free", "--plant"}
+    others = {"--gait", "--floating-base", "--plant"}
     (line,) = (x for x in commands() if "--quick" in x and not others & {*x.split()})
     # One level of two, and one trial of two: the test of the files runs all.
     monkeypatch.setattr(severity_sweep, "_QUICK_LEVELS", 1)

@@ -15,8 +15,8 @@ import pytest
 from sweep_work import alive, hold, square, wait_until
 
 import template_control as tc
+from template_control.cli import report as kept
 from template_control.cli.main import main
-from template_control.cli.report import kept
 from template_control.run.record import Record, RunInterrupted
 from template_control.sweep import executor
 from template_control.sweep.executor import workers

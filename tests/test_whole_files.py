@@ -12,7 +12,7 @@ import pytest
 from template_control.cli.main import main
 from template_control.errors import RecordError
 from template_control.run.record import Record
-from template_control.storage import replacing
+from template_control.storage import atomic_path
 from template_control.view.figures import save_figures
 from template_control.view.replay.replay import save_film, save_html
 
@@ -37,7 +37,7 @@ def contents(folder):
 def test_a_file_is_replaced_when_the_new_one_is_whole(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with replacing(path) as place:
+    with atomic_path(path) as place:
         place.write_text("new")
         assert path.read_text() == "old"
         assert place.suffix == ".txt"
@@ -47,7 +47,7 @@ def test_a_file_is_replaced_when_the_new_one_is_whole(tmp_path):
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
 def test_an_error_leaves_the_old_file(tmp_path, error):
     def write(path):
-        with replacing(path) as place:
+        with atomic_path(path) as place:
             place.write_text("ne")
             raise error
 
@@ -63,14 +63,14 @@ def test_rights_and_links_stay(tmp_path):
     path.write_text("old")
     path.chmod(0o640)
     link.symlink_to(path)
-    with replacing(link) as place:
+    with atomic_path(link) as place:
         place.write_text("new")
     assert link.is_symlink()
     assert path.read_text() == "new"
     assert stat.S_IMODE(path.stat().st_mode) == 0o640
     mask = os.umask(0o022)
     try:
-        with replacing(tmp_path / "b.txt"):
+        with atomic_path(tmp_path / "b.txt"):
             pass
     finally:
         os.umask(mask)
@@ -78,18 +78,18 @@ def test_rights_and_links_stay(tmp_path):
 
 
 def test_a_device_stays_one(tmp_path):
-    with replacing("/dev/null") as place:
+    with atomic_path("/dev/null") as place:
         place.write_text("nothing")
     assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
     told = "cannot write /dev/full: No space left on device"
-    with pytest.raises(RecordError, match=told), replacing("/dev/full") as place:
+    with pytest.raises(RecordError, match=told), atomic_path("/dev/full") as place:
         place.write_text("nothing")
     assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
 
 
 @pytest.mark.parametrize(("place", "why"), [("", "Is a directory"), ("no/a.txt", "No such file")])
 def test_a_place_that_takes_no_file_is_named(tmp_path, place, why):
-    with pytest.raises(RecordError, match=f"cannot write .*: {why}"), replacing(tmp_path / place):
+    with pytest.raises(RecordError, match=f"cannot write .*: {why}"), atomic_path(tmp_path / place):
         pass
     assert contents(tmp_path) == {}
 

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(describe(AUTOMATON)))
     else:
         _print(figure)
-    files.tell()
+    files.raise_pending()
     return 0
 
 

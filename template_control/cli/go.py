@@ -12,19 +12,21 @@ from rich.table import Table
 
 from template_control import view
 from template_control.checks import option_types as values
-from template_control.cli.options.config import add_config, prepared
-from template_control.cli.options.gait import add_strict
-from template_control.cli.options.output import add_output_options
-from template_control.cli.options.robot import add_robot_options
-from template_control.cli.options.world import (
+from template_control.cli.interrupts import INTERRUPTED
+from template_control.cli.report import (
+    failures_text,
+    nearest_text,
+    run_and_keep,
+    speed_text,
+)
+from template_control.cli.run_options import add_config, add_robot_options, add_strict, prepared
+from template_control.cli.world_options import (
     add_catch_option,
     add_disturbance_options,
     add_length_options,
+    add_output_options,
     add_world_options,
 )
-from template_control.cli.report.kept import run_and_keep
-from template_control.cli.report.output import INTERRUPTED
-from template_control.cli.report.run_table import failures_text, nearest_text, speed_text
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.run.summary import OTHERS, STRIDES, summarise

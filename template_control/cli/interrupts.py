@@ -10,7 +10,8 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-from template_control.cli.report.output import INTERRUPTED
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it."""
 
 _AGAIN = 0.02  # [s] after which an interrupt is tried again: a callback is over by then
 _STDERR = 2

@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple, NoReturn
 
 from template_control.cli.interrupts import (
+    INTERRUPTED,
     end_at_once,
     end_quietly,
     insist,
@@ -21,7 +22,6 @@ from template_control.cli.interrupts import (
     on_signals,
     stopped,
 )
-from template_control.cli.report.output import INTERRUPTED
 from template_control.errors import ParameterError, TemplateControlError
 
 
@@ -60,11 +60,11 @@ _COMMANDS = {
     ),
     "plots": _Command("template_control.cli.plots", "draw the figures of a recorded run"),
     "robustness": _Command(
-        "template_control.cli.trials.robustness",
+        "template_control.cli.robustness",
         "raise disturbances until a robot's walk breaks, and tell how much it takes",
     ),
     "campaign": _Command(
-        "template_control.cli.trials.campaign",
+        "template_control.cli.campaign",
         "disturb a robot by everything at once, many times, and tell how sure its gait is",
     ),
     "slip": _Command(

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import argparse
 
-from template_control.cli.options.config import add_config, prepared
-from template_control.cli.options.gait import add_running_options
-from template_control.cli.options.output import add_output_options
-from template_control.cli.options.robot import add_robot_options
-from template_control.cli.options.world import (
-    add_disturbance_options,
-    add_length_options,
-    add_world_options,
+from template_control.cli.run_options import (
+    add_config,
+    add_robot_options,
+    add_running_options,
+    prepared,
 )
 from template_control.cli.walk import report
+from template_control.cli.world_options import (
+    add_disturbance_options,
+    add_length_options,
+    add_output_options,
+    add_world_options,
+)
 from template_control.run.config import RunConfig
 from template_control.run.specs import GaitSpec
 

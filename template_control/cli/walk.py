@@ -5,25 +5,25 @@ from __future__ import annotations
 import argparse
 import json
 
-from template_control.cli.options.config import add_config, prepared
-from template_control.cli.options.gait import (
+from template_control.cli.interrupts import INTERRUPTED
+from template_control.cli.report import print_table, run_and_keep
+from template_control.cli.run_options import (
+    add_config,
     add_gait_options,
     add_planner_options,
+    add_robot_options,
     add_stand_options,
     add_strict,
+    prepared,
 )
-from template_control.cli.options.output import add_output_options
-from template_control.cli.options.robot import add_robot_options
-from template_control.cli.options.world import (
+from template_control.cli.world_options import (
     add_catch_option,
     add_course_options,
     add_disturbance_options,
     add_length_options,
+    add_output_options,
     add_world_options,
 )
-from template_control.cli.report.kept import run_and_keep
-from template_control.cli.report.output import INTERRUPTED
-from template_control.cli.report.run_table import print_table
 from template_control.errors import ScenarioError
 from template_control.run.config import PreparedRun, RunConfig
 from template_control.run.summary import summarise

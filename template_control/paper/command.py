@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps({"name": options.name, **result.data, "figures": [str(p) for p in paths]}))
     else:
         _print(result, paths)
-    files.tell()
+    files.raise_pending()
     return 0
 
 

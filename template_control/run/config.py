@@ -124,12 +124,12 @@ class RunConfig(Checked):
         """
         if not self.robot.free and self.simulation.course != HeadingCommand():
             raise ParameterError(
-                "a course, of turning rate or step width, is for a free robot: give --free, or"
-                " leave it out"
+                "a course, of turning rate or step width, is for a free robot: give"
+                " --floating-base, or leave it out"
             )
         if not self.robot.free and any(push.direction for push in self.simulation.pushes):
             raise ParameterError(
-                "a push with a direction is for a free robot: give --free, or leave it out"
+                "a push with a direction is for a free robot: give --floating-base, or leave it out"
             )
         robot = self.robot.load()
         ready(WALK)  # before the gait is looked for, which would compile a part of it alone

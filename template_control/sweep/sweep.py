@@ -19,14 +19,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress
 
 from template_control.checks.checked import Checked
 from template_control.checks.fitting import check, shown
@@ -34,7 +27,7 @@ from template_control.checks.ranges import Count, Index, Range
 from template_control.errors import SweepError
 from template_control.sweep.executor import ExecutorLostError, check_pickles, run_calls
 from template_control.sweep.file import Outcome, SweepFile, header
-from template_control.terminal import plain_console
+from template_control.terminal import bar, plain_console
 
 Item = dict[str, Any]
 
@@ -202,12 +195,14 @@ def sweep(
     grown = rows if options.grows else None
     head = header(function, seed, rows, whole=not options.grows)
     book = nullcontext() if path is None else SweepFile(path, head, grown)
-    with book as file, _bar(options.progress) as bar:
+    with book as file, _bar(options.progress) as progress:
         ledger: dict[int, Outcome] = {} if file is None else file.finished
         if options.retry_failed:
             ledger = {i: outcome for i, outcome in ledger.items() if outcome.error is None}
         failed = sum(outcome.error is not None for outcome in ledger.values())
-        task = bar.add_task(options.label, total=len(rows), completed=len(ledger), failed=failed)
+        task = progress.add_task(
+            options.label, total=len(rows), completed=len(ledger), failed=failed
+        )
 
         def keep(index: int, outcome: Outcome) -> None:
             nonlocal failed
@@ -215,13 +210,13 @@ def sweep(
                 file.append(index, rows[index], seeds[index], outcome)
             ledger[index] = outcome
             failed += outcome.error is not None
-            bar.update(task, completed=len(ledger), failed=failed)
+            progress.update(task, completed=len(ledger), failed=failed)
 
         waiting = [i for i in range(len(rows)) if i not in ledger]
         calls = ((i, rows[i] | ({"seed": seeds[i]} if takes_seed else {})) for i in waiting)
         try:
             if waiting:
-                run_calls(function, calls, executor, options.in_flight, keep, bar.refresh)
+                run_calls(function, calls, executor, options.in_flight, keep, progress.refresh)
         except ExecutorLostError as error:
             kept = (
                 "nothing is kept: give a path, to go on from there the next time"
@@ -268,18 +263,10 @@ def _checked(
 
 
 def _bar(shown: bool) -> Progress:
-    """On stderr; without a thread of its own, as workers may be forked meanwhile."""
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[failed]} failed"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    return Progress(
-        *columns,
-        console=plain_console(stderr=True),
+    """Bar on stderr; without a thread of its own, as workers may be forked meanwhile."""
+    return bar(
+        plain_console(stderr=True),
+        "{task.fields[failed]} failed",
         auto_refresh=False,
         redirect_stdout=False,
         redirect_stderr=False,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Phase
-from template_control.storage import replacing
+from template_control.storage import atomic_path
 
 LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
 WINDOW = 2.2  # [s], about four steps
@@ -76,6 +76,6 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = DPI) -> Path:
     Raises:
         RecordError: if the file cannot be written.
     """
-    with replacing(path) as place:
+    with atomic_path(path) as place:
         figure.savefig(place, dpi=dpi)
     return Path(path)

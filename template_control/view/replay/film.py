@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from template_control.errors import RecordError
 from template_control.run.record import FloatingRecord, Record
-from template_control.storage import replacing
+from template_control.storage import atomic_path
 from template_control.view.replay.playback import (
     Playback,
     carrying,
@@ -322,7 +322,7 @@ def write_film(
         RecordError: if the ending is another, ffmpeg is missing, or the file cannot be written.
     """
     writer = _writer(path, fps, len(playback.rows))
-    with replacing(path) as place:
+    with atomic_path(path) as place:
         free = isinstance(playback.record, FloatingRecord)
         stage = SpaceStage(playback) if free else _Stage(playback)
         try:

@@ -20,7 +20,7 @@ import umsgpack
 import zmq
 
 from template_control.errors import RecordError
-from template_control.storage import replacing
+from template_control.storage import atomic_path
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
@@ -92,7 +92,7 @@ def write_page(path: Path, title: str, commands: list[Any]) -> Path:
         viewer=_VIEWER.read_text(encoding="utf-8"),
         commands=",\n".join(f'"{text}"' for text in packed),
     )
-    with replacing(path) as place:
+    with atomic_path(path) as place:
         place.write_text(page, encoding="utf-8")
     return path
 

@@ -1,12 +1,17 @@
-"""The options that say how a run goes: plant, disturbances, length."""
+"""Options of how a run goes (plant, disturbances, length), and of where it is kept."""
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Annotated, Any
 
+from template_control.checks import option_types as values
 from template_control.checks import typed
 from template_control.checks.option_types import MANY, SEED, number, whole
 from template_control.checks.ranges import Index, NotNegative, Range
@@ -18,6 +23,7 @@ from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.terrain.spec import terrain_from
 from template_control.run.options import HeadingCommand, Phase, Push, SimulationOptions, TurningRate
 from template_control.run.simulation import STEPS
+from template_control.storage import writing
 
 _PLANTS = {options.kind: options for options in (PlantOptions, MujocoOptions, IdealOptions)}
 _DEFAULT = SimulationOptions().for_robot(free=False)
@@ -103,7 +109,7 @@ def add_disturbance_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_course_options(parser: argparse.ArgumentParser) -> None:
-    """Add ``--turn`` and ``--step-width``, which go with ``--free``."""
+    """Add ``--turn`` and ``--step-width``, which go with ``--floating-base``."""
     parser.add_argument(
         "--turn",
         action="append",
@@ -237,3 +243,45 @@ def _push(text: str) -> Push:
         typed.number(f"{where}: phase", phase or "0", Phase),
         direction=math.radians(direction),
     )
+
+
+def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
+    """Add ``--output``, ``--json`` and ``--no-figures``.
+
+    Args:
+        parser: of the command.
+        folder: where runs go if nothing else is said.
+    """
+    parser.add_argument(
+        "--output",
+        type=values.path,
+        default=Path(folder),
+        help=f"folder for run.npz, run.toml and figures, {folder} if not given; a run that is"
+        " there is replaced, and the command says so",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
+    )
+    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+
+
+@contextmanager
+def output_folder(folder: Path) -> Iterator[Path]:
+    """Keep a folder for a run; says on stderr if a run in it will be replaced.
+
+    Args:
+        folder: as asked for.
+
+    Yields:
+        The folder; see :func:`~template_control.storage.writing`.
+
+    Raises:
+        RecordError: if nothing can be written there, or another command writes there now.
+    """
+    with writing(folder):
+        if (folder / "run.npz").exists():
+            print(
+                f"template-control: the run in {folder} will be replaced; --output keeps both",
+                file=sys.stderr,
+            )
+        yield folder

@@ -12,8 +12,8 @@ from rich.table import Table
 from template_control import settings
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
-from template_control.cli.options.robot import add_robot_options, robot_choice
-from template_control.cli.trials.common import (
+from template_control.cli.run_options import add_robot_options, robot_choice
+from template_control.cli.trial_options import (
     add_engine,
     add_gait,
     add_printed,
@@ -122,7 +122,7 @@ def _try(options: argparse.Namespace, conditions: CampaignConfig, folder: Path) 
         print(markdown(found))
     else:
         _print_tables(found, falls, figure)
-    files.tell()
+    files.raise_pending()
     return 0
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from template_control.checks.option_types import SPEED, number, whole
 from template_control.checks.ranges import Range
-from template_control.cli.report.output import INTERRUPTED
+from template_control.cli.interrupts import INTERRUPTED
 from template_control.robustness.subject import ENGINES, Subject
 from template_control.view.style import save_figure
 

@@ -10,8 +10,8 @@ from typing import Any
 from rich.table import Table
 
 from template_control.checks import option_types as values
-from template_control.cli.options.robot import add_robot_options, robot_choice
-from template_control.cli.trials.common import (
+from template_control.cli.run_options import add_robot_options, robot_choice
+from template_control.cli.trial_options import (
     add_engine,
     add_gait,
     add_printed,
@@ -111,7 +111,7 @@ def _measure(options: argparse.Namespace, subject: Subject, folder: Path) -> int
         print(markdown(found))
     else:
         _print_table(found, figure)
-    files.tell()
+    files.raise_pending()
     return 0
 
 

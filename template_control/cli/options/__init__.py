@@ -1,1 +1,0 @@
-"""Groups of options that commands share, and the run that they describe."""

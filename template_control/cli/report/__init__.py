@@ -1,1 +1,0 @@
-"""What commands that make a run do with it: keep it, and tell it."""
