@@ -264,12 +264,13 @@ def private_imports(tree):
 
 
 def _names_a_gait(node):
-    """Whether an operand is a member of Phase, a gait's or a node's name, or a group of these."""
+    """Whether an operand is a phase, a kind of stride, a node's name, or a group of these."""
     if isinstance(node, ast.Tuple | ast.List | ast.Set):
         return any(map(_names_a_gait, node.elts))
     if isinstance(node, ast.Attribute):
         owner = node.value
-        return "Phase" in (getattr(owner, "id", None), getattr(owner, "attr", None))
+        names = (getattr(owner, "id", None), getattr(owner, "attr", None))
+        return "Phase" in names or "StrideKind" in names
     if isinstance(node, ast.Constant):
         return node.value in GAIT_NAMES
     return (
@@ -323,6 +324,34 @@ def undocumented(tree):
 
 
 @cache
+def exported_names():
+    """Names in the stubs of the packages."""
+    return {
+        alias.asname
+        for path in sources(suffix=".pyi").values()
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def inner_checks(tree):
+    """Functions that check their arguments and are called by the library alone."""
+    bases = {
+        ast.unparse(base)
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and node.name in exported_names()
+        for base in node.bases
+    }
+    for owner in tree.body:
+        if getattr(owner, "name", None) in exported_names() | bases:
+            continue
+        for node in ast.walk(owner):
+            if isinstance(node, Function) and "checked" in map(ast.unparse, node.decorator_list):
+                yield f"{node.lineno}: {node.name} is not exported: let its callers check"
+
+
+@cache
 def documented_names():
     """Names of the library's classes, functions and methods that have a docstring."""
     return {
@@ -372,7 +401,9 @@ def faults(rule, folder):
     "folder", [LIBRARY, ROOT / "benchmarks", ROOT / "examples"], ids=lambda f: f.name
 )
 @pytest.mark.parametrize(
-    "rule", [many_parameters, many_positional, private_imports], ids=lambda r: r.__name__
+    "rule",
+    [many_parameters, many_positional, private_imports, inner_checks],
+    ids=lambda r: r.__name__,
 )
 def test_every_file_keeps_the_rule(rule, folder):
     assert_none(faults(rule, folder))
@@ -410,10 +441,14 @@ def test_everything_public_is_documented(rule):
         (gait_branches, "def f(n):\n return WEIGHTS[n]", 0),
         (gait_branches, "def f(n):\n return 1 if n.phase is Phase.SS else 2", 1),
         (gait_branches, "def f(n):\n return n.phase in (vocabulary.Phase.SS, 3)", 1),
+        (gait_branches, "def f(s):\n return s == StrideKind.WALK", 1),
         (gait_branches, "def f(n):\n return n == STRIDE_START['w'] or n == 'w'", 2),
         (gait_branches, "def f(n):\n match n:\n  case Phase.DS: pass\n  case 'DS_sc^w': pass", 2),
         (gait_branches, "def f(n):\n return n.startswith('SS')", 1),
         (gait_branches, "def f(n):\n return n.startswith('left')", 0),
+        (inner_checks, "@checked\ndef simulate(a): ...\n@checked\ndef f(a): ...", 1),
+        (inner_checks, "class A:\n @checked\n def __init__(self): ...\nclass Record(A): ...", 0),
+        (inner_checks, "class A:\n @checked\n def __init__(self): ...", 1),
         (undocumented, "def f(): ...\nclass A:\n def g(self): ...\n def _h(self): ...", 3),
         (undocumented, "class _A:\n def g(self): ...", 0),
         (without_arguments, "def f(a, b):\n '''Do.'''", 1),

@@ -214,7 +214,6 @@ def _shortest_leg(gait: RunningGait) -> float:
     return float(result[RESULTS - 2])
 
 
-@checked
 def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Positive = 1.0) -> None:
     """Check that a robot can run with an apex of a given height.
 

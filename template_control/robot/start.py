@@ -78,7 +78,6 @@ class FloatingBasePose(Checked):
     pitch: float = 0.0
 
 
-@checked
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     """State of a robot whose CoM and feet are in a pose.
 

@@ -165,7 +165,6 @@ def deadbeat_figure(
     return figure
 
 
-@checked
 def speed_family_figure(
     quantities: Mapping[str, Sequence[Array]], pairs: Mapping[str, Mapping[str, Sequence[Array]]]
 ) -> Figure:

@@ -55,7 +55,6 @@ def _keeping_up(scenario: Scenario) -> RunningOptions:
     return replace(options, pace=max(options.pace, pace))
 
 
-@checked
 def first_speed(route: Route) -> float:
     """dx/dt that the gait has with which a route begins, after a stand where it has one [m/s]."""
     followed = _followed(route)

@@ -231,7 +231,6 @@ def gaits_by_speed(parameters: SlipParameters) -> Family:
     return Family(partial(chain.gait, parameters), ends)
 
 
-@checked
 def carrying_planners(walk: Planner, options: StandingOptions) -> dict[str, Planner]:
     """Planners of what a slow walk breaks into: it is carried on, or stands and starts again.
 

@@ -8,7 +8,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.checks.checked import checked
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.bullet_bodies import load_body
 from template_control.plant.quiet import silenced
@@ -39,7 +38,6 @@ class FreeBulletPlant(BulletPlant):
         RobotError: if PyBullet does not read the URDF, or reads another robot.
     """
 
-    @checked
     def __init__(self, robot: FloatingBaseBiped, options: PlantOptions) -> None:
         super().__init__(robot, options)
         self._away = self._inertial.inverse()

@@ -8,7 +8,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.checks.checked import checked
 from template_control.plant.mjcf import (
     FOOT,
     TRUNK,
@@ -46,7 +45,6 @@ class FreeMujocoPlant(MujocoPlant):
         RobotError: if MuJoCo does not take the model, or makes another robot of it.
     """
 
-    @checked
     def __init__(self, robot: FloatingBaseBiped, options: MujocoOptions) -> None:
         super().__init__(robot, options)
 

@@ -325,7 +325,6 @@ def gait_from_energy(
     return _gait(name, parameters, *roots[-1])
 
 
-@checked
 def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
     """Share of a stride's duration in which no foot is on the ground.
 

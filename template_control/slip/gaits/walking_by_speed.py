@@ -272,7 +272,6 @@ _PAPER = (StrideKind.WALK,)  # strides
 _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 
 
-@checked
 def speed_range(parameters: SlipParameters) -> tuple[float, float]:
     """Slowest and fastest dx/dt at VLO of the family [m/s]."""
     unit = parameters.speed_unit
