@@ -92,7 +92,7 @@ def test_axes_that_turn_do_not_forget_a_wall(robot, default_gait):
     for _ in range(2 * DOUBT):
         controller.tick(q, v, np.ones(2, dtype=bool), DT, wall)
     np.testing.assert_array_equal(controller.observer.now.contact, [True, False])
-    assert controller._lean(0.05, 0), "the axes turn"
+    assert controller._tilt_axes(0.05, 0), "the axes turn"
     np.testing.assert_array_equal(controller.observer.now.contact, [True, False])
 
 

@@ -142,8 +142,8 @@ def test_a_foot_that_comes_down_and_is_nearly_there_is_set_down(speed, foothold,
     assert (swing.y[0] > 0.03) == rises
 
 
-@pytest.mark.parametrize("reaching", [False, True])
-def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(reaching):
+@pytest.mark.parametrize("overdue", [False, True])
+def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(overdue):
     """The path of an overdue foot knows a later touchdown, of lower ground."""
     feet = Feet(SwingOptions(), np.zeros((2, 2, 3)))
     swing = feet.swing[1]
@@ -155,12 +155,12 @@ def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(reaching):
         SimpleNamespace(blocked=lambda foot: True),
         SimpleNamespace(furthest=np.zeros(2)),
     )
-    supervisor = SimpleNamespace(reaching=reaching, landing=lambda foot: landing)
-    station = SimpleNamespace(swings=(Leg.FRONT,), awaited=Leg.FRONT)
+    supervisor = SimpleNamespace(without_touchdown=overdue, landing=lambda foot: landing)
+    mode = SimpleNamespace(swings=(Leg.FRONT,), next_touchdown_leg=Leg.FRONT)
     for _ in range(10):
-        in_air.advance(station, supervisor, None, 0.0, np.array([0.25, 0.9]), 1e-3)
+        in_air.advance(mode, supervisor, None, 0.0, np.array([0.25, 0.9]), 1e-3)
     assert swing.x[0] == 0.57
-    assert (swing.y[0] < -0.006) if reaching else (swing.y[0] > 0.0)
+    assert (swing.y[0] < -0.006) if overdue else (swing.y[0] > 0.0)
 
 
 def test_a_foot_that_is_held_comes_down_late():
