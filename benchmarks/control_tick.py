@@ -24,8 +24,7 @@ from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.robot_template import default_gait, template_for
-from template_control.plant.bullet import BulletPlant, PlantOptions
-from template_control.plant.free.bullet import FreeBulletPlant
+from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import load_floating_robot, load_robot
@@ -48,9 +47,9 @@ _TICK, _PHYSICS = "whole tick", "physics step (not in the tick)"
 Times = dict[str, np.ndarray[Any, Any]]
 
 
-def _plant(robot: Biped, options: PlantOptions) -> BulletPlant | FreeBulletPlant:
+def _plant(robot: Biped, options: PlantOptions) -> BulletPlant | FloatingBaseBulletPlant:
     if isinstance(robot, FloatingBaseBiped):
-        return FreeBulletPlant(robot, options)
+        return FloatingBaseBulletPlant(robot, options)
     assert isinstance(robot, PlanarBiped)
     return BulletPlant(robot, options)
 

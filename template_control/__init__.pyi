@@ -22,10 +22,10 @@ from .embedding.robot_template import template_for as template_for
 from .embedding.robot_template import walking_speeds as walking_speeds
 from .errors import TemplateControlError as TemplateControlError
 from .plant.bullet import PlantOptions as PlantOptions
-from .plant.ground import GroundStep as GroundStep
 from .plant.ideal import IdealOptions as IdealOptions
 from .plant.mujoco import MujocoOptions as MujocoOptions
-from .plant.terrain.terrain import Terrain as Terrain
+from .plant.terrain import GroundStep as GroundStep
+from .plant.terrain import Terrain as Terrain
 from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
 from .robot.library import load_floating_robot as load_floating_robot

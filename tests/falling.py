@@ -3,15 +3,16 @@
 import numpy as np
 import pinocchio as pin
 
-from template_control.plant.bullet import BulletPlant, PlantOptions
-from template_control.plant.free.bullet import FreeBulletPlant
-from template_control.plant.free.mujoco import FreeMujocoPlant
+from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
-from template_control.plant.mujoco import MujocoOptions, MujocoPlant
+from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions, MujocoPlant
 
 DT = 1e-4  # [s]
 FALL = 0.1  # [s]
-FREE = {"pybullet": (FreeBulletPlant, PlantOptions), "mujoco": (FreeMujocoPlant, MujocoOptions)}
+FREE = {
+    "pybullet": (FloatingBaseBulletPlant, PlantOptions),
+    "mujoco": (FloatingBaseMujocoPlant, MujocoOptions),
+}
 PLANAR = {
     "pybullet": (BulletPlant, PlantOptions),
     "mujoco": (MujocoPlant, MujocoOptions),

@@ -11,7 +11,7 @@ from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import BulletPlant, PlantOptions
-from template_control.plant.ground import GroundStep
+from template_control.plant.terrain import GroundStep
 from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
 from template_control.run.options import SimulationOptions

@@ -7,9 +7,13 @@ from scipy.linalg import solve_discrete_are
 import template_control as tc
 from template_control.cli.main import build_parser, main
 from template_control.errors import ParameterError
-from template_control.estimation.base_filter import BaseFilter, BaseFilterOptions
+from template_control.estimation.filters import (
+    BaseFilter,
+    BaseFilterOptions,
+    JointFilter,
+    JointFilterOptions,
+)
 from template_control.estimation.imu import ImuOptions, ImuSensors
-from template_control.estimation.joint_filter import JointFilter, JointFilterOptions
 from template_control.robustness.severity_sweep import gait_errors
 from template_control.run.config import RunConfig
 from template_control.run.options import SimulationOptions

@@ -9,11 +9,9 @@ from other_frames import rewritten
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.robot_template import default_gait, template_for
 from template_control.errors import RobotError
-from template_control.plant.bullet import BulletPlant, PlantOptions
-from template_control.plant.free.bullet import FreeBulletPlant
-from template_control.plant.free.mujoco import FreeMujocoPlant
+from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
-from template_control.plant.mujoco import MujocoOptions, MujocoPlant
+from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions, MujocoPlant
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
@@ -31,8 +29,8 @@ PLANTS = {
     "mujoco": (MujocoPlant, MujocoOptions()),
 }
 FREE_PLANTS = {
-    "pybullet": (FreeBulletPlant, PlantOptions()),
-    "mujoco": (FreeMujocoPlant, MujocoOptions()),
+    "pybullet": (FloatingBaseBulletPlant, PlantOptions()),
+    "mujoco": (FloatingBaseMujocoPlant, MujocoOptions()),
 }
 
 

@@ -9,8 +9,8 @@ import pytest
 import template_control as tc
 from template_control.cli.world_options import simulation_choice
 from template_control.errors import ParameterError
-from template_control.plant.free.bullet import FreeBulletPlant
-from template_control.plant.free.mujoco import FreeMujocoPlant
+from template_control.plant.bullet import FloatingBaseBulletPlant
+from template_control.plant.mujoco import FloatingBaseMujocoPlant
 from template_control.run.backends import FloatingBackend, PlanarBackend
 
 FORCE = (8.0, -5.0)  # [N] along x and y
@@ -24,8 +24,8 @@ def bolt():
 @pytest.mark.parametrize(
     "plant_of",
     [
-        lambda robot: FreeBulletPlant(robot, tc.PlantOptions()),
-        lambda robot: FreeMujocoPlant(robot, tc.MujocoOptions()),
+        lambda robot: FloatingBaseBulletPlant(robot, tc.PlantOptions()),
+        lambda robot: FloatingBaseMujocoPlant(robot, tc.MujocoOptions()),
     ],
     ids=("pybullet", "mujoco"),
 )

@@ -8,10 +8,8 @@ import pybullet
 import pytest
 
 from template_control.errors import ParameterError, RobotError
-from template_control.plant.bullet import PlantOptions
-from template_control.plant.free.bullet import FreeBulletPlant
-from template_control.plant.free.mujoco import FreeMujocoPlant
-from template_control.plant.mujoco import MujocoOptions
+from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions
+from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
 from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
 from template_control.robot.start import FloatingBasePose, floating_state_in
@@ -39,7 +37,7 @@ def states(robot, count=10):
 
 def integrated(plant):
     """(3,) the point of the trunk whose velocity the engine integrates, in its frame [m]."""
-    if isinstance(plant, FreeMujocoPlant):
+    if isinstance(plant, FloatingBaseMujocoPlant):
         return np.zeros(3)
     told = pybullet.getDynamicsInfo(plant.body, -1, physicsClientId=plant.client)
     return np.array(told[3])
@@ -73,8 +71,8 @@ def model_acceleration(robot, q, v, torque, point):
 PLANTS = pytest.mark.parametrize(
     "plant_of",
     [
-        lambda robot: FreeBulletPlant(robot, PlantOptions()),
-        lambda robot: FreeMujocoPlant(robot, MujocoOptions()),
+        lambda robot: FloatingBaseBulletPlant(robot, PlantOptions()),
+        lambda robot: FloatingBaseMujocoPlant(robot, MujocoOptions()),
     ],
     ids=("pybullet", "mujoco"),
 )

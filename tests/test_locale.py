@@ -19,8 +19,8 @@ if comma:
     locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
 import template_control as tc
 from template_control.robot import load_floating_robot
-from template_control.plant.free.bullet import FreeBulletPlant
-from template_control.plant.free.mujoco import FreeMujocoPlant
+from template_control.plant.bullet import FloatingBaseBulletPlant
+from template_control.plant.mujoco import FloatingBaseMujocoPlant
 
 def points():
     buffer = ctypes.create_string_buffer(32)
@@ -38,7 +38,10 @@ for world in worlds:
     bits = hashlib.sha256(record.q.tobytes() + record.contact_force.tobytes()).hexdigest()
     found[world.kind] = [record.steps, bits]
 free = load_floating_robot("bolt")
-for plant in (FreeBulletPlant(free, tc.PlantOptions()), FreeMujocoPlant(free, tc.MujocoOptions())):
+for plant in (
+    FloatingBaseBulletPlant(free, tc.PlantOptions()),
+    FloatingBaseMujocoPlant(free, tc.MujocoOptions()),
+):
     q, v, force = free.neutral(), np.zeros(free.nv), np.zeros((2, 3))
     q[2], felt = 0.5, []
     plant.reset(q, v)
@@ -103,7 +106,7 @@ def test_a_run_in_every_engine_has_the_same_bits_where_decimals_have_a_comma(loc
 THREADS = """
 import ctypes, json, locale, threading
 locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
-from template_control.plant.c_locale import decimal_points
+from template_control.plant.c_library import decimal_points
 
 def points():
     buffer = ctypes.create_string_buffer(32)

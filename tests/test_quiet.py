@@ -15,7 +15,7 @@ def test_pybullet_is_imported_in_silence():
 
 SPEAK = """
 import os, sys
-from template_control.plant.quiet import silenced
+from template_control.plant.c_library import silenced
 with silenced():
     print("lost")
     print("lost", file=sys.stderr)

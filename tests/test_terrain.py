@@ -21,7 +21,7 @@ from template_control.plant import (
     read_terrain,
     terrain_from,
 )
-from template_control.plant.terrain.pieces import pieces
+from template_control.plant.terrain import pieces
 
 SLOPE = Terrain.slope(np.radians(4.0))
 GROUNDS = {

@@ -8,7 +8,7 @@ from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.ground import GroundStep
+from template_control.plant.terrain import GroundStep
 from template_control.robot.library import load_robot
 from template_control.robustness.disturbances import Situation
 from template_control.robustness.severity_sweep import gait_errors

@@ -21,7 +21,7 @@ from template_control.cli.trial_options import (
     draw,
     kept,
 )
-from template_control.plant.quiet import stdout_to_stderr
+from template_control.plant.c_library import stdout_to_stderr
 from template_control.robustness.campaign import (
     FLOATING_MIX,
     OFF_GAIT,

@@ -19,7 +19,7 @@ from template_control import view
 from template_control.cli.interrupts import stopped
 from template_control.cli.world_options import output_folder
 from template_control.errors import TemplateControlError
-from template_control.plant.quiet import stdout_to_stderr
+from template_control.plant.c_library import stdout_to_stderr
 from template_control.run import failures
 from template_control.run.config import PreparedRun, RunConfig
 from template_control.run.record import Record, RunInterrupted, one_line, recorded

@@ -20,7 +20,7 @@ from template_control.cli.trial_options import (
     kept,
 )
 from template_control.errors import ParameterError
-from template_control.plant.quiet import stdout_to_stderr
+from template_control.plant.c_library import stdout_to_stderr
 from template_control.robustness.disturbances import AFTER, ALL
 from template_control.robustness.findings import Finding, Robustness
 from template_control.robustness.severity_sweep import SETTLED, measure

@@ -20,7 +20,7 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
-from template_control.plant.terrain.spec import terrain_from
+from template_control.plant.terrain_spec import terrain_from
 from template_control.run.options import HeadingCommand, Phase, Push, SimulationOptions, TurningRate
 from template_control.run.simulation import STEPS
 from template_control.storage import writing

@@ -1,10 +1,10 @@
-from .base_filter import BaseFilterOptions as BaseFilterOptions
 from .delay import DelayCompensation as DelayCompensation
 from .delay import DelayOptions as DelayOptions
-from .estimator import EstimatorOptions as EstimatorOptions
-from .estimator import StateEstimator as StateEstimator
+from .filters import BaseFilterOptions as BaseFilterOptions
+from .filters import JointFilterOptions as JointFilterOptions
+from .filters import NoiseFilter as NoiseFilter
+from .filters import NoiseFilterOptions as NoiseFilterOptions
+from .imu import EstimatorOptions as EstimatorOptions
 from .imu import ImuOptions as ImuOptions
-from .joint_filter import JointFilterOptions as JointFilterOptions
-from .noise_filter import NoiseFilter as NoiseFilter
-from .noise_filter import NoiseFilterOptions as NoiseFilterOptions
-from .readings import Readings as Readings
+from .imu import Readings as Readings
+from .imu import StateEstimator as StateEstimator

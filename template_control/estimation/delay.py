@@ -1,4 +1,4 @@
-"""How long the robot's torques are under way: learnt from what they do, and reckoned with."""
+"""Delay of the robot's torques: estimated from their effect, and compensated."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import NotNegative, Positive, Share
+from template_control.checks.ranges import NotNegative, Positive
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import RATE_SQUARED, TIME, tuned
 
@@ -18,20 +18,21 @@ Array = NDArray[np.float64]
 _LOG = logging.getLogger(__name__)
 
 _BLOCK = 64  # ticks whose accelerations are compared at once
+# Another delay is believed when its squared errors are less than those of the present one by this
+# share. Neighbours differ by 1 % at a noise of 0.5 mrad.
+_MARGIN = 0.01
 
 
 @dataclass(frozen=True)
 class DelayOptions(Checked):
-    """What delays are looked for, and how soon one is believed.
+    """Delays that are looked for, and how soon one is believed.
 
     Attributes:
-        longest: delay that is looked for; 0: none is, and none reckoned with [s].
+        longest: delay that is looked for; 0: none is, and none compensated [s].
         memory: over which the errors of each delay are remembered [s]. A swing and a stance of each
             leg tell delays apart; a shorter memory follows the noise.
         most: error of a joint's acceleration that counts at most [rad/s^2]. Impacts say nothing
             of delays.
-        margin: another delay is believed when its squared errors are less than those of the
-            present one by this share. Neighbours differ by 1 % at a noise of 0.5 mrad.
 
     Raises:
         ParameterError: if a value is of a wrong type or out of its range.
@@ -40,11 +41,10 @@ class DelayOptions(Checked):
     longest: NotNegative = tuned(0.008, TIME)
     memory: Positive = tuned(0.5, TIME)
     most: Positive = tuned(60.0, RATE_SQUARED)
-    margin: Share = tuned(0.01)
 
 
 class DelayCompensation:
-    """Tells the state in which the torques of this tick will act.
+    """Prediction of the state in which the torques of this tick will act.
 
     The torques of tick j act in the step after tick j + d. So the acceleration of the joints in
     the step before tick k is the one expected at tick k - 1 - d, but for errors of the model:
@@ -122,7 +122,7 @@ class DelayCompensation:
                 errors = found - self._expected[first : first + _BLOCK, joints]
                 self._errors[d] += np.square(np.clip(errors, -o.most, o.most)).sum()
             likeliest = int(self._errors.argmin())
-            if self._errors[likeliest] < (1.0 - o.margin) * self._errors[self.ticks]:
+            if self._errors[likeliest] < (1.0 - _MARGIN) * self._errors[self.ticks]:
                 self.ticks = likeliest
                 _LOG.info("the torques act %.3g s after they are computed", self.delay)
         self._expected[: self._most + 1] = self._expected[_BLOCK:].copy()

@@ -1,23 +1,99 @@
-"""Walking from an estimated state: simulated encoders, IMU and contacts, and the estimator."""
+"""Simulated encoders, IMU and contacts, and the estimator of the whole state from them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
-from template_control.estimation.estimator import EstimatorOptions, StateEstimator
-from template_control.estimation.readings import Readings
+from template_control.estimation.filters import (
+    BaseFilter,
+    BaseFilterOptions,
+    JointFilter,
+    JointFilterOptions,
+)
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import Scale, scaled
 
 Array = NDArray[np.float64]
 
 _PITCH = 2
+
+
+class Readings(NamedTuple):
+    """Readings of one tick; no position in the world is among them.
+
+    Attributes:
+        joints: (nu,) angles that the encoders tell [rad].
+        pitch_rate: of the trunk, from the gyro, forward positive [rad/s].
+        specific_force: (2,) from the accelerometer, forward and up along the trunk: its
+            acceleration less gravity, mean since the tick before [m/s^2].
+        contact: (2,) whether each foot touches the ground.
+    """
+
+    joints: Array
+    pitch_rate: float
+    specific_force: Array
+    contact: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class EstimatorOptions(Checked):
+    """Noise that the estimator assumes.
+
+    Attributes:
+        joints: of the encoders.
+        base: of the IMU and the feet.
+    """
+
+    joints: JointFilterOptions = field(default_factory=JointFilterOptions)
+    base: BaseFilterOptions = field(default_factory=BaseFilterOptions)
+
+
+class StateEstimator:
+    """Estimates (q, v) from :class:`Readings`.
+
+    Args:
+        robot: model; its last update is overwritten.
+        options: the noise.
+    """
+
+    def __init__(self, robot: PlanarBiped, options: EstimatorOptions) -> None:
+        self._joints = JointFilter(options.joints)
+        self._base = BaseFilter(robot, options.base)
+
+    def reset(self, q: Array, v: Array) -> None:
+        """Begin with a known state.
+
+        Args:
+            q: (nv,) configuration [m, rad].
+            v: (nv,) velocity [m/s, rad/s].
+        """
+        self._joints.reset(q[3:], v[3:])
+        self._base.reset(q, v)
+
+    def update(self, readings: Readings, acceleration: Array, dt: float) -> tuple[Array, Array]:
+        """Take in the readings of a tick.
+
+        Args:
+            readings: of this tick.
+            acceleration: (nv,) that the whole-body QP expects since the tick before.
+            dt: since then [s]; 0 at the first tick.
+
+        Returns:
+            (nv,) configuration and (nv,) velocity.
+        """
+        joints, base = self._joints, self._base
+        if dt > 0.0:
+            joints.update(readings.joints, acceleration[3:], dt)
+            base.predict(readings.pitch_rate, readings.specific_force, dt)
+        base.correct(joints.angle, readings.contact)
+        q = np.concatenate((base.state[:3], joints.angle))
+        return q, np.concatenate((base.state[3:5], [base.pitch_rate], joints.speed))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from template_control.embedding.robot_route import robot_route
 from template_control.paper.reproduction import Reproduction
-from template_control.plant.quiet import stdout_to_stderr
+from template_control.plant.c_library import stdout_to_stderr
 from template_control.robot.library import load_robot
 from template_control.run.simulation import simulate
 from template_control.run.summary import summarise

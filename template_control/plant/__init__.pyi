@@ -1,12 +1,12 @@
 from .bullet import BulletPlant as BulletPlant
 from .bullet import PlantOptions as PlantOptions
-from .ground import GroundStep as GroundStep
 from .ideal import IdealOptions as IdealOptions
 from .ideal import IdealPlant as IdealPlant
 from .mujoco import MujocoOptions as MujocoOptions
 from .mujoco import MujocoPlant as MujocoPlant
 from .plant import Plant as Plant
 from .plant import open_plant as open_plant
-from .terrain.spec import read_terrain as read_terrain
-from .terrain.spec import terrain_from as terrain_from
-from .terrain.terrain import Terrain as Terrain
+from .terrain import GroundStep as GroundStep
+from .terrain import Terrain as Terrain
+from .terrain_spec import read_terrain as read_terrain
+from .terrain_spec import terrain_from as terrain_from

@@ -1,8 +1,9 @@
-"""Check that an engine simulates the robot of the controller's model, and no other."""
+"""Robot of an engine: its trunk's box, and checks that it is the one of the controller's model."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from template_control.errors import RobotError
 from template_control.robot.biped import Biped
+from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.terms import PLANAR_DOF
 
 Array = NDArray[np.float64]
 
@@ -70,6 +73,21 @@ def check_damping(robot: Biped, time_step: float) -> None:
             f" for a time step of {time_step:g} s: take {0.9 / rate:.2g} s, or load the robot"
             " lossless"
         )
+
+
+def trunk_corners(robot: PlanarBiped) -> Array:
+    """x and z (2, n) of the corners of boxes around the upright trunk's shapes [m]."""
+    geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.GeometryType.COLLISION)
+    corners = []
+    for shape in geometry.geometryObjects:
+        if shape.parentJoint != PLANAR_DOF:
+            continue
+        shape.geometry.computeLocalAABB()
+        box = shape.geometry.aabb_local
+        for corner in product(*zip(box.min_, box.max_, strict=True)):
+            point = robot.trunk_axes @ shape.placement.act(np.array(corner))
+            corners.append(point[[0, 2]])
+    return np.array(corners).reshape(-1, 2).T
 
 
 def _bent(robot: Biped) -> Array:

@@ -1,25 +1,28 @@
-"""The plant: the robot in PyBullet, headless, driven by joint torques and nothing else."""
+"""PyBullet plant: the robot headless, driven by joint torques and nothing else."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar
+from xml.etree import ElementTree
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_damping, check_mass_matrix
-from template_control.plant.bullet_bodies import ground_bodies, load_body
-from template_control.plant.ground import GroundStep
-from template_control.plant.quiet import silenced
-from template_control.plant.terrain.terrain import Terrain
+from template_control.plant.c_library import decimal_points, silenced
+from template_control.plant.terrain import GroundStep, Terrain, pieces
 from template_control.robot.biped import Biped
-from template_control.robot.terms import PLANAR_DOF
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.terms import FLOATING_DOF, PLANAR_DOF
 from template_control.robot.urdf import link_masses
 
 with silenced():  # PyBullet announces its build time on standard output or stderr
@@ -27,7 +30,12 @@ with silenced():  # PyBullet announces its build time on standard output or stde
 
 Array = NDArray[np.float64]
 
+# By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
+_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
 _CLOSE = 1e-6  # of the robot's mass
+_BASE = -1  # PyBullet's index of the base link
+_POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
+_ANGULAR_FIRST = (3, 4, 5, 0, 1, 2)  # places of a velocity's components, linear first
 AXES = {2: [0, 2], 3: [0, 1, 2]}
 """Of a force's components, by how many there are."""
 
@@ -99,7 +107,7 @@ class BulletPlant:
         p, c = pybullet, self.client
         p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
         p.setTimeStep(options.time_step, physicsClientId=c)
-        self._ground = ground_bodies(options.ground, c)
+        self._ground = _ground_bodies(options.ground, c)
         try:
             self.body = self._load()
             info = self._info()
@@ -120,7 +128,7 @@ class BulletPlant:
         self._configure(len(info))
 
     def _load(self) -> int:
-        return load_body(self.robot, self.client)
+        return _load_body(self.robot, self.client)
 
     def _trunk_link(self) -> int:
         """PyBullet's index of the trunk."""
@@ -300,3 +308,144 @@ class BulletPlant:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class FloatingBaseBulletPlant(BulletPlant):
+    """As :class:`BulletPlant`, for a floating-base robot.
+
+    PyBullet tells and sets the state of the base link's CoM in its axes of inertia; the robot's is
+    that of the link's own frame.
+
+    Args:
+        robot: whose URDF to load and whose joint order to speak.
+        options: friction, physics step, mass error, step of the ground.
+
+    Raises:
+        RobotError: if PyBullet does not read the URDF, or reads another robot.
+    """
+
+    def __init__(self, robot: FloatingBaseBiped, options: PlantOptions) -> None:
+        super().__init__(robot, options)
+        self._away = self._inertial.inverse()
+
+    def _load(self) -> int:
+        body = _load_body(self.robot, self.client, held=False)
+        found = pybullet.getDynamicsInfo(body, _BASE, physicsClientId=self.client)
+        self._inertial = _pose(found[3], found[4])
+        return body
+
+    def _mass_matrix(self, q: Array) -> Array:
+        # PyBullet's base: angular velocity first, about its CoM in its axes of inertia.
+        order = np.argsort(self.joints)
+        place = np.concatenate((_ANGULAR_FIRST, FLOATING_DOF + order))
+        found, turned = np.empty((self.robot.nv, self.robot.nv)), np.eye(self.robot.nv)
+        found[np.ix_(place, place)] = self._joint_space(q[_POSITION:][order])
+        turned[:FLOATING_DOF, :FLOATING_DOF] = self._inertial.toActionMatrixInverse()
+        return turned.T @ found @ turned
+
+    def _trunk_link(self) -> int:
+        return _BASE
+
+    def _trunk_com(self) -> Any:
+        return pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
+
+    def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
+        """See :meth:`~.plant.Plant.step`.
+
+        Args:
+            torque: (nu,) joint torques [N m].
+            push, aside: disturbance on the trunk's centre of mass along the world's x and y [N].
+        """
+        self._advance(torque, push, aside)
+
+    def reset(self, q: Array, v: Array) -> None:
+        """See :meth:`~.plant.Plant.reset`."""
+        p, c = pybullet, self.client
+        super().reset(q[_POSITION:], v[FLOATING_DOF:])
+        trunk = _pose(q[:3], q[3:_POSITION])
+        place = trunk * self._inertial
+        quaternion = pin.Quaternion(place.rotation).coeffs().tolist()
+        p.resetBasePositionAndOrientation(
+            self.body, place.translation.tolist(), quaternion, physicsClientId=c
+        )
+        linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:FLOATING_DOF]
+        linear = linear + np.cross(angular, place.translation - trunk.translation)
+        p.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=c)
+
+    def read(self, q: Array, v: Array) -> None:
+        """See :meth:`~.plant.Plant.read`."""
+        super().read(q[_POSITION:], v[FLOATING_DOF:])
+        p, c = pybullet, self.client
+        position, quaternion = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
+        linear, angular = p.getBaseVelocity(self.body, physicsClientId=c)
+        place = _pose(position, quaternion)
+        trunk = place * self._away
+        back = trunk.rotation.T
+        speed = linear - np.cross(angular, place.translation - trunk.translation)
+        q[:3], v[:3], v[3:FLOATING_DOF] = trunk.translation, back @ speed, back @ angular
+        coefficients = pin.Quaternion(trunk.rotation).coeffs()
+        # Of the two quaternions of a rotation the one nearer to the last.
+        near = float(coefficients @ q[3:_POSITION]) >= 0.0
+        q[3:_POSITION] = coefficients if near else -coefficients
+
+
+def _load_body(robot: Biped, client: int, held: bool = True) -> int:
+    """Body of a robot's URDF; PyBullet only reads files.
+
+    Args:
+        robot: whose URDF.
+        client: PyBullet's handle of the world.
+        held: whether the root link is fixed to the world.
+
+    Raises:
+        RobotError: if PyBullet does not read it.
+    """
+    tree = ElementTree.fromstring(robot.urdf)
+    for link in tree.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)  # which PyBullet would read all the same
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.urdf"
+        path.write_bytes(ElementTree.tostring(tree, encoding="utf-8"))
+        try:
+            with decimal_points():
+                body = pybullet.loadURDF(
+                    str(path), useFixedBase=held, flags=_FLAGS, physicsClientId=client
+                )
+        except pybullet.error as error:
+            raise RobotError(f"PyBullet does not read {robot.path} ({error}): change it") from None
+    return int(body)
+
+
+def _ground_bodies(terrain: Terrain, client: int) -> dict[int, float | None]:
+    """Make the ground's bodies.
+
+    Args:
+        terrain: the ground.
+        client: PyBullet's handle of the world.
+
+    Returns:
+        The friction of each body; None: that of the plant's options.
+    """
+    p = pybullet
+
+    def body(shape: int, position: tuple[float, float, float], pitch: float = 0.0) -> int:
+        turn = p.getQuaternionFromEuler((0.0, pitch, 0.0))
+        made = p.createMultiBody(
+            0, shape, basePosition=position, baseOrientation=turn, physicsClientId=client
+        )
+        return int(made)
+
+    height, stand_out = pieces(terrain)
+    plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client)
+    found: dict[int, float | None] = {body(plane, (0.0, 0.0, height)): None}
+    for piece in stand_out:
+        sides = piece.half_sides
+        box = p.createCollisionShape(p.GEOM_BOX, halfExtents=sides, physicsClientId=client)
+        found[body(box, piece.centre, piece.pitch)] = piece.friction
+    return found
+
+
+def _pose(position: Any, quaternion: Any) -> pin.SE3:
+    """A frame from its place [m] and its quaternion x y z w."""
+    return pin.SE3(pin.Quaternion(np.array(quaternion)).matrix(), np.array(position))

@@ -1,4 +1,4 @@
-"""An ideal plant: the robot on rigid ground, with nothing that a contact solver adds.
+"""Ideal plant: the robot on rigid ground, with nothing that a contact solver adds.
 
 Forward dynamics of the Pinocchio model with the feet's rolling contacts as rigid constraints:
 they stick (friction is not modelled, it always suffices), hold only while they press, and a
@@ -21,11 +21,9 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import DivergedError
-from template_control.plant.agreement import check_damping
-from template_control.plant.rigid_contact import pressing, solve
-from template_control.plant.terrain.rolling_feet import RollingFeet
-from template_control.plant.terrain.terrain import Terrain
-from template_control.plant.trunk_box import trunk_corners
+from template_control.plant.agreement import check_damping, trunk_corners
+from template_control.plant.rigid_contact import RollingFeet, pressing, solve
+from template_control.plant.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import PLANAR_DOF
 

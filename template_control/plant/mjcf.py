@@ -1,4 +1,4 @@
-"""A planar biped and its ground as MuJoCo's MJCF, written from the Pinocchio model.
+"""Robot and ground as MuJoCo's MJCF, written from the Pinocchio model.
 
 MuJoCo refuses links without mass, so the massless slides of the base become joints of the trunk:
 joints of one body act one after another, as a chain does.
@@ -14,9 +14,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from template_control.plant.agreement import trunk_corners
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.terrain.pieces import pieces
-from template_control.plant.trunk_box import trunk_corners
+from template_control.plant.terrain import pieces
 from template_control.robot.biped import Biped
 from template_control.robot.legs import foot_frame
 from template_control.robot.planar_biped import PlanarBiped
@@ -32,63 +32,54 @@ TRUNK = "trunk"
 _MASSLESS = 1e-12  # of the robot's mass
 _HELD = 0.9999  # MuJoCo's largest impedance
 _CORNER = 1e-3  # radius of the balls at the trunk's corners [m]
+_ROOT = 1  # Pinocchio's index of the free flyer
 
 
-def mjcf(robot: PlanarBiped, world: PlantOptions, contact_time: float) -> str:
+def mjcf(robot: Biped, world: PlantOptions, contact_time: float) -> str:
     """The model as MuJoCo reads it.
 
     The joints have the names of Pinocchio's, the feet's spheres are ``foot0`` and ``foot1``, and
-    the trunk's body and shapes begin with ``trunk``. Feet and trunk meet the ground; the other
-    links, and the robot itself, do not.
+    the trunk's body and shapes begin with ``trunk``. Feet and a planar robot's trunk meet the
+    ground; the other links, and the robot itself, do not.
 
     Args:
         robot: the model.
         world: friction, time step, mass error, ground.
         contact_time: time constant with which a contact gives way [s].
     """
-    root, ground = world_element(robot, world, contact_time)
-    _add_robot(ground, robot, world)
-    return ElementTree.tostring(root, encoding="unicode")
-
-
-def world_element(
-    robot: Biped, world: PlantOptions, contact_time: float
-) -> tuple[Element, Element]:
-    """A world with its ground, and the element that a robot is added to.
-
-    Args:
-        robot: whose gravity acts.
-        world: friction, time step, ground.
-        contact_time: time constant with which a contact gives way [s].
-    """
     root = Element("mujoco", model="plant")
-    add(root, "compiler", angle="radian", autolimits="true")
-    option = add(
+    _add(root, "compiler", angle="radian", autolimits="true")
+    option = _add(
         root,
         "option",
         timestep=repr(world.time_step),
-        gravity=text((0.0, 0.0, -robot.gravity)),
+        gravity=_text((0.0, 0.0, -robot.gravity)),
         cone="elliptic",  # the friction cone as it is, no pyramid in it
     )
     # A state that is no number any more is the controller's to refuse, not to be put back.
-    add(option, "flag", autoreset="disable")
-    ground = add(root, "worldbody")
+    _add(option, "flag", autoreset="disable")
+    ground = _add(root, "worldbody")
     _add_ground(ground, world, contact_time)
-    return root, ground
+    # MuJoCo weighs a contact's give by the robot's pose with all joints at their `ref`.
+    add_robot = _add_planar if isinstance(robot, PlanarBiped) else _add_floating
+    bodies = add_robot(ground, robot, world)
+    for i, foot in enumerate(robot.feet):
+        frame = robot.model.frames[foot_frame(robot.model, foot)]
+        centre = _text(frame.placement.translation)
+        _add_ball(bodies[frame.parentJoint], f"{FOOT}{i}", centre, robot.foot_radius)
+    if isinstance(robot, PlanarBiped):
+        for i, (x, z) in enumerate(trunk_corners(robot).T):
+            centre = _text(np.array((x, 0.0, z)) @ robot.trunk_axes)
+            _add_ball(bodies[PLANAR_DOF], f"{TRUNK}{i}", centre, _CORNER)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
-def add(parent: Element, tag: str, **attributes: str) -> Element:
-    """An element of another.
-
-    Args:
-        parent: the other.
-        tag: of the new one.
-        attributes: of the new one.
-    """
+def _add(parent: Element, tag: str, **attributes: str) -> Element:
+    """A new element of ``parent``."""
     return ElementTree.SubElement(parent, tag, attributes)
 
 
-def text(values: ArrayLike) -> str:
+def _text(values: ArrayLike) -> str:
     """Numbers as they are written in MJCF."""
     return " ".join(map(repr, np.asarray(values, dtype=float).tolist()))
 
@@ -98,31 +89,30 @@ def _add_ground(parent: Element, world: PlantOptions, contact_time: float) -> No
     how = {
         "priority": "1",  # the ground's friction and give count, not the robot's
         "condim": "3",
-        "solref": text((contact_time, 1.0)),
+        "solref": _text((contact_time, 1.0)),
         "contype": "1",
         "conaffinity": "0",
     }
     height, stand_out = pieces(world.ground)
-    slides = text((world.friction, 0.0, 0.0))
-    place = text((0.0, 0.0, height))
-    add(parent, "geom", type="plane", size="0 0 1", pos=place, friction=slides, **how)
+    slides = _text((world.friction, 0.0, 0.0))
+    place = _text((0.0, 0.0, height))
+    _add(parent, "geom", type="plane", size="0 0 1", pos=place, friction=slides, **how)
     for piece in stand_out:
         own = world.friction if piece.friction is None else piece.friction
         box = {
             "type": "box",
-            "size": text(piece.half_sides),
-            "pos": text(piece.centre),
-            "quat": text((cos(0.5 * piece.pitch), 0.0, sin(0.5 * piece.pitch), 0.0)),
-            "friction": text((own, 0.0, 0.0)),
+            "size": _text(piece.half_sides),
+            "pos": _text(piece.centre),
+            "quat": _text((cos(0.5 * piece.pitch), 0.0, sin(0.5 * piece.pitch), 0.0)),
+            "friction": _text((own, 0.0, 0.0)),
         }
-        add(parent, "geom", **box, **how)
+        _add(parent, "geom", **box, **how)
 
 
-def _add_robot(ground: Element, robot: PlanarBiped, world: PlantOptions) -> None:
-    """One body for each link that has mass, with the joints that lead to it."""
+def _add_planar(ground: Element, robot: Biped, world: PlantOptions) -> dict[int, Element]:
+    """One body, by Pinocchio's joint, for each link that has mass, with all joints above it."""
     model = robot.model
     axes = _axes(model)
-    # MuJoCo weighs a contact's give by the robot's pose with all joints at their `ref`.
     data, neutral = model.createData(), robot.neutral()
     pin.forwardKinematics(model, data, neutral)
     bodies: dict[int, Element] = {0: ground}
@@ -137,22 +127,45 @@ def _add_robot(ground: Element, robot: PlanarBiped, world: PlantOptions) -> None
         for above in chain:
             pose = pose * data.liMi[above]
         name = TRUNK if joint == PLANAR_DOF else model.names[joint] + " link"
-        body = add(bodies[parent], "body", name=name, **place(pose))
+        body = _add(bodies[parent], "body", name=name, **_place(pose))
         here = pose.inverse()
         for above in chain:
             here = here * data.liMi[above]
             ref, hinge = float(neutral[above - 1]), above - 1 - PLANAR_DOF
-            lost = losses(robot, hinge, world.time_step) if hinge >= 0 else {}
+            lost = _losses(robot, hinge, world.time_step) if hinge >= 0 else {}
             _add_joint(body, model, above, here, axes[:, above - 1], ref=ref, lost=lost)
         _add_inertia(body, model.inertias[joint], axes[3:, joint - 1], world.mass_scale)
         bodies[joint] = body
-    for i, foot in enumerate(robot.feet):
-        frame = model.frames[foot_frame(model, foot)]
-        centre = text(frame.placement.translation)
-        add_ball(bodies[frame.parentJoint], f"{FOOT}{i}", centre, robot.foot_radius)
-    for i, (x, z) in enumerate(trunk_corners(robot).T):
-        centre = text(np.array((x, 0.0, z)) @ robot.trunk_axes)
-        add_ball(bodies[PLANAR_DOF], f"{TRUNK}{i}", centre, _CORNER)
+    return bodies
+
+
+def _add_floating(ground: Element, robot: Biped, world: PlantOptions) -> dict[int, Element]:
+    """As :func:`_add_planar`, for a floating base."""
+    model = robot.model
+    data, neutral = model.createData(), robot.neutral()
+    axes = pin.computeJointJacobians(model, data, neutral)
+    bodies = {0: ground}
+    for joint in range(_ROOT, model.njoints):
+        name = TRUNK if joint == _ROOT else f"{model.names[joint]} link"
+        body = _add(bodies[model.parents[joint]], "body", name=name, **_place(data.liMi[joint]))
+        if joint == _ROOT:
+            _add(body, "freejoint", name=TRUNK)
+        else:
+            axis = data.oMi[joint].rotation.T @ axes[3:, model.idx_vs[joint]]
+            about = {"axis": _text(axis), "ref": repr(float(neutral[model.idx_qs[joint]]))}
+            about |= _losses(robot, joint - 1 - _ROOT, world.time_step)
+            _add(body, "joint", name=model.names[joint], type="hinge", **about)
+        inertia = model.inertias[joint]
+        i = world.mass_scale * inertia.inertia
+        _add(
+            body,
+            "inertial",
+            mass=repr(float(world.mass_scale * inertia.mass)),
+            pos=_text(inertia.lever),
+            fullinertia=_text((i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])),
+        )
+        bodies[joint] = body
+    return bodies
 
 
 def _axes(model: pin.Model) -> Array:
@@ -166,10 +179,10 @@ def _axes(model: pin.Model) -> Array:
     return np.array(columns).T
 
 
-def place(pose: pin.SE3) -> dict[str, str]:
+def _place(pose: pin.SE3) -> dict[str, str]:
     """Attributes that put an element somewhere in its parent."""
     x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
-    return {"pos": text(pose.translation), "quat": text((w, x, y, z))}
+    return {"pos": _text(pose.translation), "quat": _text((w, x, y, z))}
 
 
 def _add_joint(
@@ -190,24 +203,18 @@ def _add_joint(
     about = {
         "name": model.names[joint],
         "type": "hinge" if hinge else "slide",
-        "axis": text(here.rotation @ (axis[3:] if hinge else axis[:3])),
-        "pos": text(here.translation),
+        "axis": _text(here.rotation @ (axis[3:] if hinge else axis[:3])),
+        "pos": _text(here.translation),
         "ref": repr(ref),
     }
     low, high = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
     if joint > PLANAR_DOF and max(abs(low), abs(high)) < UNLIMITED:
-        about["range"] = text((low, high))
-    add(body, "joint", **about, **lost)
+        about["range"] = _text((low, high))
+    _add(body, "joint", **about, **lost)
 
 
-def losses(robot: Biped, joint: int, time_step: float) -> dict[str, str]:
-    """Attributes of a joint that has damping or friction.
-
-    Args:
-        robot: whose joint.
-        joint: its index among the actuated ones.
-        time_step: of the world [s].
-    """
+def _losses(robot: Biped, joint: int, time_step: float) -> dict[str, str]:
+    """Attributes of a joint that has damping or friction; ``joint``: among the actuated ones."""
     found = {}
     damping, friction = robot.joint_damping[joint], robot.joint_friction[joint]
     if damping > 0.0:
@@ -215,8 +222,8 @@ def losses(robot: Biped, joint: int, time_step: float) -> dict[str, str]:
     if friction > 0.0:
         found["frictionloss"] = repr(float(friction))
         # As stiff as MuJoCo allows: by default a joint that friction holds creeps.
-        found["solreffriction"] = text((2.0 * time_step, 1.0))
-        found["solimpfriction"] = text((_HELD, _HELD, 1e-3, 0.5, 2.0))
+        found["solreffriction"] = _text((2.0 * time_step, 1.0))
+        found["solimpfriction"] = _text((_HELD, _HELD, 1e-3, 0.5, 2.0))
     return found
 
 
@@ -224,25 +231,18 @@ def _add_inertia(body: Element, inertia: pin.Inertia, axis: Array, scale: float)
     # The robot turns about the axis of its hinges only, where any rotation leaves the inertia as it
     # is. MuJoCo refuses the flat inertias of a planar model, in which the other two axes have none.
     about_y = scale * (axis @ inertia.inertia @ axis)
-    add(
+    _add(
         body,
         "inertial",
         mass=repr(float(scale * inertia.mass)),
-        pos=text(inertia.lever),
-        diaginertia=text((about_y, about_y, about_y)),
+        pos=_text(inertia.lever),
+        diaginertia=_text((about_y, about_y, about_y)),
     )
 
 
-def add_ball(body: Element, name: str, centre: str, radius: float) -> None:
-    """A sphere that meets the ground.
-
-    Args:
-        body: that it is a part of.
-        name: its own.
-        centre: in the body's frame, as :func:`text` writes it [m].
-        radius: its own [m].
-    """
-    add(
+def _add_ball(body: Element, name: str, centre: str, radius: float) -> None:
+    """A sphere that meets the ground; ``centre`` as :func:`_text` writes it."""
+    _add(
         body,
         "geom",
         name=name,

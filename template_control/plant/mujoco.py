@@ -1,4 +1,4 @@
-"""The robot in MuJoCo: a second physics engine, driven by joint torques and nothing else."""
+"""MuJoCo plant: a second physics engine, driven by joint torques and nothing else."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
@@ -15,9 +16,11 @@ from template_control.plant.agreement import check_mass_matrix
 from template_control.plant.bullet import AXES, PlantOptions
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.robot.biped import Biped
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.terms import FLOATING_DOF
 
 Array = NDArray[np.float64]
+
+_POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
 
 
 @dataclass(frozen=True)
@@ -81,11 +84,12 @@ class MujocoPlant:
         self.options = options
         self._engine = engine = _mujoco()
         try:
-            self.model = engine.MjModel.from_xml_string(self._text(robot))
+            self.model = engine.MjModel.from_xml_string(mjcf(robot, options, options.contact_time))
         except ValueError as error:
             raise RobotError(f"MuJoCo does not take {robot.path} ({error}): change it") from None
         self.data = engine.MjData(self.model)
-        names = list(robot.model.names)[robot.model.njoints - self._told(robot) :]
+        # Joints of one number each: all of a planar robot's, but not a floating base.
+        names = list(robot.model.names)[2 if robot.base_joints == 1 else 1 :]
         self._q = np.array([self.model.joint(name).qposadr[0] for name in names])
         self._v = np.array([self.model.joint(name).dofadr[0] for name in names])
         self._actuated = self._v[-len(robot.joint_names) :]
@@ -104,15 +108,6 @@ class MujocoPlant:
         for unit, column in zip(np.eye(self.model.nv), columns, strict=True):
             self._engine.mj_mulM(self.model, self.data, column, unit)
         return columns / self.options.mass_scale
-
-    def _text(self, robot: Biped) -> str:
-        """The world as MJCF."""
-        assert isinstance(robot, PlanarBiped)
-        return mjcf(robot, self.options, self.options.contact_time)
-
-    def _told(self, robot: Biped) -> int:
-        """How many joints MuJoCo tells by a number each: the model's last ones."""
-        return robot.model.njoints - 1
 
     @property
     def time_step(self) -> float:
@@ -168,3 +163,43 @@ class MujocoPlant:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class FloatingBaseMujocoPlant(MujocoPlant):
+    """As :class:`MujocoPlant`, for a floating-base robot.
+
+    MuJoCo has the trunk's velocity in the world and its angular velocity in the trunk's axes, and
+    quaternions begin with w.
+
+    Args:
+        robot: whose model to write as MJCF, and whose joint order to speak.
+        options: friction, time step, mass error, contacts, step of the ground.
+
+    Raises:
+        ParameterError: if MuJoCo is not installed.
+        RobotError: if MuJoCo does not take the model, or makes another robot of it.
+    """
+
+    def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
+        """See :meth:`~.plant.Plant.step`.
+
+        Args:
+            torque: (nu,) joint torques [N m].
+            push, aside: disturbance on the trunk's centre of mass along the world's x and y [N].
+        """
+        self.data.xfrc_applied[self._trunk, 1] = aside
+        super().step(torque, push)
+
+    def reset(self, q: Array, v: Array) -> None:
+        """See :meth:`~.plant.Plant.reset`."""
+        super().reset(q[_POSITION:], v[FLOATING_DOF:])
+        rotation = pin.Quaternion(q[3:_POSITION]).matrix()
+        self.data.qpos[:3], self.data.qpos[3:7] = q[:3], q[[6, 3, 4, 5]]
+        self.data.qvel[:3], self.data.qvel[3:6] = rotation @ v[:3], v[3:FLOATING_DOF]
+
+    def read(self, q: Array, v: Array) -> None:
+        """See :meth:`~.plant.Plant.read`."""
+        super().read(q[_POSITION:], v[FLOATING_DOF:])
+        q[:3], q[3:_POSITION] = self.data.qpos[:3], self.data.qpos[[4, 5, 6, 3]]
+        rotation = pin.Quaternion(q[3:_POSITION]).matrix()
+        v[:3], v[3:FLOATING_DOF] = rotation.T @ self.data.qvel[:3], self.data.qvel[3:6]

@@ -1,4 +1,4 @@
-"""What a plant is, and the one that given options describe."""
+"""Interface of plants, and the plant that options describe."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Plant(Protocol):
         Args:
             torque: (nu,) joint torques, held during the step [N m].
             push: horizontal force on the trunk's centre of mass, forward positive [N]. The plant of
-                a free robot has a third parameter: push and it act along the world's x and y.
+                a floating-base robot has a third parameter: both act along the world's x and y.
         """
 
     def close(self) -> None:
@@ -87,7 +87,7 @@ _MEMBERS = (
 
 
 def check_world(world: World) -> None:
-    """Refuse what is no plant.
+    """Check that an object implements :class:`Plant`.
 
     Args:
         world: a plant, or options; those have checked themselves.

@@ -157,7 +157,7 @@ def load_robot(name: str | Path) -> PlanarBiped:
 
 @checked
 def load_floating_robot(name: str | Path) -> FloatingBaseBiped:
-    """A shipped robot by name, or any biped by the path of its URDF, that nothing holds.
+    """A shipped robot by name, or any biped by the path of its URDF, with a floating base.
 
     Raises:
         RobotError: if there is no such robot or file, or it is planar.

@@ -17,7 +17,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative
 from template_control.errors import ParameterError, SweepError
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.ground import GroundStep
+from template_control.plant.terrain import GroundStep
 from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
 from template_control.robustness.fall_cause import fall_cause
 from template_control.robustness.findings import wilson_interval

@@ -20,7 +20,7 @@ from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.ground import GroundStep
+from template_control.plant.terrain import GroundStep
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.options import Push, SimulationOptions

@@ -21,12 +21,10 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.standing.options import standing_pose
 from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
+from template_control.estimation.filters import NoiseFilter
 from template_control.estimation.imu import ImuOptions, ImuSensors
-from template_control.estimation.noise_filter import NoiseFilter
-from template_control.plant.bullet import PlantOptions
-from template_control.plant.free.bullet import FreeBulletPlant
-from template_control.plant.free.mujoco import FreeMujocoPlant
-from template_control.plant.mujoco import MujocoOptions
+from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions
+from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
 from template_control.plant.plant import Plant, World, open_plant, plant_name
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
@@ -317,9 +315,9 @@ class FloatingBackend(RobotBackend):
         if isinstance(world, Plant) and not isinstance(world, PlantOptions):
             return nullcontext(world)
         if isinstance(world, MujocoOptions):
-            return FreeMujocoPlant(self.robot, world)
+            return FloatingBaseMujocoPlant(self.robot, world)
         if isinstance(world, PlantOptions):
-            return FreeBulletPlant(self.robot, world)
+            return FloatingBaseBulletPlant(self.robot, world)
         raise ParameterError(
             f"{self.robot.name} walks free in PyBullet and MuJoCo, and the plant is"
             f" {plant_name(world)}: give PlantOptions or MujocoOptions"

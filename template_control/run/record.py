@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from template_control import settings, storage
 from template_control.checks.checked import checked
 from template_control.errors import RecordError, TemplateControlError
-from template_control.plant.ground import GroundStep
-from template_control.plant.terrain.terrain import Terrain
+from template_control.plant.terrain import GroundStep, Terrain
 from template_control.run.data_frame import to_dataframe
 
 Array = NDArray[np.float64]

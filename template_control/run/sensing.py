@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.estimation.delay import DelayCompensation
+from template_control.estimation.filters import NoiseFilter
 from template_control.estimation.imu import ImuOptions
-from template_control.estimation.noise_filter import NoiseFilter
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import Scale
 

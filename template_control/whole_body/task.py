@@ -40,7 +40,8 @@ class References:
         feet: the foot that is the rear leg's, and the front leg's.
         foot: (2, 2, 3) of each foot: x and y, each wanted position, velocity, acceleration, in
             the world [m, m/s, m/s^2].
-        side: (2, 3) of each foot of a free robot: y, to the left, as ``foot`` in its heading frame.
+        side: (2, 3) of each foot of a floating-base robot: y, to the left, as ``foot`` in its
+            heading frame.
         furthest: (2,) largest x that each foot may be moved to, so that its leg does not go
             straight [m].
         hip_speed: forward speed of the hips [m/s].

@@ -318,7 +318,7 @@ class SpareJointTask(Checked):
 
 
 def _floating(robot: Biped) -> FloatingBaseBiped:
-    """The robot, if nothing holds it.
+    """The robot, if it has a floating base.
 
     Raises:
         ParameterError: if it is held in its plane.

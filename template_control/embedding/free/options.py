@@ -12,7 +12,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PhaseControl
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.swing import SwingOptions
-from template_control.estimation.noise_filter import NoiseFilterOptions
+from template_control.estimation.filters import NoiseFilterOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.lateral.gait import LateralOptions
 from template_control.slip.similarity import LENGTH, TIME, tuned

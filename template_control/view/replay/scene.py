@@ -18,7 +18,7 @@ from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform
 from meshcat.path import Path as ScenePath
 from numpy.typing import NDArray
 
-from template_control.plant.terrain.terrain import Terrain
+from template_control.plant.terrain import Terrain
 from template_control.run.record import FloatingRecord, Record
 from template_control.view.replay.playback import (
     Playback,

@@ -1,4 +1,4 @@
-"""The ground's height along x: a profile that the plants know, and nobody tells the controller."""
+"""Ground unknown to the controller: its height along x, and the boxes that engines make of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from math import hypot, tan
+from math import atan2, cos, hypot, sin, tan
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -15,12 +15,20 @@ import numpy as np
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive, Range, Rising
 from template_control.errors import ParameterError
+from template_control.slip.gaits.gait import WalkingGait
 
 _HIGHEST = 1000.0  # [m]
 _FARTHEST = 1000.0  # [m]
 _STEEPEST = float(np.radians(45.0))
 _LEVEL = 1e-9  # [m] the ground is at height 0 where a run begins
 _MOST_POINTS = 100_000
+_HIGHEST_STEP = 1.0  # [m]
+_END = 2000.0  # length of the level parts at both ends [m]
+_DEPTH = 1.0  # of the boxes below the lowest ground [m]
+_HALF_WIDTH = 1.0  # across the way [m]
+# Thickness of a slope's plate [m]. Where a slope ends at a wall, its lower edge stands out of that
+# by this times the slope's sine.
+_PLATE = 0.02
 
 Height = Annotated[float, Range(-_HIGHEST, _HIGHEST)]
 Place = Annotated[float, Range(-_FARTHEST, _FARTHEST)]
@@ -263,3 +271,130 @@ def _check_count(points: float) -> None:
             f"the ground has about {points:.3g} points: give fewer or longer pieces, of at most"
             f" {_MOST_POINTS} points"
         )
+
+
+@dataclass(frozen=True)
+class GroundStep(Checked):
+    """A single step of the ground: at height 0 before ``x``, at ``height`` from there on.
+
+    The edge is a vertical wall, on which a foot can trip; place it between footholds, as
+    :meth:`at_step` does.
+
+    Attributes:
+        height: up positive [m].
+        x: of the edge [m]; a run begins with the stance foot at x = 0.
+
+    Raises:
+        ParameterError: if the height is 0 or more than 1 m, or x is not within 0 to 1000 m.
+    """
+
+    height: Annotated[float, Range(-_HIGHEST_STEP, _HIGHEST_STEP)]
+    x: Start
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.height == 0.0:
+            raise ParameterError("GroundStep.height is 0: give a number other than 0")
+
+    @classmethod
+    def at_step(cls, gait: WalkingGait, height: float, step: int, share: float = 0.5) -> GroundStep:
+        """The step that the robot meets when it treads on its ``step``-th foothold.
+
+        Args:
+            gait: its footholds are at multiples of the step length, the first stance foot
+                (number 0) at x = 0.
+            height: up positive [m].
+            step: number of the first foothold beyond the edge, at least 1.
+            share: of the way from the foothold before to that one, where the edge is.
+
+        Raises:
+            ParameterError: if a number is out of its range.
+        """
+        if step < 1:
+            raise ParameterError(f"foothold is {step}: give at least 1")
+        if not 0.0 < share < 1.0:
+            raise ParameterError(f"share is {share!r}: give a number between 0 and 1")
+        return cls(height, (step - 1 + share) * gait.step_length)
+
+    @property
+    def terrain(self) -> Terrain:
+        """The ground with this step in it."""
+        return Terrain.step(self.height, self.x)
+
+
+class Piece(NamedTuple):
+    """A box of ground.
+
+    Attributes:
+        centre: x, y across the way, and height [m].
+        half_sides: along its own axes [m].
+        pitch: its turn about +y, forward down positive [rad].
+        friction: its coefficient; None: that of the plant's options.
+    """
+
+    centre: tuple[float, float, float]
+    half_sides: tuple[float, float, float]
+    pitch: float
+    friction: float | None
+
+
+def pieces(terrain: Terrain) -> tuple[float, list[Piece]]:
+    """Height of a plane, and the boxes of ground that stand out of it.
+
+    Args:
+        terrain: whose ground.
+
+    Returns:
+        The height, which is the ground's lowest where its friction is everywhere the same; and
+        the boxes in the order of x: one for a level line, for a slope a plate and one below it.
+    """
+    lowest = min(y for _, y in terrain.points)
+    base = lowest - _DEPTH
+    plane = base if terrain.friction else lowest
+    found = []
+    for (a, low), (b, high), friction in _lines(terrain):
+        if max(low, high) <= plane:
+            continue
+        top = low
+        if low != high:
+            found.append(_plate((a, low), (b, high), friction))
+            top = min(low, high) - _PLATE
+        centre = (0.5 * (a + b), 0.0, 0.5 * (top + base))
+        half_sides = (0.5 * (b - a), _HALF_WIDTH, 0.5 * (top - base))
+        found.append(Piece(centre, half_sides, 0.0, friction))
+    return plane, found
+
+
+_Point = tuple[float, float]
+
+
+def _plate(begin: _Point, end: _Point, friction: float | None) -> Piece:
+    """A thin box whose upper side is the line between two points."""
+    along, up = end[0] - begin[0], end[1] - begin[1]
+    angle = atan2(up, along)
+    x = 0.5 * (begin[0] + end[0]) + 0.5 * _PLATE * sin(angle)
+    z = 0.5 * (begin[1] + end[1]) - 0.5 * _PLATE * cos(angle)
+    half_sides = (0.5 * hypot(along, up), _HALF_WIDTH, 0.5 * _PLATE)
+    return Piece((x, 0.0, z), half_sides, -angle, friction)
+
+
+def _lines(terrain: Terrain) -> list[tuple[_Point, _Point, float | None]]:
+    """The lines of the ground that are no walls, cut where friction changes."""
+    (first, begin), (last, end) = terrain.points[0], terrain.points[-1]
+    ground = ((first - _END, begin), *terrain.points, (last + _END, end))
+    cuts = [x for x, _ in terrain.friction]
+    found = []
+    for (a, low), (b, high) in pairwise(ground):
+        if a == b:
+            continue  # a wall: the side of its neighbour
+        places = [a, *(x for x in cuts if a < x < b), b]
+        heights = [low + (high - low) * (x - a) / (b - a) for x in places]
+        ends = list(zip(places, heights, strict=True))
+        found += [(p, q, _friction(terrain, p[0])) for p, q in pairwise(ends)]
+    return found
+
+
+def _friction(terrain: Terrain, x: float) -> float | None:
+    """Of the ground from ``x`` on."""
+    before = [friction for place, friction in terrain.friction if place <= x]
+    return before[-1] if before else None

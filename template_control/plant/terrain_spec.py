@@ -1,4 +1,4 @@
-"""A terrain from a line of text or a file."""
+"""Terrain from a line of text or a file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive, Range
 from template_control.checks.typed import entries, number
 from template_control.errors import ParameterError
-from template_control.plant.terrain.terrain import Height, Start, Terrain
+from template_control.plant.terrain import Height, Start, Terrain
 
 KINDS: dict[str, dict[str, Any]] = {
     "flat": {},

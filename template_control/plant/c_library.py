@@ -1,8 +1,9 @@
-"""Keeps what C libraries print off standard output."""
+"""Standard output and the locale of C libraries."""
 
 from __future__ import annotations
 
 import ctypes
+import locale
 import os
 import shutil
 import sys
@@ -11,6 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _STDOUT, _STDERR = 1, 2
+# POSIX has a mask for each category; glibc, musl and macOS number its bits as the categories.
+_NUMERIC = 1 << locale.LC_NUMERIC
 
 
 @contextmanager
@@ -35,6 +38,26 @@ def silenced() -> Iterator[None]:
             with os.fdopen(os.dup(_STDERR), "wb") as stderr:
                 shutil.copyfileobj(held, stderr)
             raise
+
+
+@contextmanager
+def decimal_points() -> Iterator[None]:
+    """Let this thread's C code read and write numbers with a point within the ``with`` block.
+
+    A program that has set a locale with decimal commas, as Qt does, makes PyBullet read "0.7" as
+    0. Only the calling thread is changed: setlocale would change all, and other threads may be
+    printing.
+    """
+    libc = ctypes.CDLL(None)
+    for function in (libc.newlocale, libc.uselocale):
+        function.restype = ctypes.c_void_p
+    points = ctypes.c_void_p(libc.newlocale(_NUMERIC, b"C", None))
+    before = ctypes.c_void_p(libc.uselocale(points))
+    try:
+        yield
+    finally:
+        libc.uselocale(before)
+        libc.freelocale(points)
 
 
 @contextmanager

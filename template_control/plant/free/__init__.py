@@ -1,1 +1,0 @@
-"""Worlds in which nothing holds a robot."""

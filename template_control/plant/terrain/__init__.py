@@ -1,1 +1,0 @@
-"""The ground's height along x: what it is, its text, and its pieces for the engines."""
