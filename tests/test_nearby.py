@@ -7,7 +7,7 @@ import pytest
 
 from template_control.embedding.planners import stride_solver
 from template_control.embedding.planners.planner import ANY_ANGLE
-from template_control.embedding.planners.running import RunningPlanner, aim_and_bounds
+from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.planners.stride_solver import (
     FromSection,
     NearbyStrides,
@@ -45,8 +45,7 @@ def step():
 
 def prior_of(gait, z, angles=ANY_ANGLE):
     planner = RunningPlanner(gait)
-    legs, limits = gait.controls[:3], planner._limits
-    _, table, _ = aim_and_bounds(z, gait.apex, np.zeros(3), legs, angles, limits)
+    table = planner.bounds(z, gait, angles)
     return Prior(gait.controls, [0, 1, 2], table, planner.options.rounds)
 
 

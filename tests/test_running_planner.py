@@ -8,7 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from template_control.embedding.planners.planner import Planner
-from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
+from template_control.embedding.planners.running import (
+    AGILE,
+    OFFSET_GAIN,
+    SURPRISE_BOUND,
+    RunningOptions,
+    RunningPlanner,
+)
 from template_control.embedding.planners.stride_solver import solve_within_reach
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.gaits.running_gait import running_gait
@@ -108,7 +114,7 @@ def test_what_every_stride_adds_is_learnt(planner, gait):
 def test_a_push_is_no_offset(planner, gait):
     decision = planner.decide(gait.apex)
     planner.observe(decision, gait.apex + [1.0, -0.1])
-    limit = np.array(OPTIONS.surprise_bound) * OPTIONS.offset_gain
+    limit = SURPRISE_BOUND * OFFSET_GAIN
     np.testing.assert_allclose(planner.offset[:2], limit * [1.0, -1.0])
 
 

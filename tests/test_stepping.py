@@ -5,7 +5,7 @@ import pytest
 
 import template_control as tc
 from template_control.embedding import gaits_by_speed, standing_planners, standing_pose
-from template_control.embedding.standing.options import StandingOptions
+from template_control.embedding.standing.passes import CLOSING
 from template_control.run.options import Push
 from template_control.slip import Event
 from template_control.slip.automaton.automaton import AUTOMATON, STEP_OUT
@@ -15,7 +15,6 @@ from template_control.slip.scenario.scenario import Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 P = tc.SlipParameters()
-OPTIONS = StandingOptions()
 STEPS = {"sf": 1.0, "sb": -1.0}  # and their directions
 WIDE, NARROW = (0.42, 0.0), (0.1, 0.3)  # feet apart [m], speed in the step's direction [m/s]
 
@@ -45,7 +44,7 @@ def test_a_step_leads_to_rest(planners, kind, case):
     np.testing.assert_allclose(stride.state[2:], 0.0, atol=1e-12)
     rear, front = stride.toes
     assert rear < front, "roles are those of the feet as they stand"
-    assert front - rear == pytest.approx(OPTIONS.closing, abs=0.03)
+    assert front - rear == pytest.approx(CLOSING, abs=0.03)
     assert stride.state[0] == pytest.approx(0.5 * (rear + front), abs=1e-9)
     assert {"sf": rear, "sb": front}[kind] == pytest.approx({"sf": case[0], "sb": 0.0}[kind])
     for event in stride.events[:2]:

@@ -13,6 +13,7 @@ from template_control.embedding.planners.planner import Decision, LandingPlanner
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.planners.transition import (
     RUN_TO_WALK,
+    TOLERANCE,
     WALK_TO_RUN,
     TransitionPlanner,
 )
@@ -67,7 +68,7 @@ def test_from_the_walk_it_comes_to_the_run_within_tolerance(speed):
     end, outcome = ReturnMap(P, "wr").step(WALK.vlo, decision.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(decision.predicted, [*end, 0.0], atol=1e-12)
-    assert np.all(np.abs(end - target) < np.array(WALK_TO_RUN.tolerance)[:2] / 5)
+    assert np.all(np.abs(end - target) < TOLERANCE[:2] / 5)
     walks = WALK.controls[[Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]]
     np.testing.assert_allclose(decision.controls[:3], walks, rtol=1e-3)
     assert decision.feasible
@@ -82,7 +83,7 @@ def test_from_the_run_it_comes_near_the_walk_with_legs_that_a_knee_can_be(speed)
     end, outcome = ReturnMap(P, "rw").step(z, decision.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(decision.predicted, end, atol=1e-12)
-    tolerance = np.array(RUN_TO_WALK.tolerance)
+    tolerance = TOLERANCE
     assert np.all(np.abs(end - WALK.vlo) < 4.0 * tolerance)
     # The walking planner makes good what is left.
     for _ in range(8):
@@ -182,7 +183,7 @@ def test_what_is_chosen_within_a_stride_is_what_the_whole_stride_does(stride):
     whole, outcome = ReturnMap(P, stride).step(z, again.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(again.predicted[: len(whole)], whole, atol=1e-7)
-    tolerance = np.array(planner.options.tolerance)[: len(target)]
+    tolerance = TOLERANCE[: len(target)]
     before = ReturnMap(P, stride).step(z, first.controls)[0]
     missed = [np.linalg.norm((x - target) / tolerance) for x in (before, whole)]
     assert missed[1] < 0.9 * missed[0]
@@ -195,7 +196,7 @@ def test_a_leg_that_has_landed_elsewhere_gets_other_stiffnesses():
     state[2] += 0.1  # faster than planned
     ahead = ahead_from(node, state, toes, end)
     again = planner.land(ahead, first, target, free_controls(AUTOMATON, AUTOMATON.node(node)))
-    tolerance = np.array(planner.options.tolerance)
+    tolerance = TOLERANCE
     left, right = (
         np.linalg.norm((ahead(d.controls)[0] - target) / tolerance) for d in (first, again)
     )

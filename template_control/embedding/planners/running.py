@@ -8,13 +8,13 @@ speed; a target far from it is approached step by step.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Index, Interval, NotNegative, Positive, Share
+from template_control.checks.ranges import Index, Interval, NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.embedding.planners.planner import ANY_ANGLE, Decision
 from template_control.embedding.planners.stride_solver import (
@@ -27,85 +27,64 @@ from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
-from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
+from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
 
+_SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]  # the first three
 _SAME = 1e-9  # rounding [m/s, m]
-
-
-class RunningLimits(NamedTuple):
-    """The numbers of a running planner; compiled code takes a plain tuple of them.
-
-    Attributes:
-        rest_length: l0 [m].
-        top_margin: alpha stays this far [rad] below asin(y / l0).
-        flatter, steeper: least and greatest alpha, relative to the gait's [rad].
-        softest, stiffest: least and greatest stiffness, over the gait's.
-        turn, sooner, later: changes of alpha [rad], k_sc and k_sd (shares) that count as 1.
-        faster, higher, slower, lower: how far the aim may be from the present apex [m/s, m].
-    """
-
-    rest_length: float
-    top_margin: float
-    flatter: float
-    steeper: float
-    softest: float
-    stiffest: float
-    turn: float
-    sooner: float
-    later: float
-    faster: float
-    higher: float
-    slower: float
-    lower: float
+# A flatter leg brakes with forces that the hips cannot bear.
+_ANGLE_RANGE = (-0.1, 0.1)  # of alpha relative to the gait's [rad]
+_TOP_MARGIN = 0.005  # of alpha below asin(y / l0), at which the foot would touch down at once [rad]
+_CLIMB = 0.02  # largest way from the present height to the one aimed at, over l0
+# For the reference template: dx/dt and y [m/s, m].
+_TOLERANCE = np.array([0.02, 0.004])  # errors at the next apex that count as 1
+OFFSET_GAIN = 0.2
+"""Share of a stride's surprise that enters the offset estimate."""
+_OFFSET_BOUND = np.array([0.3, 0.03])  # largest offset believed
+SURPRISE_BOUND = np.array([0.06, 0.008])
+"""A larger surprise counts as this much [m/s, m], for the reference template: it is a push."""
+# Where a stride would miss the speed aimed at by more than this, and by more than half of the
+# change, a smaller change is tried.
+_MISS = 0.1  # [m/s], for the reference template
 
 
 @compiled
-def aim_and_bounds(
+def leg_bounds(
     z: Array,
-    wanted: Array,
-    offset: Array,
     legs: Array,
     angles: tuple[float, float],
-    limits: tuple[float, ...],
-) -> tuple[Array, Array, bool]:
-    """Where the template's stride is to end, and the controls that it may have.
+    rest_length: float,
+    change: tuple[float, float, float],
+    stiffness_range: tuple[float, float],
+) -> Array:
+    """Controls that a stride may have, about those of a gait.
+
+    Compiled: a run plans three times a stride, and each plan decides on two strides.
 
     Args:
         z: (2,) apex that the stride begins at, dx/dt and y [m/s, m].
-        wanted: (2,) apex that the route asks for.
-        offset: (3,) what the robot adds to the template's next apex.
         legs: (3,) alpha [rad], k_sc and k_sd [N/m] of the gait near the present speed.
         angles: least and greatest alpha that the swing foot can still reach [rad].
-        limits: of :class:`RunningLimits`.
+        rest_length: l0 [m].
+        change: of alpha [rad], k_sc and k_sd (shares of the gait's) that count as 1.
+        stiffness_range: k_sc and k_sd over the gait's.
 
     Returns:
-        (2,) the aim, less the offset; (4, 3) of a :class:`~.stride_solver.Prior`; whether the aim
-        is what was wanted.
+        (4, 3) of a :class:`~.stride_solver.Prior`.
     """
-    l0, margin, flatter, steeper, softest, stiffest = limits[:6]
-    turn, sooner, later, faster, higher, slower, lower = limits[6:]
-    goal, table = np.empty(2), np.empty((4, 3))
-    at_target = True
+    table = np.empty((4, 3))
+    top = np.arcsin(min(z[1] / rest_length, 1.0)) - _TOP_MARGIN
+    table[1, 0] = change[0]
     for i in range(2):
-        up, down = (faster, slower) if i == 0 else (higher, lower)
-        aim = min(max(wanted[i], z[i] - down), z[i] + up)
-        at_target = at_target and abs(wanted[i] - aim) < _SAME
-        goal[i] = aim - offset[i]
-    top = np.arcsin(min(z[1] / l0, 1.0)) - margin
-    table[1, 0] = turn
-    table[2, 0] = min(max(min(legs[0] + flatter, top), angles[0]), angles[1], top)
-    table[3, 0] = min(max(min(legs[0] + steeper, top), angles[0]), angles[1], top)
+        angle = min(legs[0] + _ANGLE_RANGE[i], top)
+        table[2 + i, 0] = min(max(angle, angles[0]), angles[1], top)
     for i in range(1, 3):
-        table[1, i] = (sooner if i == 1 else later) * legs[i]
-        table[2, i], table[3, i] = softest * legs[i], stiffest * legs[i]
+        table[1, i] = change[i] * legs[i]
+        table[2, i], table[3, i] = stiffness_range[0] * legs[i], stiffness_range[1] * legs[i]
     for i in range(3):
         table[0, i] = min(max(legs[i], table[2, i]), table[3, i])
-    return goal, table, at_target
-
-
-_SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]  # the first three
+    return table
 
 
 @dataclass(frozen=True)
@@ -113,21 +92,10 @@ class RunningOptions(Checked):
     """Tuning of the running planner.
 
     Attributes:
-        tolerance: errors of dx/dt and y at the next apex that count as 1.
         change: changes of alpha [rad], k_sc and k_sd (shares of the gait's) that count as 1.
-        angle_range: alpha relative to the gait's [rad]. A flatter leg brakes with forces that the
-            hips cannot bear.
         stiffness_range: k_sc and k_sd over the gait's.
-        top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the foot
-            would touch down at once.
         pace: the speed aimed at is at most this far from the present one.
         brake: below the present one at most this far; None: as ``pace``.
-        miss: where a stride would miss the speed aimed at by more than this, and by more than half
-            of the change, a smaller change is tried.
-        climb: the height aimed at is at most this far from the present one.
-        offset_gain: share of a stride's surprise that enters the offset estimate.
-        offset_bound: largest offset believed.
-        surprise_bound: a larger surprise counts as this much: a push is no offset.
         rounds: Gauss-Newton steps.
         near: in a steady run, a state that is this many tolerances from that of a stride which is
             solved already is solved to first order about it; 0: every stride is solved anew.
@@ -135,18 +103,10 @@ class RunningOptions(Checked):
 
     kind: ClassVar[str] = "deadbeat"
 
-    tolerance: tuple[Positive, Positive] = tuned((0.02, 0.004), SPEED, LENGTH)
     change: tuple[Positive, Positive, Positive] = tuned((0.02, 0.15, 0.15))
-    angle_range: Interval = tuned((-0.1, 0.1))
     stiffness_range: Interval = tuned((0.6, 1.6))
-    top_margin: NotNegative = tuned(0.005)
     pace: Positive = tuned(0.09, SPEED)
     brake: Positive | None = tuned(None, SPEED)
-    miss: Positive = tuned(0.1, SPEED)
-    climb: Positive = tuned(0.02, LENGTH)
-    offset_gain: Share = tuned(0.2)
-    offset_bound: tuple[NotNegative, NotNegative] = tuned((0.3, 0.03), SPEED, LENGTH)
-    surprise_bound: tuple[NotNegative, NotNegative] = tuned((0.06, 0.008), SPEED, LENGTH)
     rounds: Index = tuned(4)
     near: NotNegative = tuned(0.5)
 
@@ -178,18 +138,17 @@ class RunningPlanner:
     @checked
     def __init__(self, gait: RunningGait, options: RunningOptions | None = None) -> None:
         self.gait = gait
-        self.options = scaled(options or RunningOptions(), Scale.of(gait.parameters))
+        self._scale = Scale.of(gait.parameters)
+        self.options = scaled(options or RunningOptions(), self._scale)
         self.offset: Array = np.zeros(PADDED)
         self._family = RunningFamily(gait)
         self._map = ReturnMap(gait.parameters, gait.stride)
         o = self.options
         self._grid = 0.5 * o.pace
-        slower = o.pace if o.brake is None else o.brake
-        ranges = *o.angle_range, *o.stiffness_range, *o.change
-        reach = o.pace, o.climb, slower, o.climb
-        limits = RunningLimits(gait.parameters.rest_length, o.top_margin, *ranges, *reach)
-        self._limits = tuple(map(float, limits))
-        self._strides = NearbyStrides(np.array(o.tolerance), o.near)
+        self._slower = o.pace if o.brake is None else o.brake
+        self._climb = _CLIMB * gait.parameters.rest_length
+        self._miss = _MISS * self._scale.speed
+        self._strides = NearbyStrides(_TOLERANCE * self._scale.state[:2], o.near)
         # Compile now what a stride would otherwise wait for.
         self.decide(gait.apex)
 
@@ -207,20 +166,42 @@ class RunningPlanner:
             self.gait = self._family.at(float(target[0]))
         wanted = self.gait.apex if target is None else target
         near = self._near(z, wanted)
-        legs = near.controls[: len(_SLOTS)]
-        numbers = wanted, self.offset, legs, angles, self._limits
-        goal, table, at_target = aim_and_bounds(z, *numbers)
+        goal, at_target = self._aim(z, wanted)
+        table = self.bounds(z, near, angles)
         prior = Prior(near.controls, _SLOTS, table, self.options.rounds)
         stride = FromSection(self._map, z, _SLOTS)
 
         def solve(goal: Array) -> tuple[Array, Array | None]:
             return self._strides.solve(stride, goal, prior)
 
-        u, end = solve_within_reach(solve, z, goal, self.options.miss)
+        u, end = solve_within_reach(solve, z, goal, self._miss)
         completed = end is not None
         predicted = self.offset.copy()
         predicted[:2] += z if end is None else end
         return Decision(u, predicted, completed, completed, completed and at_target)
+
+    def bounds(self, z: Array, gait: RunningGait, angles: tuple[float, float]) -> Array:
+        """(4, 3) of a :class:`~.stride_solver.Prior`: controls about a gait's.
+
+        Args:
+            z: (2,) apex that the stride begins at [m/s, m].
+            gait: near the present speed.
+            angles: least and greatest alpha that the swing foot can still reach [rad].
+        """
+        o, l0 = self.options, gait.parameters.rest_length
+        legs = gait.controls[: len(_SLOTS)]
+        low, high = float(angles[0]), float(angles[1])
+        table: Array = leg_bounds(z, legs, (low, high), l0, o.change, o.stiffness_range)
+        return table
+
+    def _aim(self, z: Array, wanted: Array) -> tuple[Array, bool]:
+        """(2,) the template's next apex, less the offset; whether it is what was wanted."""
+        speed, height = z.tolist()
+        fastest, highest = wanted.tolist()
+        fast = min(max(fastest, speed - self._slower), speed + self.options.pace)
+        high = min(max(highest, height - self._climb), height + self._climb)
+        at_target = abs(fastest - fast) < _SAME and abs(highest - high) < _SAME
+        return np.array([fast, high]) - self.offset[:2], at_target
 
     def _near(self, z: Array, wanted: Array) -> RunningGait:
         """The gait about which the controls change, near the present speed."""
@@ -232,8 +213,7 @@ class RunningPlanner:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal strides teach."""
         if not (decision.feasible and decision.nominal):
             return
-        o, come, told = self.options, z.tolist(), decision.predicted.tolist()
-        for i, (limit, bound) in enumerate(zip(o.surprise_bound, o.offset_bound, strict=True)):
-            surprise = min(max(come[i] - told[i], -limit), limit)
-            offset = self.offset.item(i) + o.offset_gain * surprise
-            self.offset[i] = min(max(offset, -bound), bound)
+        unit = self._scale.state[:2]
+        limit, bound = SURPRISE_BOUND * unit, _OFFSET_BOUND * unit
+        surprise = np.clip(z[:2] - decision.predicted[:2], -limit, limit)
+        self.offset[:2] = np.clip(self.offset[:2] + OFFSET_GAIN * surprise, -bound, bound)

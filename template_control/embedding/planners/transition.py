@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Index, Interval, NotNegative, Positive
+from template_control.checks.ranges import Interval, Positive
 from template_control.embedding.planners.planner import (
     ANY_ANGLE,
     Ahead,
@@ -34,11 +34,24 @@ from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
-from template_control.slip.similarity import LENGTH, SPEED, Scale, scaled, tuned
+from template_control.slip.similarity import Scale, scaled, tuned
 
 Array = NDArray[np.float64]
 
 _LEGS = (Slot.K_SC, Slot.K_SD)  # of a gait, before and after the bottom
+
+
+TOLERANCE = np.array([0.05, 0.01, 0.1])
+"""Errors of dx/dt, y, dy/dt at the end that count as 1 [m/s, m, m/s], of the reference."""
+_TOP_MARGIN = 0.005  # of alpha below asin(y / l0), at which the foot would touch down at once [rad]
+_ROUNDS = 6  # Gauss-Newton steps
+# When a foot has landed: shares of the stiffnesses chosen before.
+_AGAIN = 0.3  # change that counts as 1
+_AGAIN_BOUNDS = (0.5, 2.0)
+# Where the robot breaks into the stride.
+_BROKEN_TURN = 0.05  # change of alpha that counts as 1 [rad]
+_BROKEN_ANGLES = (-0.2, 0.1)  # of alpha, relative to the gait's [rad]
+_BROKEN_BOUNDS = (0.35, 2.0)  # of the stiffnesses, over those of the gait that it leads to
 
 
 @dataclass(frozen=True)
@@ -50,15 +63,6 @@ class TransitionOptions(Checked):
         base: what they change from: alpha [rad], and stiffnesses over m g / l0.
         change: changes of each that count as 1 [rad, shares of the base].
         bounds: of each: alpha relative to the base [rad], shares of the base.
-        tolerance: errors of dx/dt, y, dy/dt at the end that count as 1.
-        top_margin: alpha stays this far [rad] below asin(y / l0), the angle at which the foot
-            would touch down at once.
-        again: change of each, a share, that counts as 1 when a foot has landed.
-        again_bounds: of the stiffnesses when a foot has landed, as shares of those chosen before.
-        broken_turn: change of alpha [rad] that counts as 1 where the robot breaks into the stride.
-        broken_angles: of alpha then, relative to the gait's [rad].
-        broken_bounds: of the stiffnesses then, as shares of those of the gait that it leads to.
-        rounds: Gauss-Newton steps.
 
     Raises:
         ParameterError: if there are not as many of each as there are free controls.
@@ -68,14 +72,6 @@ class TransitionOptions(Checked):
     base: tuple[Positive, ...] = tuned((12.2, 20.8))
     change: tuple[Positive, ...] = tuned((0.3, 0.3))
     bounds: tuple[Interval, ...] = tuned(((0.5, 2.0), (0.5, 2.0)))
-    tolerance: tuple[Positive, Positive, Positive] = tuned((0.05, 0.01, 0.1), SPEED, LENGTH, SPEED)
-    top_margin: NotNegative = tuned(0.005)
-    again: Positive = tuned(0.3)
-    again_bounds: Interval = tuned((0.5, 2.0))
-    broken_turn: Positive = tuned(0.05)
-    broken_angles: Interval = tuned((-0.2, 0.1))
-    broken_bounds: Interval = tuned((0.35, 2.0))
-    rounds: Index = tuned(6)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -125,7 +121,9 @@ class TransitionPlanner:
     ) -> None:
         self._before, self._after = before, after
         p = before.gait.parameters
-        self.options = scaled(options, Scale.of(p))
+        scale = Scale.of(p)
+        self.options = scaled(options, scale)
+        self._tolerance = TOLERANCE * scale.state
         self.offset: Array = np.zeros(PADDED)
         self._map = ReturnMap(p, stride)
         self.gait = self._first = after(float(before.gait.state[0]))
@@ -146,7 +144,7 @@ class TransitionPlanner:
         wanted = self.gait.state if target is None else target
         size = self._map.dimensions[1]
         prior = self._prior(z, angles)
-        tolerance = np.array(self.options.tolerance)[:size]
+        tolerance = self._tolerance[:size]
         u, end = solve_stride(FromSection(self._map, z, prior.slots), wanted, prior, tolerance)
         return self._decision(u, end, wanted)
 
@@ -154,13 +152,13 @@ class TransitionPlanner:
         self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
     ) -> Decision:
         """See :meth:`~.planner.LandingPlanner.land`."""
-        o, controls = self.options, decision.controls
+        controls = decision.controls
         stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE]
         base = controls[stiff]
-        lower, upper = (share * base for share in o.again_bounds)
-        table = np.array([base, o.again * base, lower, upper])
-        prior = Prior(controls.copy(), stiff, table, o.rounds)
-        tolerance = np.array(o.tolerance)[: len(target)]
+        lower, upper = (share * base for share in _AGAIN_BOUNDS)
+        table = np.array([base, _AGAIN * base, lower, upper])
+        prior = Prior(controls.copy(), stiff, table, _ROUNDS)
+        tolerance = self._tolerance[: len(target)]
         u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
         return self._decision(u, end, target)
 
@@ -176,17 +174,17 @@ class TransitionPlanner:
         turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
         base = gait.controls[[chosen[Slot(slot)] for slot in slots]]
         now, wanted = float(controls[Slot.TOUCHDOWN_ANGLE]), gait.controls[Slot.TOUCHDOWN_ANGLE]
-        flattest = max(now - free.turn, min(now, wanted + o.broken_angles[0]))
-        steepest = min(now + free.turn, max(now, wanted + o.broken_angles[1]))
-        softest, stiffest = o.broken_bounds
+        flattest = max(now - free.turn, min(now, wanted + _BROKEN_ANGLES[0]))
+        steepest = min(now + free.turn, max(now, wanted + _BROKEN_ANGLES[1]))
+        softest, stiffest = _BROKEN_BOUNDS
         lower = np.where(turns, flattest, softest * base)
         upper = np.where(turns, steepest, stiffest * base)
         base = np.clip(base, lower, upper)
-        change = np.where(turns, o.broken_turn, o.again * base)
+        change = np.where(turns, _BROKEN_TURN, _AGAIN * base)
         u = controls.copy()
         u[own] = gait.controls[[chosen[slot] for slot in own]]
-        prior = Prior(u, slots, np.array([base, change, lower, upper]), o.rounds)
-        tolerance = np.array(o.tolerance)[: len(target)]
+        prior = Prior(u, slots, np.array([base, change, lower, upper]), _ROUNDS)
+        tolerance = self._tolerance[: len(target)]
         u, end = solve_stride(FromHere(ahead, slots), target, prior, tolerance)
         return self._decision(u, end, target)
 
@@ -207,9 +205,9 @@ class TransitionPlanner:
         if angles[0] == angles[1]:
             controls[Slot.TOUCHDOWN_ANGLE] = angles[0]
             lower[turns] = upper[turns] = angles[0]
-        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
+        top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - _TOP_MARGIN
         upper[turns] = np.minimum(upper[turns], top)
         lower[turns] = np.minimum(lower[turns], upper[turns])
         change = np.array(o.change) * np.where(turns, 1.0, base)
         table = np.array([np.clip(base, lower, upper), change, lower, upper])
-        return Prior(controls, slots, table, o.rounds)
+        return Prior(controls, slots, table, _ROUNDS)

@@ -10,10 +10,7 @@ import numpy as np
 
 from template_control.embedding.com_path import LOCATE
 from template_control.embedding.leg_forces import leg_forces
-from template_control.embedding.planners.running import (
-    RunningLimits,
-    aim_and_bounds,
-)
+from template_control.embedding.planners.running import leg_bounds
 from template_control.embedding.planners.step_search import KneeLoadPenalty, Law, choose
 from template_control.embedding.planners.stride_solver import improve
 from template_control.embedding.swing import (
@@ -120,8 +117,7 @@ def catch() -> None:
     """The planner of the run that a walk breaks into."""
     one, square, prior = np.ones(1), np.ones((1, 1)), np.ones((4, 1))
     improve((one, one, one, square, square), one, one, one, prior)
-    apex, limits = np.ones(2), tuple(1.0 for _ in RunningLimits._fields)
-    aim_and_bounds(apex, apex, np.zeros(3), np.ones(3), (0.0, 1.0), limits)
+    leg_bounds(np.ones(2), np.ones(3), (0.0, 1.0), 1.0, (1.0, 1.0, 1.0), (0.0, 1.0))
 
 
 CONTROL = (

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from template_control.compiled import compiled
 from template_control.embedding.com_path import TERMS, Quintic, quintics
-from template_control.embedding.standing.options import StandingOptions
+from template_control.embedding.standing.options import PLACE, StandingOptions
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
 from template_control.warm_up import Part
 
 Array = NDArray[np.float64]
@@ -121,9 +122,6 @@ STAND = (Part(curves, 0.5),)
 """What standing, starting and stopping call."""
 
 
-_PEAK = 10.0 / np.sqrt(3.0)  # acceleration of a quintic from rest to rest, over distance / time^2
-
-
 class Found(NamedTuple):
     """The best curve found.
 
@@ -136,6 +134,20 @@ class Found(NamedTuple):
     pieces: tuple[Quintic, ...]
     excess: float
     cost: float
+
+
+_PEAK = 10.0 / np.sqrt(3.0)  # acceleration of a quintic from rest to rest, over distance / time^2
+_SHIFTS = (0.05, 0.15, 0.25, 0.35, 0.45)  # of the spacing: places from which a start may set off
+# Shares of the load that the front foot may take up at once where it has landed.
+_LOADS = (0.33, 0.67, 1.0)
+_FALL = 0.5  # largest downward acceleration that a curve begins with, over g
+_MARGIN = 0.01  # of a rest place from either foot, over l0
+_REST_PLACES = 9  # that are tried
+_DURATIONS = 14  # that are tried, from the shortest to the longest
+# For the reference template.
+_SHORTEST, _LONGEST = 0.1, 1.2  # duration of a quintic [s]
+_CALM = 0.3  # duration of a quintic that is liked best [s]
+_PACE = 0.002  # excess that a second more or less counts as [m/s]
 
 
 @dataclass(frozen=True)
@@ -151,6 +163,20 @@ class BetweenFeet:
     toes: tuple[float, float]
     parameters: SlipParameters
     options: StandingOptions
+
+    @cached_property
+    def _pace(self) -> float:
+        return _PACE * Scale.of(self.parameters).speed
+
+    @cached_property
+    def _durations(self) -> tuple[float, float]:
+        unit = Scale.of(self.parameters).time
+        return _SHORTEST * unit, _LONGEST * unit
+
+    @property
+    def margin(self) -> float:
+        """Of a rest place from either foot [m]."""
+        return _MARGIN * self.parameters.rest_length
 
     @property
     def spacing(self) -> float:
@@ -172,7 +198,13 @@ class BetweenFeet:
         p, o = self.parameters, self.options
         reach = o.reach * p.rest_length
         return Rules(
-            min(self.toes), max(self.toes), p.gravity_parts, reach, o.slack, o.pace, o.calm
+            low=min(self.toes),
+            high=max(self.toes),
+            gravity=p.gravity_parts,
+            reach=reach,
+            slack=o.slack,
+            pace=self._pace,
+            calm=_CALM * Scale.of(p).time,
         )
 
     def loaded(self, start: Array) -> Array:
@@ -186,9 +218,9 @@ class BetweenFeet:
         if y <= 0.0:
             return start[None]
         across, along = self.parameters.gravity_parts
-        lift = max(1.0 - self.options.fall, 1.0 + start[1, 2] / across) * across
-        starts = np.repeat(start[None], 1 + len(self.options.loads), axis=0)
-        for i, share in enumerate(self.options.loads, 1):
+        lift = max(1.0 - _FALL, 1.0 + start[1, 2] / across) * across
+        starts = np.repeat(start[None], 1 + len(_LOADS), axis=0)
+        for i, share in enumerate(_LOADS, 1):
             starts[i, 0, 2] = (x - self.place(share)) * lift / y - along
         return starts
 
@@ -199,12 +231,11 @@ class BetweenFeet:
             start: (2, 3) x and y, each position, velocity and acceleration; or (m, 2, 3) of these.
             ends: (n, 2, 3) the same.
         """
-        o = self.options
-        durations = np.geomspace(*o.durations, o.trials[0])
+        durations = np.geomspace(*self._durations, _DURATIONS)
         curve = np.empty((2, TERMS))
         starts = start.reshape(-1, 2, 3).copy()
         # Where a foot lands late, the template has begun to fall.
-        starts[:, 1, 2] = np.maximum(starts[:, 1, 2], -o.fall * self.parameters.gravity)
+        starts[:, 1, 2] = np.maximum(starts[:, 1, 2], -_FALL * self.parameters.gravity)
         cost, excess, end, i = best_quintic(starts, ends, durations, self._rules, curve)
         return Found((Quintic(curve, float(durations[i])),), excess, cost), end
 
@@ -215,15 +246,14 @@ class BetweenFeet:
             start: (2, 3) x and y, each position, velocity and acceleration.
             lands: whether the front foot has just landed: it takes up load at once.
         """
-        o = self.options
-        margin = min(o.margin, 0.5 * abs(self.spacing))
+        margin = min(self.margin, 0.5 * abs(self.spacing))
         low, high = min(self.toes) + margin, max(self.toes) - margin
-        wanted = self.place(o.place)
-        places = np.append(np.linspace(low, high, o.trials[1]), wanted)
+        wanted = self.place(PLACE)
+        places = np.append(np.linspace(low, high, _REST_PLACES), wanted)
         starts = self.loaded(start) if lands else start
         stop, i = self.best(starts, np.array([self.at_rest(x) for x in places]))
         there, _ = self.best(starts, self.at_rest(wanted)[None])
-        if there.cost <= stop.cost + o.pace * o.durations[1]:
+        if there.cost <= stop.cost + self._pace * self._durations[1]:
             return there
         return self._joined(stop, self._shift(places[i], wanted))
 
@@ -242,7 +272,7 @@ class BetweenFeet:
         found, number = self.best(self.loaded(start) if lands else start, ends)
         if lands or found.excess <= self.options.slack:
             return found, number
-        for share in self.options.shifts:
+        for share in _SHIFTS:
             place = self.place(share)
             back, _ = self.best(start, self.at_rest(place)[None])
             away, i = self.best(self.at_rest(place), ends)
@@ -255,9 +285,9 @@ class BetweenFeet:
         """From rest to rest [m], within half of what the centre of pressure allows."""
         room = 0.5 * min(abs(end - toe) for toe in self.toes) + self.options.slack
         height = self.options.height / self.parameters.gravity
-        time = max(np.sqrt(_PEAK * abs(end - start) * height / room), self.options.durations[0])
+        time = max(np.sqrt(_PEAK * abs(end - start) * height / room), self._durations[0])
         curve = quintics(self.at_rest(start), self.at_rest(end), np.array(time))
-        return Found((Quintic(curve, float(time)),), 0.0, self.options.pace * float(time))
+        return Found((Quintic(curve, float(time)),), 0.0, self._pace * float(time))
 
     def _joined(self, first: Found, second: Found) -> Found:
         return Found(

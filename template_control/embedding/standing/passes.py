@@ -18,6 +18,7 @@ from template_control.slip.dynamics.stride import Stride, StrideSimulator, contr
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
 from template_control.warm_up import ready
 
 Array = NDArray[np.float64]
@@ -27,7 +28,31 @@ _FLATTER = 0.05  # the way past VLO goes on beyond the flattest landing [rad]
 _POINTS = 120  # of a way, between which a landing is looked for
 _NEWTON = 3
 _APPROACHES = 12
-_SPEEDS = 25  # that gaits and vaults are kept for
+_SPEEDS = 25  # that gaits and passes are kept for
+_VAULT = 64.0  # stiffness of the leg that slowly passes under the CoM, k l0 / (m g)
+_SLOWEST = 0.05  # speed at VLO of the slowest step, over sqrt(g l0)
+_ANGLES = 12  # touchdown angles tried
+_FLATTEST = 1.08  # of them [rad]
+_STIFFNESS = (0.5, 4.0)  # least and greatest of the leg before touchdown, over k0
+# The CoM sinks over a softer leg, and the foot lands further ahead of it.
+_YIELDING = (1.0, 0.85, 0.7)  # stiffnesses tried, over that with which the leg keeps its length
+_STEPS = (0.15, 0.65)  # shortest and longest step, over l0
+_NARROW = 0.02  # excess that a metre between the feet, more or less than CLOSING, counts as [m]
+CLOSING = 0.25
+"""Distance of the feet after a step from a stand, and where a walk ends, over l0."""
+# For the reference template.
+_SINGLE = (0.15, 0.5)  # shortest and longest way of the CoM in single stance before VLO [s]
+_LANDING = (0.16, 0.35)  # bounds of the shortest time from VLO to a touchdown [s]
+_SWIFTNESS = 3.2  # mean speed of the foot to its foothold between them, over the CoM's at VLO
+# Of a step from a stand.
+STEP_DURATION = 1.5
+"""Duration of a step from a stand, about [s], for the reference template."""
+NIMBLE = 1.8
+"""Largest mean speed of a foot in the air [m/s], for the reference template."""
+_STEP_SPEEDS = 10  # at VLO that are tried
+_FASTEST = 0.16  # of them, over sqrt(g l0)
+_LATE = 0.15  # the foot lifts off this long after VLO at the latest [s], for the reference template
+_SPARE = 0.06  # distance of the capture point from either foot at landing, over l0
 
 
 class Family(NamedTuple):
@@ -91,6 +116,7 @@ class Vaults:
     ) -> None:
         ready(STAND)
         self.parameters, self.options, self.family = parameters, options, family
+        self.scale = Scale.of(parameters)
         self._automaton = automaton
         self._simulator = StrideSimulator(parameters, automaton)
         self._node = automaton.start(StrideKind.WALK).name
@@ -99,7 +125,7 @@ class Vaults:
         unit = parameters.speed_unit
         # Uphill the CoM is behind the foot at VLO, and has to come over it.
         uphill = max(np.tan(parameters.slope), 0.0) * np.sqrt(parameters.gravity * options.height)
-        slowest = options.slowest * unit
+        slowest = _SLOWEST * unit
         if uphill:
             slowest = float(np.hypot(slowest, uphill))
         self._speeds = np.linspace(slowest, family.speeds[1], _SPEEDS)
@@ -137,7 +163,7 @@ class Vaults:
             gait = self.family.gait(min(speed, fastest))
             return Vault(gait.state, float(gait.controls[Slot.K_SD]))
         own = float(self.family.gait(slowest).controls[Slot.K_SD])
-        stiff = self.options.vault * p.mass * p.gravity / p.rest_length
+        stiff = _VAULT * p.mass * p.gravity / p.rest_length
         share = np.clip(2.0 * (1.0 - speed / slowest), 0.0, 1.0)
         stiffness = float(own + share * (stiff - own))
         load = p.mass * (p.gravity - speed**2 / p.rest_length)
@@ -166,7 +192,7 @@ class Vaults:
         back = replace(self.parameters, slope=-self.parameters.slope)
         simulator = StrideSimulator(back, self._automaton)
         past = simulator.run(self._node, [0.0, height, speed, -vertical], u)
-        shortest, longest = self.options.single
+        shortest, longest = (time * self.scale.time for time in _SINGLE)
         # Whatever ends the stride: before it the leg pushes.
         longest = min(longest, 0.98 * past.duration)
         x, y, dx, dy, ddx, ddy = past.sample(np.linspace(shortest, longest, _APPROACHES)).T
@@ -188,30 +214,31 @@ class Vaults:
             z: (3,) state at VLO.
             angles: least and greatest touchdown angle [rad].
         """
-        k, (least, most) = self._keeping(z), self.options.stiffness
+        k, (least, most) = self._keeping(z), _STIFFNESS
         k0 = self.parameters.leg_stiffness
-        tried = {min(max(share * k, least * k0), most * k0) for share in self.options.yielding}
+        tried = {min(max(share * k, least * k0), most * k0) for share in _YIELDING}
         steps = [step for k in sorted(tried) for step in self._landings(z, k, angles)]
         # Where no step leaves the foot its time, the one that leaves it most has to do.
         return [s for s in steps if s.late >= 0.0] or sorted(steps, key=lambda s: -s.late)[:1]
 
     def _landings(self, z: Array, stiffness: float, angles: tuple[float, float]) -> list[Touchdown]:
         """Of all angles from one way past VLO: the foot lands when the CoM sinks to its leg."""
-        p, (number, flattest) = self.parameters, self.options.angles
+        p = self.parameters
         top = float(np.arcsin(min(z[1] / p.rest_length, 1.0))) - 0.005
-        tried = np.unique(np.clip(np.linspace(flattest, top, number), *angles))
+        tried = np.unique(np.clip(np.linspace(_FLATTEST, top, _ANGLES), *angles))
         u = controls(max(float(tried[0]) - _FLATTER, _FLAT), stiffness, stiffness)
         stride = self._simulator.run(self._node, VLO.state(z), u)
         times = _sinking(stride, p.rest_length * np.sin(tried))
         landed = np.isfinite(times)
         states = stride.sample(times[landed]).reshape(-1, 3, 2).swapaxes(1, 2)
-        shortest, longest = self.options.steps
+        shortest, longest = (step * p.rest_length for step in _STEPS)
+        soonest, latest = (time * self.scale.time for time in _LANDING)
         found = []
         for angle, time, state in zip(tried[landed], times[landed], states, strict=True):
             toe = float(state[0, 0] + p.rest_length * np.cos(angle))
             if shortest <= toe <= longest or len(tried) == 1:
-                swift = toe / (self.options.swiftness * max(float(z[0]), 1e-6))
-                least = float(np.clip(swift, *self.options.landing))
+                swift = toe / (_SWIFTNESS * max(float(z[0]), 1e-6))
+                least = float(np.clip(swift, soonest, latest))
                 late = float(time) - least
                 found.append(Touchdown(float(angle), stiffness, state, (0.0, toe), late))
         return found
@@ -226,6 +253,16 @@ class Vaults:
             toes: (2,) x of the rear and the front foot [m].
         """
         return self._simulator.run(node, state, u, toes)
+
+
+def width_price(apart: float, parameters: SlipParameters) -> float:
+    """Price of feet that do not close to the distance that is liked best [m].
+
+    Args:
+        apart: distance of the feet [m].
+        parameters: the template.
+    """
+    return _NARROW * abs(apart - CLOSING * parameters.rest_length)
 
 
 def _sinking(stride: Stride, heights: Array) -> Array:
@@ -292,14 +329,12 @@ class Passes:
     """
 
     def __init__(self, vaults: Vaults, node: str) -> None:
-        self.parameters, self.options = vaults.parameters, vaults.options
+        self.parameters, self._scale = vaults.parameters, vaults.scale
         self._vaults, self._node = vaults, node
         self.known = self._found()
 
     def _found(self) -> list[Pass]:
-        o, p = self.options, self.parameters
-        speeds = np.linspace(o.slowest, o.passes[1], o.passes[0])
-        speeds *= p.speed_unit
+        speeds = np.linspace(_SLOWEST, _FASTEST, _STEP_SPEEDS) * self.parameters.speed_unit
         found = (self._over(self._vaults.at(float(speed))) for speed in speeds)
         return [over for over in found if over is not None]
 
@@ -310,7 +345,7 @@ class Passes:
             start: (2, 3) x and y of the CoM, each position, velocity and acceleration.
             toe: x of the leg's foot [m].
         """
-        p, (least, most) = self.parameters, self.options.stiffness
+        p, (least, most) = self.parameters, _STIFFNESS
         length = float(np.hypot(start[0, 0] - toe, start[1, 0]))
         share = p.mass * p.gravity / (max(p.rest_length - length, 1e-6) * p.leg_stiffness)
         return min(max(share, least), most) * p.leg_stiffness
@@ -333,7 +368,7 @@ class Passes:
             landing: of the step.
             foot: x of the foot now [m].
         """
-        beyond = abs(landing.toe - foot) - self.options.nimble * landing.time
+        beyond = abs(landing.toe - foot) - NIMBLE * self._scale.speed * landing.time
         return landing.price + _HURRY * max(beyond, 0.0)
 
     def _over(self, vault: Vault) -> Pass | None:
@@ -344,8 +379,8 @@ class Passes:
         if not landings:
             return None
         stride = self._way(start, vault.stiffness, 0.0)
-        longest = min(self.options.single[1], 0.98 * stride.duration)
-        times = np.linspace(-longest, self.options.late, _LIFTOFFS)
+        longest = min(_SINGLE[1] * self._scale.time, 0.98 * stride.duration)
+        times = np.linspace(-longest, _LATE * self._scale.time, _LIFTOFFS)
         x, y, dx, dy, ddx, ddy = stride.sample(np.abs(times)).T
         sign = np.where(times < 0.0, -1.0, 1.0)
         across = np.stack((sign * x, dx, sign * ddx), axis=-1)
@@ -356,9 +391,10 @@ class Passes:
 
     def _landings(self, state: Array, stiffness: float, toe: float) -> list[Landing]:
         """Where a step forward may land, from the CoM's state (4,) over a foot at x = ``toe``."""
-        length, (_, longest) = self.parameters.rest_length, self.options.steps
+        length = self.parameters.rest_length
+        longest, duration = _STEPS[1] * length, STEP_DURATION * self._scale.time
         stride = self._way(state, stiffness, toe)
-        times = np.linspace(0.0, 0.98 * min(stride.duration, self.options.step), _LANDINGS)[1:]
+        times = np.linspace(0.0, 0.98 * min(stride.duration, duration), _LANDINGS)[1:]
         path = stride.sample(times)
         # Whenever the CoM sinks the foot may land: its leg has the angle that suits the height.
         angles = np.arcsin(np.minimum(path[:, 1] / length, 1.0))
@@ -379,8 +415,8 @@ class Passes:
         """
         capture = self.capture(state)
         left = min(foot - capture, capture - toe)
-        apart = abs(foot - toe - self.options.closing)
-        return max(self.options.spare - left, 0.0) + self.options.narrow * apart
+        spare = _SPARE * self.parameters.rest_length
+        return max(spare - left, 0.0) + width_price(foot - toe, self.parameters)
 
     def capture(self, state: Array) -> float:
         """The capture point x + dx/dt sqrt(y / g) [m]; x where the CoM is not above the ground.

@@ -18,7 +18,7 @@ from template_control.embedding.planners.planner import (
 )
 from template_control.embedding.standing.curves import BetweenFeet, Found
 from template_control.embedding.standing.options import StandingOptions
-from template_control.embedding.standing.passes import Touchdown, Vault, Vaults
+from template_control.embedding.standing.passes import Touchdown, Vault, Vaults, width_price
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot, StrideKind
@@ -26,10 +26,14 @@ from template_control.slip.dynamics.stride import Stride, controls
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
 
 _TRIALS = 6  # of speeds, where a step's angle is chosen
+BEAT = 0.5
+"""A stand is planned anew, and the route asked, after this time [s], for the reference template; a
+step from a stand ends this long after its curve, when the robot has come to rest too."""
 _STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
 
 
@@ -64,7 +68,7 @@ class StandingGait:
             options: tuning, for that template.
         """
         state = np.array([0.0, options.height, 0.0])
-        return cls(parameters, state, np.zeros(NUM_SLOTS), options.beat)
+        return cls(parameters, state, np.zeros(NUM_SLOTS), BEAT * Scale.of(parameters).time)
 
 
 class Curves:
@@ -80,6 +84,7 @@ class Curves:
         self.vaults, self.automaton = vaults, automaton
         self.gait: Gait = StandingGait.of(self.parameters, self.options)
         self.offset: Array = np.zeros(PADDED)
+        self.beat = BEAT * vaults.scale.time
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`."""
@@ -101,7 +106,7 @@ class Curves:
 
     def _price(self, step: Touchdown, found: Found) -> float:
         """Of a step and the curve after it [m]."""
-        return found.cost + self.options.narrow * abs(step.toes[1] - self.options.closing)
+        return found.cost + width_price(step.toes[1], self.parameters)
 
     def _between(self, toes: tuple[float, float]) -> BetweenFeet:
         return BetweenFeet(toes, self.parameters, self.options)
@@ -179,7 +184,7 @@ class StandPlanner(SlopeCurves):
     ) -> tuple[Decision, Stride]:
         """See :class:`~.planner.CurvePlanner`."""
         found = self._between(toes).to_rest(start, self.lands)
-        left = self.options.beat - sum(piece.duration for piece in found.pieces)
+        left = self.beat - sum(piece.duration for piece in found.pieces)
         stride = timed_stride(self.automaton, node, self._stilled(found, left), toes)
         return replace(decision, feasible=self._fits(found)), stride
 

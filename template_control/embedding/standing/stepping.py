@@ -17,8 +17,15 @@ from template_control.checks.checked import checked
 from template_control.embedding.com_path import TERMS, Quintic, chained, timed_stride
 from template_control.embedding.planners.planner import Decision, LandingPlanner, Planner
 from template_control.embedding.standing.curves import BetweenFeet, Found
-from template_control.embedding.standing.options import StandingOptions
-from template_control.embedding.standing.passes import Family, Pass, Passes, Vaults
+from template_control.embedding.standing.options import PLACE, StandingOptions
+from template_control.embedding.standing.passes import (
+    NIMBLE,
+    STEP_DURATION,
+    Family,
+    Pass,
+    Passes,
+    Vaults,
+)
 from template_control.embedding.standing.planners import (
     CarryingPlanner,
     ChangePlanner,
@@ -39,6 +46,7 @@ from template_control.slip.similarity import Scale, scaled
 Array = NDArray[np.float64]
 
 _SOON = 1e-3  # [s]
+_LAUNCH = 0.05  # excess with which a step is still made, over l0; without it the robot would fall
 
 
 class Away(NamedTuple):
@@ -85,9 +93,10 @@ class StepPlanner(Curves):
             self._single: self._swing,
             automaton.successor(self._single, Event.TOUCHDOWN): self._rest,
         }
+        self._launch = _LAUNCH * self.parameters.rest_length
         self.passes = passes or Passes(vaults, self._single)
         gait = StandingGait.of(self.parameters, self.options)
-        self.gait = replace(gait, stride=stride, step_duration=self.options.step)
+        self.gait = replace(gait, stride=stride, step_duration=STEP_DURATION * vaults.scale.time)
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
@@ -107,16 +116,16 @@ class StepPlanner(Curves):
         state = self._turned(away.liftoff)[:, :2].T.ravel()
         stands = first.toes if self._way > 0.0 else np.array(toes)
         second, _ = self._landed(state, u, stands)
-        middle = feet.place(self.options.place) - self.options.margin
-        fits = away.found.excess <= self.options.launch and self.passes.capture(ahead) >= middle
+        middle = feet.place(PLACE) - feet.margin
+        fits = away.found.excess <= self._launch and self.passes.capture(ahead) >= middle
         return replace(decision, controls=u, feasible=fits), chained(first, second)
 
     def _best_away(self, feet: BetweenFeet, start: Array) -> Away:
         """The curve to a liftoff, forward, after which the step ends best."""
-        o, ways = self.options, []
+        ways, nimble = [], NIMBLE * self.vaults.scale.speed
         for over in self.passes.known:
             far = feet.spacing + over.landing.toe
-            in_time = over.landing.time - over.times >= far / o.nimble
+            in_time = over.landing.time - over.times >= far / nimble
             in_time[0] = True  # whatever it is, it has to do
             ends = over.states[in_time].copy()
             ends[:, 0, 0] += feet.toes[1]
@@ -172,7 +181,7 @@ class StepPlanner(Curves):
         """The curve to rest, seen in the direction of the step, and its stride in the world."""
         feet = self._between((self._way * toes[0], self._way * toes[1]))
         found = feet.to_rest(self._turned(start), True)
-        pieces = self._back(self._stilled(found, self.options.beat))
+        pieces = self._back(self._stilled(found, self.beat))
         return found, timed_stride(self.automaton, node, pieces, toes)
 
     # -- both ways --------------------------------------------------------------------
