@@ -9,7 +9,7 @@ import pytest
 import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.default import default_planners
-from template_control.embedding.planners.planner import BreakingPlanner, Free
+from template_control.embedding.planners.planner import BreakingPlanner, FreeControls
 from template_control.embedding.replanning import free_controls
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.rollout import ReplanOptions
@@ -159,7 +159,7 @@ def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
         stride = simulate_stride(P, node.name, state, u)
         return APEX.of(stride.state), stride.outcome
 
-    free = Free([int(Slot.TOUCHDOWN_ANGLE), *free_controls(AUTOMATON, node)], turn)
+    free = FreeControls([int(Slot.TOUCHDOWN_ANGLE), *free_controls(AUTOMATON, node)], turn)
     decision = planner.break_into(ahead, u, target, free)
     assert decision.feasible
     assert not decision.nominal

@@ -13,8 +13,8 @@ from template_control.embedding.planners.ahead import (
     SPACING,
     AheadOptions,
     AheadPlanner,
+    check_feasibility,
     plan_problem,
-    rehearse,
 )
 from template_control.embedding.planners.gait_table import (
     CONTROL,
@@ -198,9 +198,9 @@ def test_a_table_scales_with_the_template():
 
 
 def test_a_rehearsal_refuses_what_cannot_be_had(planner):
-    rehearse(SpeedRoute(P, SpeedProfile((0.0, 8.0), (0.8, 0.95)), 8.0), planner)
+    check_feasibility(SpeedRoute(P, SpeedProfile((0.0, 8.0), (0.8, 0.95)), 8.0), planner)
     with pytest.raises(ScenarioError, match=r"wants .* m/s at VLO .* can be had then"):
-        rehearse(SpeedRoute(P, SpeedProfile((2.0, 2.5), (0.5, 1.2)), 8.0), planner)
+        check_feasibility(SpeedRoute(P, SpeedProfile((2.0, 2.5), (0.5, 1.2)), 8.0), planner)
 
 
 def test_strict_refuses_a_scenario_in_one_line(tmp_path, capsys):

@@ -11,7 +11,7 @@ from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.planner import CurvePlanner
 from template_control.embedding.standing.curves import BetweenFeet
 from template_control.embedding.standing.options import StandingOptions, standing_pose
-from template_control.embedding.standing.passes import Family, Vaults
+from template_control.embedding.standing.passes import GaitsBySpeed, PassTable
 from template_control.embedding.standing.planners import BEAT
 from template_control.embedding.standing.stepping import standing_planners
 from template_control.errors import ParameterError, ScenarioError
@@ -26,14 +26,14 @@ from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 P = tc.SlipParameters()
 OPTIONS = StandingOptions()
-FAMILY = Family(partial(walking_gait, P), speed_range(P))
+FAMILY = GaitsBySpeed(partial(walking_gait, P), speed_range(P))
 BODY = np.array([P.mass, P.gravity, 0.0, P.rest_length, 0.0])
 STAND, WALK = Segment("stand", duration=1.0), Segment("walk", speed=0.8, duration=2.0)
 
 
 @pytest.fixture(scope="module")
-def vaults():
-    return Vaults(P, OPTIONS, FAMILY)
+def passes():
+    return PassTable(P, OPTIONS, FAMILY)
 
 
 @pytest.fixture(scope="module")
@@ -154,28 +154,28 @@ def test_wider_feet_start_faster(planners):
     assert np.all(np.diff(speeds) > 0.0)
 
 
-def test_the_approach_to_vlo_is_the_templates(vaults):
+def test_the_approach_to_vlo_is_the_templates(passes):
     """From each of its states the template comes to that VLO."""
-    vault = vaults.at(0.35)
-    for state in vaults.approach(vault, 0.5):
-        u = tc.slip.controls(1.4, vault.stiffness, vault.stiffness)
+    over = passes.at(0.35)
+    for state in passes.approach(over, 0.5):
+        u = tc.slip.controls(1.4, over.stiffness, over.stiffness)
         stride = tc.simulate_stride(P, "SS_bv^w", state[:, :2].T.ravel(), u, (0.5, 0.5))
-        np.testing.assert_allclose(VLO.of(stride.state), vault.vlo, atol=1e-9)
+        np.testing.assert_allclose(VLO.of(stride.state), over.vlo, atol=1e-9)
 
 
-def test_a_vault_is_the_gait_where_there_is_one(vaults):
+def test_a_vault_is_the_gait_where_there_is_one(passes):
     gait = walking_gait(P, 0.9)
-    np.testing.assert_array_equal(vaults.at(0.9).vlo, gait.vlo)
-    assert vaults.at(0.9).stiffness == gait.controls[Slot.K_SD]
-    slow = vaults.at(0.3)
+    np.testing.assert_array_equal(passes.at(0.9).vlo, gait.vlo)
+    assert passes.at(0.9).stiffness == gait.controls[Slot.K_SD]
+    slow = passes.at(0.3)
     lift = slow.stiffness * (P.rest_length - slow.vlo[1]) / P.mass
     assert lift == pytest.approx(P.gravity - 0.3**2 / P.rest_length)
 
 
 @pytest.mark.parametrize(("speed", "wanted"), [(0.3, 0.8), (0.9, 0.35), (1.1, 0.64)])
-def test_a_step_changes_the_speed(planners, vaults, speed, wanted):
+def test_a_step_changes_the_speed(planners, passes, speed, wanted):
     """The template lands as planned, and the curve from there leads to the wanted speed."""
-    planner, z = planners["ww"], vaults.at(speed).vlo
+    planner, z = planners["ww"], passes.at(speed).vlo
     decision = planner.decide(z, np.array([wanted, 0.96, 0.0]))
     assert decision.feasible
     down = tc.simulate_stride(P, "SS_av^ww", VLO.state(z), decision.controls)
@@ -188,8 +188,8 @@ def test_a_step_changes_the_speed(planners, vaults, speed, wanted):
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.35, 0.5])
-def test_a_last_step_comes_to_rest(planners, vaults, speed):
-    planner, z = planners["ws"], vaults.at(speed).vlo
+def test_a_last_step_comes_to_rest(planners, passes, speed):
+    planner, z = planners["ws"], passes.at(speed).vlo
     decision = planner.decide(z)
     down = tc.simulate_stride(P, "SS_av^ws", VLO.state(z), decision.controls)
     touchdown = next(event for event in down.events if event.event is Event.TOUCHDOWN)

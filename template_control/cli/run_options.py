@@ -13,7 +13,7 @@ from template_control.checks.option_types import number
 from template_control.checks.ranges import Range
 from template_control.cli.world_options import simulation_choice
 from template_control.embedding.free.options import FREE_PLANNER
-from template_control.embedding.planners.ahead import AheadOptions, AheadPlanner, rehearse
+from template_control.embedding.planners.ahead import AheadOptions, AheadPlanner, check_feasibility
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.errors import ParameterError
@@ -372,4 +372,4 @@ def _check_strictly(ready: PreparedRun) -> None:
         raise ParameterError(
             "--strict goes with a scenario that only walks, and with planner ahead: leave it out"
         )
-    rehearse(ready.route, planner)
+    check_feasibility(ready.route, planner)

@@ -16,7 +16,7 @@ from .phases import Clock as Clock
 from .phases import PhaseControl as PhaseControl
 from .planners.ahead import AheadOptions as AheadOptions
 from .planners.ahead import AheadPlanner as AheadPlanner
-from .planners.ahead import rehearse as rehearse
+from .planners.ahead import check_feasibility as check_feasibility
 from .planners.default import default_planners as default_planners
 from .planners.lqr import LqrOptions as LqrOptions
 from .planners.lqr import LqrPlanner as LqrPlanner
@@ -26,7 +26,7 @@ from .planners.planner import BreakingPlanner as BreakingPlanner
 from .planners.planner import CurvePlanner as CurvePlanner
 from .planners.planner import Decision as Decision
 from .planners.planner import ForgettingPlanner as ForgettingPlanner
-from .planners.planner import Free as Free
+from .planners.planner import FreeControls as FreeControls
 from .planners.planner import LandingPlanner as LandingPlanner
 from .planners.planner import Planner as Planner
 from .planners.planner import PricingPlanner as PricingPlanner
@@ -44,7 +44,7 @@ from .robot_template import walking_speeds as walking_speeds
 from .rollout import ReplanOptions as ReplanOptions
 from .standing.options import StandingOptions as StandingOptions
 from .standing.options import standing_pose as standing_pose
-from .standing.planners import ChangePlanner as ChangePlanner
+from .standing.planners import SpeedChangePlanner as SpeedChangePlanner
 from .standing.planners import StandingGait as StandingGait
 from .standing.planners import StandPlanner as StandPlanner
 from .standing.planners import StartPlanner as StartPlanner

@@ -12,7 +12,7 @@ from template_control.embedding.planners.planner import (
     BreakingPlanner,
     CurvePlanner,
     Decision,
-    Free,
+    FreeControls,
     decided,
 )
 from template_control.embedding.replanning import free_controls
@@ -108,7 +108,7 @@ def _decision(
     if node.edge(Event.TOUCHDOWN) is not None:
         slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
     ahead = rollout.ahead(node, sensed)
-    free = Free(slots, turn)
+    free = FreeControls(slots, turn)
     return decided(planner.break_into, ahead, present.controls, goal.target, free)
 
 

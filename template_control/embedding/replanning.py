@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from template_control.embedding.learners.momentum import uncontrolled
 from template_control.embedding.planners.planner import (
-    Ahead,
     Decision,
+    EndOfStride,
     PricingPlanner,
     decided,
     lands,
@@ -140,7 +140,7 @@ class _Pricing(NamedTuple):
 
 
 def choose_legs(
-    ahead: Ahead,
+    ahead: EndOfStride,
     decision: Decision,
     target: Array,
     free: Sequence[int],
@@ -178,7 +178,7 @@ def choose_legs(
 
 
 def _cheapest(
-    u: Array, end: Array | None, prior: Prior, ahead: Ahead, pricing: _Pricing
+    u: Array, end: Array | None, prior: Prior, ahead: EndOfStride, pricing: _Pricing
 ) -> tuple[Array, Array | None]:
     """The cheapest of a grid within the bounds, and of controls ``u`` that lead to ``end``."""
     stiff = prior.slots

@@ -14,9 +14,9 @@ from template_control.checks.checked import Checked
 from template_control.checks.fitting import asked, check, name_of, shown
 from template_control.checks.ranges import NotNegative, Range, Shape, Triple
 from template_control.embedding.planners.planner import (
-    Ahead,
     CurvePlanner,
     Decision,
+    EndOfStride,
     ForgettingPlanner,
     Planner,
     Planners,
@@ -206,11 +206,11 @@ class RoutePlanners:
         if decision.lasting:
             return decision, z
         for share in _CALMER:
-            start = section.calmer(z, share, _HIGHEST * self.route.parameters.rest_length)
-            calmer = decided(planner.decide, start, goal.target)
-            if calmer.lasting:  # from there; from here a run may be the better way
+            start = section.damped(z, share, _HIGHEST * self.route.parameters.rest_length)
+            damped = decided(planner.decide, start, goal.target)
+            if damped.lasting:  # from there; from here a run may be the better way
                 feasible = decision.feasible
-                return replace(calmer, feasible=feasible, lasting=False, nominal=False), start
+                return replace(damped, feasible=feasible, lasting=False, nominal=False), start
         return decision, z
 
 
@@ -324,7 +324,7 @@ class TemplateRollout:
             more -= 1
         return strides, whole and all(stride.completed for stride in strides)
 
-    def ahead(self, node: Node, sensed: TemplateState) -> Ahead:
+    def ahead(self, node: Node, sensed: TemplateState) -> EndOfStride:
         """Where the present stride ends from here, by its controls.
 
         Args:

@@ -66,7 +66,7 @@ _MOST_STRIDES = 1000  # that are rehearsed, of a route that does not end
 
 @dataclass(frozen=True)
 class AheadOptions(Checked):
-    """How several walking steps are planned at once, and how much of a change is tried.
+    """Tuning of the plan of several walking steps.
 
     States are those of the reference template (80 kg, 1 m, 9.81 m/s^2); the planner scales them.
 
@@ -86,7 +86,7 @@ class AheadOptions(Checked):
 
 
 class AheadPlanner:
-    """Plans several steps at once towards a gait of the family by speed, any at any time.
+    """Planner of several steps at once towards a gait of the family by speed.
 
     A governor tries shares of the wanted change of speed and takes the first whose plan is cheap.
     What it takes is told as :attr:`~.planner.Decision.accepted`. Where no plan is cheap, as after
@@ -240,7 +240,7 @@ AHEAD = (Part(plan_ahead, 10.0),)
 """What this planner calls, further than a walk."""
 
 
-def rehearse(route: Route, planner: AheadPlanner) -> None:
+def check_feasibility(route: Route, planner: AheadPlanner) -> None:
     """Walk a route on the template, and refuse it where the planner would reduce its changes.
 
     Args:

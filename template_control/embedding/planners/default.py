@@ -18,8 +18,8 @@ from template_control.embedding.planners.transition import (
 )
 from template_control.embedding.standing.options import StandingOptions
 from template_control.embedding.standing.stepping import (
-    carrying_planners,
     gaits_by_speed,
+    recovery_planners,
     standing_planners,
 )
 from template_control.slip.automaton.vocabulary import StrideKind
@@ -37,7 +37,7 @@ from template_control.slip.similarity import REFERENCE
 _STRIDE = 1.9
 _CATCHING = RunningOptions(pace=0.12)  # a run that only catches a walk is to be over soon
 # A leg that is left behind may be longer than a walk's, and there is no time to set off from rest.
-_CARRYING = StandingOptions(reach=1.06, slack=0.03)
+_RECOVERY = StandingOptions(reach=1.06, slack=0.03)
 _GENTLE = 0.05  # of g: up to this acceleration moderate controls keep up
 
 
@@ -121,6 +121,6 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
         StrideKind.WALK_TO_RUN: TransitionPlanner(StrideKind.WALK_TO_RUN, walk, runs, WALK_TO_RUN),
         StrideKind.RUN: run,
         StrideKind.RUN_TO_WALK: TransitionPlanner(StrideKind.RUN_TO_WALK, run, walks, RUN_TO_WALK),
-        **carrying_planners(walk, _CARRYING),
+        **recovery_planners(walk, _RECOVERY),
         **standing,
     }

@@ -49,7 +49,7 @@ class GaitTable(NamedTuple):
 
 @compiled
 def gait_row(table: GaitTable, speed: float, row: Array) -> None:
-    """What belongs to a speed, interpolated; beyond the ends the end's own.
+    """Row of a speed, interpolated; beyond the ends the end's own.
 
     Args:
         table: the gaits.
@@ -83,7 +83,7 @@ COLUMNS = np.concatenate((np.arange(PADDED), PADDED + SLOTS))
 
 
 def row_at(table: GaitTable, speed: float) -> Array:
-    """(WIDTH,) what belongs to a speed; see :func:`~.gait_table.gait_row`.
+    """Row (WIDTH,) of a speed; see :func:`~.gait_table.gait_row`.
 
     Args:
         table: the gaits.

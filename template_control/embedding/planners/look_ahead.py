@@ -163,7 +163,7 @@ def slots_of(plan: Plan, i: int, u: Array) -> None:
 
 @compiled
 def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Array) -> float:
-    """What a plan misses, in tolerances.
+    """Errors of a plan, in tolerances.
 
     Args:
         p: the tolerances.

@@ -22,7 +22,7 @@ from template_control.checks.ranges import (
     Positive,
     Share,
 )
-from template_control.embedding.planners.planner import ANY_ANGLE, Ahead, Decision
+from template_control.embedding.planners.planner import ANY_ANGLE, Decision, EndOfStride
 from template_control.embedding.planners.step_search import (
     EFFORT,
     FALL_PRICE,
@@ -150,7 +150,7 @@ class LqrOptions(Checked):
 
 @dataclass(frozen=True)
 class _Weighed:
-    """Where the rest of a step ends, in coordinates in which the cost-to-go is a squared length.
+    """End of the rest of a step, in coordinates in which the cost-to-go is a squared length.
 
     What the robot adds to a step has mostly come in by then.
 
@@ -159,7 +159,7 @@ class _Weighed:
         root: (3, 3) with the cost-to-go root' root.
     """
 
-    ahead: Ahead
+    ahead: EndOfStride
     root: Array
 
     def __call__(self, u: Array) -> tuple[Array, Outcome]:
@@ -181,7 +181,9 @@ class Rest(NamedTuple):
     change: Array | None
 
 
-def choose_rest(law: Law, costs: Array, ahead: Ahead, controls: Array, free: Sequence[int]) -> Rest:
+def choose_rest(
+    law: Law, costs: Array, ahead: EndOfStride, controls: Array, free: Sequence[int]
+) -> Rest:
     """Controls with the least cost-to-go at the step's end, and the least change.
 
     Args:
@@ -384,7 +386,7 @@ class LqrPlanner:
         return u, first, cost, own
 
     def land(
-        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+        self, ahead: EndOfStride, decision: Decision, target: Array, free: Sequence[int]
     ) -> Decision:
         """See :meth:`~.planner.LandingPlanner.land`.
 

@@ -1,4 +1,4 @@
-"""What a planner is: section state and target in, controls of the coming stride out."""
+"""Interface of planners: section state and target in, controls of the coming stride out."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Decision(Checked):
 
 @runtime_checkable
 class Planner(Protocol):
-    """Chooses the controls of one kind of stride at its section."""
+    """Choice of the controls of one kind of stride at its section."""
 
     @property
     def gait(self) -> Gait:
@@ -85,16 +85,16 @@ class Planner(Protocol):
         """
 
 
-class Ahead(Protocol):
-    """Where the rest of a stride leads."""
+class EndOfStride(Protocol):
+    """Map from the controls of a stride that has begun to its end."""
 
     def __call__(self, u: Array) -> tuple[Array, Outcome]:
         """(m,) state at the section where it ends, and how, with (NUM_SLOTS,) controls ``u``."""
 
 
 @dataclass(frozen=True)
-class Free:
-    """What of the controls can still be chosen within a stride.
+class FreeControls:
+    """Controls that can still be chosen within a stride.
 
     Attributes:
         slots: that the rest of the stride depends on.
@@ -114,7 +114,7 @@ class LandingPlanner(Planner, Protocol):
     """
 
     def land(
-        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+        self, ahead: EndOfStride, decision: Decision, target: Array, free: Sequence[int]
     ) -> Decision:
         """Controls for the rest of a stride.
 
@@ -190,7 +190,9 @@ class CurvePlanner(Planner, Protocol):
 class BreakingPlanner(Planner, Protocol):
     """A planner of a stride that the robot can break into within another one."""
 
-    def break_into(self, ahead: Ahead, controls: Array, target: Array, free: Free) -> Decision:
+    def break_into(
+        self, ahead: EndOfStride, controls: Array, target: Array, free: FreeControls
+    ) -> Decision:
         """Controls for a stride from within.
 
         Args:

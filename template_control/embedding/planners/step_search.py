@@ -46,7 +46,7 @@ _NARROWING = 0.4  # half-widths of a finer grid over those of the one before, at
 
 
 class KneeLoadPenalty(NamedTuple):
-    """What a step costs whose leg forces are more than a knee carries.
+    """Price of a step whose leg forces are more than a knee carries.
 
     Attributes:
         reach: length of the leg at which the knee is straight [m].
@@ -60,7 +60,7 @@ class KneeLoadPenalty(NamedTuple):
 
 
 class Law(NamedTuple):
-    """A bounded linear law u = u_s - K (z - z_s) and what it needs to be judged.
+    """A bounded linear law u = u_s - K (z - z_s) and what its steps cost.
 
     There are c controls: 3 in the paper's walking step, 4 in one with push-off.
 
@@ -181,7 +181,7 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -
 
 @compiled
 def knee_load(law: Law, z: Array, u: Array, result: Array) -> float:
-    """What the knees make a step cost, where the legs are shortest.
+    """Price of the knee load, where the legs are shortest.
 
     A leg of length l bends a knee half-way up it, which is then sqrt(reach^2 - l^2) / 2 beside it.
     A robot that is fast may strain its knees: legs that brake as they can slow it down all the

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.embedding.planners.planner import Ahead
+from template_control.embedding.planners.planner import EndOfStride
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
@@ -189,7 +189,7 @@ class Prior:
 
 
 class StrideEnd(Protocol):
-    """Where a stride, or the rest of one, ends with given controls."""
+    """Map from the controls of a stride, or of the rest of one, to its end."""
 
     def at(self, u: Array) -> tuple[Array, Outcome]:
         """(m,) state at the section where it ends, and how, with (NUM_SLOTS,) controls ``u``."""
@@ -237,7 +237,7 @@ class FromHere:
         slots: the free controls.
     """
 
-    ahead: Ahead
+    ahead: EndOfStride
     slots: Sequence[int]
 
     def at(self, u: Array) -> tuple[Array, Outcome]:
@@ -341,7 +341,7 @@ class _Solution:
         self.linear: Linear | None = None
 
     def about(self, stride: FromSection) -> Linear:
-        """To first order."""
+        """The stride to first order."""
         if self.linear is None:
             step, n, slots = stride.step, len(self.z), stride.slots
             m, columns = step.dimensions[1], np.array([*range(n), *(PADDED + s for s in slots)])
@@ -352,7 +352,7 @@ class _Solution:
 
 
 class NearbyStrides:
-    """Solves strides, and keeps the last solutions.
+    """Solver of strides that keeps the last solutions.
 
     Args:
         tolerance: (m,) errors at the end that count as 1. The section that a stride begins at is

@@ -17,9 +17,9 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.embedding.planners.planner import (
     ANY_ANGLE,
-    Ahead,
     Decision,
-    Free,
+    EndOfStride,
+    FreeControls,
     Planner,
     decided,
 )
@@ -149,7 +149,7 @@ class TransitionPlanner:
         return self._decision(u, end, wanted)
 
     def land(
-        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+        self, ahead: EndOfStride, decision: Decision, target: Array, free: Sequence[int]
     ) -> Decision:
         """See :meth:`~.planner.LandingPlanner.land`."""
         controls = decision.controls
@@ -162,7 +162,9 @@ class TransitionPlanner:
         u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
         return self._decision(u, end, target)
 
-    def break_into(self, ahead: Ahead, controls: Array, target: Array, free: Free) -> Decision:
+    def break_into(
+        self, ahead: EndOfStride, controls: Array, target: Array, free: FreeControls
+    ) -> Decision:
         """See :meth:`~.planner.BreakingPlanner.break_into`.
 
         u_0 is that of the gait that the stride leads to; what is not free here stays.

@@ -28,7 +28,7 @@ _LIGHTEST = 0.05  # of the weight: legs do not pull
 
 
 class Rules(NamedTuple):
-    """What makes a curve good.
+    """Costs of a curve.
 
     Attributes:
         low, high: x between which the centre of pressure is to stay [m].
@@ -240,7 +240,7 @@ class BetweenFeet:
         return Found((Quintic(curve, float(durations[i])),), excess, cost), end
 
     def to_rest(self, start: Array, lands: bool = False) -> Found:
-        """To rest where the centre of pressure allows, then to the place to stand.
+        """Curve to rest where the centre of pressure allows, then to the place to stand.
 
         Args:
             start: (2, 3) x and y, each position, velocity and acceleration.
@@ -258,7 +258,7 @@ class BetweenFeet:
         return self._joined(stop, self._shift(places[i], wanted))
 
     def to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
-        """To one of several states in which the rear foot lifts off.
+        """Curve to one of several states in which the rear foot lifts off.
 
         Args:
             start: (2, 3) x and y, each position, velocity and acceleration.

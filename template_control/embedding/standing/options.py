@@ -23,7 +23,7 @@ PLACE = 0.5
 
 @dataclass(frozen=True)
 class StandingOptions(Checked):
-    """How a robot stands, and which curves of the CoM it may follow between its feet.
+    """Tuning of a stand, and of the curves of the CoM between the feet.
 
     Attributes:
         height: of the CoM over the ground [m].

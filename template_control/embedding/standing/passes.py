@@ -29,7 +29,7 @@ _POINTS = 120  # of a way, between which a landing is looked for
 _NEWTON = 3
 _APPROACHES = 12
 _SPEEDS = 25  # that gaits and passes are kept for
-_VAULT = 64.0  # stiffness of the leg that slowly passes under the CoM, k l0 / (m g)
+_SLOW_STIFFNESS = 64.0  # stiffness of the leg that slowly passes under the CoM, k l0 / (m g)
 _SLOWEST = 0.05  # speed at VLO of the slowest step, over sqrt(g l0)
 _ANGLES = 12  # touchdown angles tried
 _FLATTEST = 1.08  # of them [rad]
@@ -55,7 +55,7 @@ _LATE = 0.15  # the foot lifts off this long after VLO at the latest [s], for th
 _SPARE = 0.06  # distance of the capture point from either foot at landing, over l0
 
 
-class Family(NamedTuple):
+class GaitsBySpeed(NamedTuple):
     """Walking gaits by their speed at VLO.
 
     Attributes:
@@ -67,7 +67,7 @@ class Family(NamedTuple):
     speeds: tuple[float, float]
 
 
-class Vault(NamedTuple):
+class SingleSupportPass(NamedTuple):
     """A VLO, and the leg that passes it.
 
     Attributes:
@@ -80,7 +80,7 @@ class Vault(NamedTuple):
 
 
 class Touchdown(NamedTuple):
-    """Where a step lands.
+    """Touchdown of a walking step.
 
     Attributes:
         angle: its touchdown angle [rad].
@@ -97,7 +97,7 @@ class Touchdown(NamedTuple):
     late: float
 
 
-class Vaults:
+class PassTable:
     """Passes over a leg by their speed at VLO.
 
     Args:
@@ -111,7 +111,7 @@ class Vaults:
         self,
         parameters: SlipParameters,
         options: StandingOptions,
-        family: Family,
+        family: GaitsBySpeed,
         automaton: Automaton = AUTOMATON,
     ) -> None:
         ready(STAND)
@@ -120,7 +120,7 @@ class Vaults:
         self._automaton = automaton
         self._simulator = StrideSimulator(parameters, automaton)
         self._node = automaton.start(StrideKind.WALK).name
-        self._known: dict[float, Vault] = {}
+        self._known: dict[float, SingleSupportPass] = {}
         self._ways: dict[float, Array] = {}
         unit = parameters.speed_unit
         # Uphill the CoM is behind the foot at VLO, and has to come over it.
@@ -130,14 +130,14 @@ class Vaults:
             slowest = float(np.hypot(slowest, uphill))
         self._speeds = np.linspace(slowest, family.speeds[1], _SPEEDS)
 
-    def on_slope(self, slope: float) -> Vaults:
+    def on_slope(self, slope: float) -> PassTable:
         """The same passes over a leg on other ground.
 
         Args:
             slope: its angle, uphill positive [rad].
         """
         ground = replace(self.parameters, slope=slope)
-        return Vaults(ground, self.options, self.family, self._automaton)
+        return PassTable(ground, self.options, self.family, self._automaton)
 
     def between(self, wanted: float, present: float) -> list[float]:
         """Speeds at VLO that are tried, the best first [m/s].
@@ -151,43 +151,45 @@ class Vaults:
         first = float(np.clip(wanted, self._speeds[0], self._speeds[-1]))
         return [first, *sorted(inside, key=lambda v: abs(v - wanted))]
 
-    def at(self, speed: float) -> Vault:
+    def at(self, speed: float) -> SingleSupportPass:
         """The pass with a speed at VLO [m/s]."""
         if speed not in self._known:
             self._known[speed] = self._made(speed)
         return self._known[speed]
 
-    def _made(self, speed: float) -> Vault:
+    def _made(self, speed: float) -> SingleSupportPass:
         p, (slowest, fastest) = self.parameters, self.family.speeds
         if speed >= slowest:
             gait = self.family.gait(min(speed, fastest))
-            return Vault(gait.state, float(gait.controls[Slot.K_SD]))
+            return SingleSupportPass(gait.state, float(gait.controls[Slot.K_SD]))
         own = float(self.family.gait(slowest).controls[Slot.K_SD])
-        stiff = _VAULT * p.mass * p.gravity / p.rest_length
+        stiff = _SLOW_STIFFNESS * p.mass * p.gravity / p.rest_length
         share = np.clip(2.0 * (1.0 - speed / slowest), 0.0, 1.0)
         stiffness = float(own + share * (stiff - own))
         load = p.mass * (p.gravity - speed**2 / p.rest_length)
-        return Vault(np.array([speed, p.rest_length - load / stiffness, 0.0]), stiffness)
+        return SingleSupportPass(
+            np.array([speed, p.rest_length - load / stiffness, 0.0]), stiffness
+        )
 
-    def approach(self, vault: Vault, toe: float) -> Array:
+    def approach(self, over: SingleSupportPass, toe: float) -> Array:
         """States (n, 2, 3) on the way to VLO over ``toe`` [m], the last of them first.
 
         The template's dynamics are the same forward and backward.
 
         Args:
-            vault: where they lead to.
+            over: where they lead to.
             toe: x of the foot [m].
         """
-        speed = float(vault.vlo[0])
+        speed = float(over.vlo[0])
         if speed not in self._ways:
-            self._ways[speed] = self._way(vault)
+            self._ways[speed] = self._way(over)
         states = self._ways[speed].copy()
         states[:, 0, 0] += toe
         return states
 
-    def _way(self, vault: Vault) -> Array:
-        speed, height, vertical = vault.vlo
-        u = controls(_FLAT, vault.stiffness, vault.stiffness)
+    def _way(self, over: SingleSupportPass) -> Array:
+        speed, height, vertical = over.vlo
+        u = controls(_FLAT, over.stiffness, over.stiffness)
         # Uphill is downhill for one who walks back.
         back = replace(self.parameters, slope=-self.parameters.slope)
         simulator = StrideSimulator(back, self._automaton)
@@ -285,8 +287,8 @@ _LANDINGS = 60
 _HURRY = 0.3  # m of excess that count as a metre which the foot cannot make
 
 
-class Landing(NamedTuple):
-    """Where a step forward lands.
+class StepLanding(NamedTuple):
+    """Landing of a step from a stand.
 
     Attributes:
         angle: touchdown angle [rad].
@@ -301,7 +303,7 @@ class Landing(NamedTuple):
     price: float
 
 
-class Pass(NamedTuple):
+class StepPass(NamedTuple):
     """The way over a foot at x = 0, and the landing after it.
 
     Attributes:
@@ -314,28 +316,28 @@ class Pass(NamedTuple):
     stiffness: float
     times: Array
     states: Array
-    landing: Landing
+    landing: StepLanding
 
 
-class Passes:
-    """Passes over a leg, and landings.
+class LandingTable:
+    """Passes over a leg that stays, with the landings after them.
 
     Args:
-        vaults: passes by their speed at VLO.
+        passes: by their speed at VLO.
         node: of the automaton, in single stance before a touchdown.
 
     Attributes:
         known: passes with their landings, the slowest first.
     """
 
-    def __init__(self, vaults: Vaults, node: str) -> None:
-        self.parameters, self._scale = vaults.parameters, vaults.scale
-        self._vaults, self._node = vaults, node
+    def __init__(self, passes: PassTable, node: str) -> None:
+        self.parameters, self._scale = passes.parameters, passes.scale
+        self._passes, self._node = passes, node
         self.known = self._found()
 
-    def _found(self) -> list[Pass]:
+    def _found(self) -> list[StepPass]:
         speeds = np.linspace(_SLOWEST, _FASTEST, _STEP_SPEEDS) * self.parameters.speed_unit
-        found = (self._over(self._vaults.at(float(speed))) for speed in speeds)
+        found = (self._over(self._passes.at(float(speed))) for speed in speeds)
         return [over for over in found if over is not None]
 
     def carrying(self, start: Array, toe: float) -> float:
@@ -350,7 +352,7 @@ class Passes:
         share = p.mass * p.gravity / (max(p.rest_length - length, 1e-6) * p.leg_stiffness)
         return min(max(share, least), most) * p.leg_stiffness
 
-    def best(self, start: Array, stiffness: float, feet: Sequence[float]) -> Landing | None:
+    def best(self, start: Array, stiffness: float, feet: Sequence[float]) -> StepLanding | None:
         """The best landing; None where there is none.
 
         Args:
@@ -361,7 +363,7 @@ class Passes:
         landings = self._landings(start[:, :2].T.ravel(), stiffness, feet[0])
         return min(landings, key=lambda one: self.hurried(one, feet[1]), default=None)
 
-    def hurried(self, landing: Landing, foot: float) -> float:
+    def hurried(self, landing: StepLanding, foot: float) -> float:
         """Price of a landing for a foot that has to get there [m].
 
         Args:
@@ -371,14 +373,14 @@ class Passes:
         beyond = abs(landing.toe - foot) - NIMBLE * self._scale.speed * landing.time
         return landing.price + _HURRY * max(beyond, 0.0)
 
-    def _over(self, vault: Vault) -> Pass | None:
-        """The pass of a vault; None where no landing follows."""
-        speed, height, _ = vault.vlo
+    def _over(self, over: SingleSupportPass) -> StepPass | None:
+        """The pass with its landing; None where no landing follows."""
+        speed, height, _ = over.vlo
         start = np.array([0.0, height, speed, 0.0])
-        landings = self._landings(start, vault.stiffness, 0.0)
+        landings = self._landings(start, over.stiffness, 0.0)
         if not landings:
             return None
-        stride = self._way(start, vault.stiffness, 0.0)
+        stride = self._way(start, over.stiffness, 0.0)
         longest = min(_SINGLE[1] * self._scale.time, 0.98 * stride.duration)
         times = np.linspace(-longest, _LATE * self._scale.time, _LIFTOFFS)
         x, y, dx, dy, ddx, ddy = stride.sample(np.abs(times)).T
@@ -387,10 +389,10 @@ class Passes:
         up = np.stack((y, sign * dy, ddy), axis=-1)
         states = np.stack((across, up), axis=1)
         best = min(landings, key=lambda one: one.price)
-        return Pass(vault.stiffness, times, states, best)
+        return StepPass(over.stiffness, times, states, best)
 
-    def _landings(self, state: Array, stiffness: float, toe: float) -> list[Landing]:
-        """Where a step forward may land, from the CoM's state (4,) over a foot at x = ``toe``."""
+    def _landings(self, state: Array, stiffness: float, toe: float) -> list[StepLanding]:
+        """Landings of a step forward, from the CoM's state (4,) over a foot at x = ``toe``."""
         length = self.parameters.rest_length
         longest, duration = _STEPS[1] * length, STEP_DURATION * self._scale.time
         stride = self._way(state, stiffness, toe)
@@ -401,7 +403,7 @@ class Passes:
         feet = path[:, 0] + length * np.cos(angles)
         sinks = (path[:, 3] < 0.0) & (np.maximum.accumulate(angles[::-1])[::-1] <= angles)
         return [
-            Landing(float(angles[i]), float(times[i]), foot, self._priced(row, toe, foot))
+            StepLanding(float(angles[i]), float(times[i]), foot, self._priced(row, toe, foot))
             for i, (row, foot) in enumerate(
                 zip(path.reshape(-1, 3, 2).swapaxes(1, 2), feet.tolist(), strict=True)
             )
@@ -432,4 +434,4 @@ class Passes:
         """The template's way over a foot at x = ``toe``, without a landing."""
         u = np.zeros(NUM_SLOTS)
         u[Slot.TOUCHDOWN_ANGLE], u[Slot.K_SC] = _FLAT, stiffness
-        return self._vaults.arriving(self._node, state, u, np.array([toe, toe]))
+        return self._passes.arriving(self._node, state, u, np.array([toe, toe]))

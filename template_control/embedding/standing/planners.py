@@ -11,14 +11,19 @@ from numpy.typing import NDArray
 from template_control.embedding.com_path import Quintic, chained, timed_stride
 from template_control.embedding.planners.planner import (
     ANY_ANGLE,
-    Ahead,
     Decision,
+    EndOfStride,
     LandingPlanner,
     decided,
 )
 from template_control.embedding.standing.curves import BetweenFeet, Found
 from template_control.embedding.standing.options import StandingOptions
-from template_control.embedding.standing.passes import Touchdown, Vault, Vaults, width_price
+from template_control.embedding.standing.passes import (
+    PassTable,
+    SingleSupportPass,
+    Touchdown,
+    width_price,
+)
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot, StrideKind
@@ -39,7 +44,7 @@ _STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
 
 @dataclass(frozen=True)
 class StandingGait:
-    """To stand still, as a gait: a stride that returns to its state.
+    """A stand as a gait: a stride that returns to its state.
 
     Attributes:
         parameters: the template.
@@ -72,19 +77,19 @@ class StandingGait:
 
 
 class Curves:
-    """What the planners here have in common: they learn nothing, and plan curves.
+    """Common part of the planners of curves: they learn nothing.
 
     Args:
-        vaults: passes over a leg.
+        passes: over a leg.
         automaton: of the strides.
     """
 
-    def __init__(self, vaults: Vaults, automaton: Automaton = AUTOMATON) -> None:
-        self.parameters, self.options = vaults.parameters, vaults.options
-        self.vaults, self.automaton = vaults, automaton
+    def __init__(self, passes: PassTable, automaton: Automaton = AUTOMATON) -> None:
+        self.parameters, self.options = passes.parameters, passes.options
+        self.passes, self.automaton = passes, automaton
         self.gait: Gait = StandingGait.of(self.parameters, self.options)
         self.offset: Array = np.zeros(PADDED)
-        self.beat = BEAT * vaults.scale.time
+        self.beat = BEAT * passes.scale.time
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`."""
@@ -124,8 +129,8 @@ class Curves:
 
     def _away(
         self, feet: BetweenFeet, start: Array, speeds: list[float], lands: bool
-    ) -> tuple[Found, Vault, Array]:
-        """To a liftoff from which VLO is reached, with the first speed that there is a curve to.
+    ) -> tuple[Found, SingleSupportPass, Array]:
+        """Curve to a liftoff that leads to VLO, with the first speed that there is a curve to.
 
         Args:
             feet: on the ground.
@@ -138,24 +143,24 @@ class Curves:
         """
         ways = []
         for speed in speeds:
-            vault = self.vaults.at(speed)
-            ends = self.vaults.approach(vault, feet.toes[1])
+            over = self.passes.at(speed)
+            ends = self.passes.approach(over, feet.toes[1])
             found, i = feet.to_liftoff(start, ends, lands)
-            ways.append((found, vault, ends[i]))
+            ways.append((found, over, ends[i]))
             if self._fits(found):
                 return ways[-1]
         return min(ways, key=lambda way: way[0].cost)
 
     def _leaving(
-        self, node: str, feet: BetweenFeet, way: tuple[Found, Vault, Array], u: Array
+        self, node: str, feet: BetweenFeet, way: tuple[Found, SingleSupportPass, Array], u: Array
     ) -> tuple[Array, Stride]:
         """Controls and stride of a curve to a liftoff, and on to VLO."""
-        found, vault, liftoff = way
+        found, over, liftoff = way
         changed = u.copy()
-        changed[Slot.K_SD] = vault.stiffness
+        changed[Slot.K_SD] = over.stiffness
         first = timed_stride(self.automaton, node, found.pieces, feet.toes)
         state = liftoff[:, :2].T.ravel()
-        second = self.vaults.arriving(first.node, state, changed, first.toes)
+        second = self.passes.arriving(first.node, state, changed, first.toes)
         return changed, chained(first, second)
 
 
@@ -169,13 +174,13 @@ class SlopeCurves(Curves):
     def on_slope(self, slope: float) -> SlipParameters:
         """See :meth:`~.planner.SlopePlanner.on_slope`."""
         if slope != self.parameters.slope:
-            self.vaults = self.vaults.on_slope(slope)
-            self.parameters = self.vaults.parameters
+            self.passes = self.passes.on_slope(slope)
+            self.parameters = self.passes.parameters
         return self.parameters
 
 
 class StandPlanner(SlopeCurves):
-    """Stands: the CoM comes to rest between the feet, and stays there."""
+    """Planner of a stand: the CoM comes to rest between the feet, and stays there."""
 
     lands = False
 
@@ -190,7 +195,7 @@ class StandPlanner(SlopeCurves):
 
 
 class StartPlanner(SlopeCurves):
-    """Starts to walk: back, and forward to where the rear foot lifts off."""
+    """Planner of a start: back, and forward to where the rear foot lifts off."""
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
@@ -204,14 +209,14 @@ class StartPlanner(SlopeCurves):
     ) -> tuple[Decision, Stride]:
         """See :class:`~.planner.CurvePlanner`."""
         feet = self._between(toes)
-        speeds = self.vaults.between(float(decision.predicted[0]), 0.0)
+        speeds = self.passes.between(float(decision.predicted[0]), 0.0)
         way = self._away(feet, start, speeds, False)
         u, stride = self._leaving(node, feet, way, decision.controls)
         return replace(decision, controls=u, feasible=self._fits(way[0])), stride
 
 
 class StopPlanner(StandPlanner):
-    """Makes the last step, and comes to rest."""
+    """Planner of the last step, and of the rest after it."""
 
     lands = True
 
@@ -224,12 +229,12 @@ class StopPlanner(StandPlanner):
             found = self._between(step.toes).to_rest(step.state, True)
             return self._price(step, found)
 
-        steps = self.vaults.touchdowns(z, angles)
+        steps = self.passes.touchdowns(z, angles)
         return self._step(min(steps, key=cost) if steps else None, self.gait.state, 0.0)
 
 
-class ChangePlanner(SlopeCurves):
-    """Makes a step to another speed."""
+class SpeedChangePlanner(SlopeCurves):
+    """Planner of a step to another speed."""
 
     def decide(
         self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
@@ -237,27 +242,29 @@ class ChangePlanner(SlopeCurves):
         """See :class:`~.planner.Planner`: the step after which the speed can be had best."""
         present = float(z[0])
         wanted = present if target is None else float(target[0])
-        steps = self.vaults.touchdowns(z, angles)
-        speeds = self.vaults.between(wanted, present)
+        steps = self.passes.touchdowns(z, angles)
+        speeds = self.passes.between(wanted, present)
         if not steps:
-            vault = self.vaults.at(speeds[0])
-            return self._step(None, vault.vlo, vault.stiffness)
-        step, vault = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS])
-        return self._step(step, vault.vlo, vault.stiffness)
+            over = self.passes.at(speeds[0])
+            return self._step(None, over.vlo, over.stiffness)
+        step, over = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS])
+        return self._step(step, over.vlo, over.stiffness)
 
-    def _towards(self, steps: list[Touchdown], speeds: list[float]) -> tuple[Touchdown, Vault]:
+    def _towards(
+        self, steps: list[Touchdown], speeds: list[float]
+    ) -> tuple[Touchdown, SingleSupportPass]:
         """The step after which the first of the speeds can be had, and the VLO it leads to."""
-        best = (np.inf, steps[0], self.vaults.at(speeds[0]))
+        best = (np.inf, steps[0], self.passes.at(speeds[0]))
         for speed in speeds:
-            vault = self.vaults.at(speed)
+            over = self.passes.at(speed)
             fits = False
             for step in steps:
-                ends = self.vaults.approach(vault, step.toes[1])
+                ends = self.passes.approach(over, step.toes[1])
                 found, _ = self._between(step.toes).to_liftoff(step.state, ends, True)
                 fits = fits or self._fits(found)
                 price = self._price(step, found)
                 if price < best[0]:
-                    best = price, step, vault
+                    best = price, step, over
             if fits:
                 break
         return best[1:]
@@ -268,27 +275,29 @@ class ChangePlanner(SlopeCurves):
         """See :class:`~.planner.CurvePlanner`."""
         feet = self._between(toes)
         present = float(start[0, 1])
-        speeds = self.vaults.between(float(decision.predicted[0]), present)
+        speeds = self.passes.between(float(decision.predicted[0]), present)
         way = self._away(feet, start, speeds, True)
         u, stride = self._leaving(node, feet, way, decision.controls)
         return replace(decision, controls=u, feasible=self._fits(way[0])), stride
 
 
-class CarryingPlanner(ChangePlanner):
-    """Leads to a liftoff from which the walk passes VLO; on one leg the walk's planner chooses.
+class DoubleSupportRecovery(SpeedChangePlanner):
+    """Recovery of a walk that is too slow: both feet carry it to a liftoff that leads to VLO.
+
+    On one leg the walk's planner chooses.
 
     Args:
-        vaults: passes over a leg.
+        passes: over a leg.
         walk: the walk's planner.
     """
 
-    def __init__(self, vaults: Vaults, walk: LandingPlanner) -> None:
-        super().__init__(vaults)
+    def __init__(self, passes: PassTable, walk: LandingPlanner) -> None:
+        super().__init__(passes)
         self._walk = walk
         self.gait = walk.gait
 
     def land(
-        self, ahead: Ahead, decision: Decision, target: Array, free: Sequence[int]
+        self, ahead: EndOfStride, decision: Decision, target: Array, free: Sequence[int]
     ) -> Decision:
         """See :meth:`~.planner.LandingPlanner.land`."""
         return decided(self._walk.land, ahead, decision, target, free)

@@ -21,15 +21,15 @@ from template_control.embedding.standing.options import PLACE, StandingOptions
 from template_control.embedding.standing.passes import (
     NIMBLE,
     STEP_DURATION,
-    Family,
-    Pass,
-    Passes,
-    Vaults,
+    GaitsBySpeed,
+    LandingTable,
+    PassTable,
+    StepPass,
 )
 from template_control.embedding.standing.planners import (
-    CarryingPlanner,
-    ChangePlanner,
     Curves,
+    DoubleSupportRecovery,
+    SpeedChangePlanner,
     StandingGait,
     StandPlanner,
     StartPlanner,
@@ -60,29 +60,29 @@ class Away(NamedTuple):
     """
 
     found: Found
-    over: Pass
+    over: StepPass
     liftoff: Array
     price: float
 
 
 class StepPlanner(Curves):
-    """Makes one step from a stand, and stands again.
+    """Planner of one step from a stand to a stand.
 
     Args:
-        vaults: passes over a leg.
+        passes: over a leg.
         stride: which of the automaton's it makes; the leg that lifts off first tells its direction.
-        passes: of another such planner, to share; None: its own.
+        landings: of another such planner, to share; None: its own.
         automaton: of the strides.
     """
 
     def __init__(
         self,
-        vaults: Vaults,
+        passes: PassTable,
         stride: str,
-        passes: Passes | None = None,
+        landings: LandingTable | None = None,
         automaton: Automaton = AUTOMATON,
     ) -> None:
-        super().__init__(vaults, automaton)
+        super().__init__(passes, automaton)
         first = automaton.start(stride)
         ahead = first.edge(Event.REAR_LIFTOFF) is not None
         self._way = 1.0 if ahead else -1.0
@@ -94,9 +94,9 @@ class StepPlanner(Curves):
             automaton.successor(self._single, Event.TOUCHDOWN): self._rest,
         }
         self._launch = _LAUNCH * self.parameters.rest_length
-        self.passes = passes or Passes(vaults, self._single)
+        self.landings = landings or LandingTable(passes, self._single)
         gait = StandingGait.of(self.parameters, self.options)
-        self.gait = replace(gait, stride=stride, step_duration=STEP_DURATION * vaults.scale.time)
+        self.gait = replace(gait, stride=stride, step_duration=STEP_DURATION * passes.scale.time)
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
@@ -117,13 +117,13 @@ class StepPlanner(Curves):
         stands = first.toes if self._way > 0.0 else np.array(toes)
         second, _ = self._landed(state, u, stands)
         middle = feet.place(PLACE) - feet.margin
-        fits = away.found.excess <= self._launch and self.passes.capture(ahead) >= middle
+        fits = away.found.excess <= self._launch and self.landings.capture(ahead) >= middle
         return replace(decision, controls=u, feasible=fits), chained(first, second)
 
     def _best_away(self, feet: BetweenFeet, start: Array) -> Away:
         """The curve to a liftoff, forward, after which the step ends best."""
-        ways, nimble = [], NIMBLE * self.vaults.scale.speed
-        for over in self.passes.known:
+        ways, nimble = [], NIMBLE * self.passes.scale.speed
+        for over in self.landings.known:
             far = feet.spacing + over.landing.toe
             in_time = over.landing.time - over.times >= far / nimble
             in_time[0] = True  # whatever it is, it has to do
@@ -140,15 +140,15 @@ class StepPlanner(Curves):
 
     def _at_once(self, feet: BetweenFeet, start: Array) -> list[Away]:
         """The liftoff that is made now: the CoM may be past the foot that stays."""
-        stiffness = self.passes.carrying(start, feet.toes[1])
-        best = self.passes.best(start, stiffness, feet.toes[::-1])
+        stiffness = self.landings.carrying(start, feet.toes[1])
+        best = self.landings.best(start, stiffness, feet.toes[::-1])
         if best is None:
             return []
         on = np.zeros((2, TERMS))
         on[:, :2] = start[:, :2]
         soon = Quintic(on, _SOON)
-        price = self.passes.hurried(best, feet.toes[0])
-        over = Pass(stiffness, np.zeros(0), np.zeros(0), best)
+        price = self.landings.hurried(best, feet.toes[0])
+        over = StepPass(stiffness, np.zeros(0), np.zeros(0), best)
         return [Away(Found((soon,), 0.0, 0.0), over, soon.end(), price)]
 
     def _swing(
@@ -161,13 +161,13 @@ class StepPlanner(Curves):
         """
         ahead = self._turned(start)
         foot = (self._way * toes[0], self._way * toes[1])
-        stiffness = float(decision.controls[Slot.K_SC]) or self.passes.carrying(ahead, foot[0])
-        best = self.passes.best(ahead, stiffness, foot)
+        stiffness = float(decision.controls[Slot.K_SC]) or self.landings.carrying(ahead, foot[0])
+        best = self.landings.best(ahead, stiffness, foot)
         u = decision.controls
         if best is not None:
             u = self._controls(best.angle, stiffness)
         stride, landed = self._landed(start[:, :2].T.ravel(), u, np.array(toes))
-        falls = self.passes.capture(ahead) > foot[0]
+        falls = self.landings.capture(ahead) > foot[0]
         return replace(decision, controls=u, feasible=landed and falls), stride
 
     def _rest(
@@ -203,7 +203,7 @@ class StepPlanner(Curves):
 
     def _landed(self, state: Array, u: Array, toes: Array) -> tuple[Stride, bool]:
         """The stride from single stance to rest, and whether the foot lands."""
-        stride = self.vaults.arriving(self._single, state, u, toes)
+        stride = self.passes.arriving(self._single, state, u, toes)
         events = [event for event in stride.events if event.event is Event.TOUCHDOWN]
         if not events:
             return stride, False
@@ -228,7 +228,7 @@ class StepPlanner(Curves):
         return chained(cut, rest), True
 
 
-def gaits_by_speed(parameters: SlipParameters) -> Family:
+def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
     """The gaits of the family by speed, with push-off; slower walks pass over a stiff leg.
 
     Args:
@@ -237,10 +237,10 @@ def gaits_by_speed(parameters: SlipParameters) -> Family:
     chain = walking_by_speed().chains[-1]
     unit = parameters.speed_unit
     ends = (float(chain.vlo_speed[0]) * unit, float(chain.vlo_speed[-1]) * unit)
-    return Family(partial(chain.gait, parameters), ends)
+    return GaitsBySpeed(partial(chain.gait, parameters), ends)
 
 
-def carrying_planners(walk: Planner, options: StandingOptions) -> dict[str, Planner]:
+def recovery_planners(walk: Planner, options: StandingOptions) -> dict[str, Planner]:
     """Planners of what a slow walk breaks into: it is carried on, or stands and starts again.
 
     Args:
@@ -248,15 +248,15 @@ def carrying_planners(walk: Planner, options: StandingOptions) -> dict[str, Plan
         options: tuning, for the reference template.
     """
     p = walk.gait.parameters
-    vaults = Vaults(p, scaled(options, Scale.of(p)), gaits_by_speed(p))
-    change = ChangePlanner(vaults)
+    passes = PassTable(p, scaled(options, Scale.of(p)), gaits_by_speed(p))
+    change = SpeedChangePlanner(passes)
     if isinstance(walk, LandingPlanner):
-        change = CarryingPlanner(vaults, walk)
+        change = DoubleSupportRecovery(passes, walk)
     return {
         StrideKind.CHANGE_SPEED: change,
-        StrideKind.WALK_TO_STAND: StopPlanner(vaults),
-        StrideKind.STEP_BACK: StepPlanner(vaults, StrideKind.STEP_BACK),
-        StrideKind.STAND_TO_WALK: StartPlanner(vaults),
+        StrideKind.WALK_TO_STAND: StopPlanner(passes),
+        StrideKind.STEP_BACK: StepPlanner(passes, StrideKind.STEP_BACK),
+        StrideKind.STAND_TO_WALK: StartPlanner(passes),
     }
 
 
@@ -264,7 +264,7 @@ def carrying_planners(walk: Planner, options: StandingOptions) -> dict[str, Plan
 def standing_planners(
     parameters: SlipParameters,
     options: StandingOptions | None = None,
-    family: Family | None = None,
+    family: GaitsBySpeed | None = None,
 ) -> dict[str, Planner]:
     """A planner for standing, starting to walk, stopping, changing a walk's speed, and a step.
 
@@ -274,14 +274,16 @@ def standing_planners(
         family: the gaits that a walk may have, such as :func:`gaits_by_speed`; None: the library's
             own.
     """
-    gaits = family or Family(partial(walking_gait, parameters), speed_range(parameters))
-    vaults = Vaults(parameters, scaled(options or StandingOptions(), Scale.of(parameters)), gaits)
-    forward = StepPlanner(vaults, StrideKind.STEP_FORWARD)
+    gaits = family or GaitsBySpeed(partial(walking_gait, parameters), speed_range(parameters))
+    passes = PassTable(
+        parameters, scaled(options or StandingOptions(), Scale.of(parameters)), gaits
+    )
+    forward = StepPlanner(passes, StrideKind.STEP_FORWARD)
     return {
-        StrideKind.STAND: StandPlanner(vaults),
-        StrideKind.STAND_TO_WALK: StartPlanner(vaults),
-        StrideKind.WALK_TO_STAND: StopPlanner(vaults),
-        StrideKind.CHANGE_SPEED: ChangePlanner(vaults),
+        StrideKind.STAND: StandPlanner(passes),
+        StrideKind.STAND_TO_WALK: StartPlanner(passes),
+        StrideKind.WALK_TO_STAND: StopPlanner(passes),
+        StrideKind.CHANGE_SPEED: SpeedChangePlanner(passes),
         StrideKind.STEP_FORWARD: forward,
-        StrideKind.STEP_BACK: StepPlanner(vaults, StrideKind.STEP_BACK, forward.passes),
+        StrideKind.STEP_BACK: StepPlanner(passes, StrideKind.STEP_BACK, forward.landings),
     }

@@ -118,8 +118,8 @@ class Section:
         """
         return np.asarray(z, dtype=float) * _MIRROR[: self.dimension]
 
-    def calmer(self, z: Array, share: float, highest: float) -> Array:
-        """A state (n,) that the template can go on from more easily than from ``z``.
+    def damped(self, z: Array, share: float, highest: float) -> Array:
+        """State (n,) with damped dy/dt, from which the template can go on more easily.
 
         At apex dy/dt is 0 already, and no leg limits the height: there it is ``z``.
 
