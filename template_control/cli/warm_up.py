@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
         options: of the command line, none.
     """
     from template_control.compiled import cache_folder
-    from template_control.embedding.free.kernels import FREE
+    from template_control.embedding.free.controller import FREE
     from template_control.embedding.planners.ahead import AHEAD
     from template_control.embedding.planners.walk_kernels import WALK
     from template_control.embedding.standing.curves import STAND

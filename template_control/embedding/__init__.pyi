@@ -3,9 +3,9 @@ from .apex_pose import apex_pose as apex_pose
 from .contacts import ContactOptions as ContactOptions
 from .controller import EmbeddingController as EmbeddingController
 from .free.controller import FreeController as FreeController
+from .free.options import FREE_PHASES as FREE_PHASES
 from .free.options import FREE_PLANNER as FREE_PLANNER
 from .free.options import FreeOptions as FreeOptions
-from .free.phases import FREE_PHASES as FREE_PHASES
 from .learners.friction import FrictionOptions as FrictionOptions
 from .learners.lean import Lean as Lean
 from .learners.lean import LeanOptions as LeanOptions

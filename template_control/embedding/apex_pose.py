@@ -34,7 +34,7 @@ _TICK = 1e-3  # over which the references move on [s]; finer ones end in the sam
 
 @dataclass(frozen=True)
 class ApexStart(Checked):
-    """How a run begins at an apex.
+    """Start of a run at an apex.
 
     Attributes:
         state: (2,) dx/dt and y [m/s, m].

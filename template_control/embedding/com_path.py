@@ -56,7 +56,7 @@ class Curve(NamedTuple):
 
 
 class Landing(NamedTuple):
-    """Where and when a leg next touches down; (nan, inf) if it does not land on this path.
+    """Next touchdown of a leg; (nan, inf) if it does not land on this path.
 
     Attributes:
         x: of its toe in the world [m].
@@ -109,7 +109,7 @@ class TemplatePath:
         return found
 
     def after(self, event: Event, passed: int) -> int:
-        """How many of the path's events are over once the next ``event`` is.
+        """Number of the path's events that are over once the next ``event`` is.
 
         Args:
             event: the guard that fires.
@@ -253,7 +253,7 @@ Locate = Callable[[Array, Array, Array, float, float, float, Array], tuple[float
 """Arguments and results of :func:`at_direction`."""
 
 LOCATE: dict[Clock, Locate] = {Clock.DIRECTION: at_direction, Clock.TIME: at_time}
-"""How a phase's clock finds the robot's place on the path."""
+"""Search for the robot's place on the path, by the phase's clock."""
 
 TERMS = 6
 """Coefficients of a quintic."""

@@ -32,7 +32,7 @@ _FORCE = 0.02  # share of the weight that a wall's force has at least
 
 @dataclass(frozen=True)
 class ContactOptions(Checked):
-    """When a contact flag is believed, and when a foot has met a wall.
+    """Belief in contact flags, and in walls.
 
     Attributes:
         doubt: a flag that the path does not expect is believed after it has held for this long [s].

@@ -1,4 +1,4 @@
-"""The controller that makes the robot move like the template (Fig. 11).
+"""Controller that makes the robot move like the template (Fig. 11).
 
 It moves along the automaton's edges when the robot fires them, changes roles and swings of the
 feet, plans at every section and again where a foot has landed or a disturbance came, and turns the
@@ -133,7 +133,7 @@ class EmbeddingController:
 
     @property
     def _origin(self) -> float:
-        """Where the template's rear toe is in the world: at the foot, if that stands [m]."""
+        """x of the template's rear toe in the world: at the foot, if that stands [m]."""
         return float(self.observer.now.toes[0]) if self.mode.stance else self.supervisor.toe
 
     def first_pitch(self) -> float:

@@ -55,7 +55,7 @@ _OVERSTRETCH = 0.03
 
 @dataclass(frozen=True)
 class GuardOptions(Checked):
-    """When a touchdown or a liftoff has happened, by contacts that are believed.
+    """Touchdown and liftoff, by contacts that are believed.
 
     Attributes:
         liftoff_angle: direction beta from the rear foot to the CoM [rad, from forward
@@ -147,7 +147,7 @@ _FELT = [_NOT_GEOMETRIC.get(event) for event in Event]
 
 @dataclass(frozen=True)
 class Mode:
-    """Where the robot is on the automaton, and what that asks for.
+    """Mode of the robot: a node of the automaton with all that the controller looks up for it.
 
     Attributes:
         node: the automaton's node.
@@ -180,7 +180,7 @@ class Mode:
 
 
 def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:
-    """Make a mode for each node, by its name.
+    """A mode for each node, by its name.
 
     Args:
         automaton: whose nodes.
@@ -227,7 +227,7 @@ def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:
 
 
 class PathClock:
-    """Where on the path the robot is; it persists from tick to tick.
+    """Place of the robot on the path; it persists from tick to tick.
 
     Args:
         parameters: the template.

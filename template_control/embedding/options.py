@@ -1,4 +1,4 @@
-"""The tuning of the embedding, for the reference template."""
+"""Tuning of the embedding, for the reference template."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class EmbeddingOptions(QpOptions):
         catches: whether a walk breaks into another stride where it cannot go on, kept or of a
             scenario: a run where it is too fast, a stand where it is too slow.
         lean: how far the trunk leans in strides that do not keep ``trunk_pitch``.
-        delay: how the delay from measurement to torque is learnt and reckoned with, where a planar
-            robot's whole state is measured; a run is told it, not the controller.
+        delay: how the delay from measurement to torque is learnt and compensated, where a planar
+            robot's whole state is measured; a run reads it, not the controller.
         slides: how it is learnt that the ground is more slippery than ``friction`` says.
     """
 

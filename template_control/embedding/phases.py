@@ -1,4 +1,4 @@
-"""What the controller does in each phase of the automaton: a table, not code.
+"""Table of what the controller does in each phase of the automaton.
 
 The controller looks a node's entry up here, first by the node's name, then by its phase. A new
 gait brings entries of its own where the ones below do not serve it.
@@ -20,7 +20,7 @@ from template_control.whole_body.tasks import ComTask, FootTask, MomentumTask, P
 
 
 class Clock(StrEnum):
-    """How the robot's place on the template's path is found."""
+    """Clock of the robot's place on the template's path."""
 
     DIRECTION = "direction"
     """By the direction from the rear foot to the CoM (beta of Section V-B)."""
@@ -30,7 +30,7 @@ class Clock(StrEnum):
 
 @dataclass(frozen=True)
 class PhaseControl(Checked):
-    """What a phase needs.
+    """Tasks, feet, clock and learners of a phase.
 
     Attributes:
         tasks: the tasks of the whole-body QP.
@@ -70,7 +70,7 @@ class PhaseControl(Checked):
 
 
 Phases = Mapping[Phase | str, PhaseControl]
-"""What each phase needs. A key is a phase or a node's name; the node's entry comes first."""
+"""Control of each phase. A key is a phase or a node's name; the node's entry comes first."""
 
 # A running leg folds high and comes down late: a foot that sinks all the way touches early, while
 # the CoM still rises, and straightens the knee into its stop.
@@ -141,7 +141,7 @@ PHASES: Phases = {
     "SS_bt^sb": _STEPPING,
     "DS_br^sb": replace(_STANDING, estimate_load=False),
 }
-"""What walking and running need in each phase; transitions may start from it."""
+"""Control of walking and running in each phase; transitions may start from it."""
 
 
 def phase_control(phases: Phases, node: Node) -> PhaseControl:

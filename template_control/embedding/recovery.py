@@ -94,7 +94,7 @@ def _goes_on(
 def _decision(
     rollout: TemplateRollout, node: Node, report: SectionReport, sensed: TemplateState, turn: float
 ) -> Decision | None:
-    """What is decided where the goal of ``report`` begins at ``node``; None by no such planner.
+    """Decision where the goal of ``report`` begins at ``node``; None by no such planner.
 
     Its decision is the one of the stride that is left.
     """
@@ -115,7 +115,7 @@ def _decision(
 def _along_curve(
     rollout: TemplateRollout, node: Node, sensed: TemplateState, goal: StrideGoal, present: Decision
 ) -> Decision:
-    """What the planner of ``goal`` decides where a curve leads from here to its section."""
+    """Decision of ``goal``'s planner where a curve leads from here to its section."""
     wanted = section_of(rollout.automaton.sections(node.name)[1]).padded(goal.target)
     u = np.zeros(NUM_SLOTS)
     begun = replace(present, predicted=wanted, nominal=False, controls=u)

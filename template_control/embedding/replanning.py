@@ -123,7 +123,7 @@ def ballistic_touchdown_angle(sensed: TemplateState, parameters: SlipParameters)
 
 
 class _Pricing(NamedTuple):
-    """What makes a choice dear: the state that it leads to, and how far it is from the gait's.
+    """Price of a choice: of the state that it leads to, and of its distance from the gait's.
 
     Attributes:
         price: of a state.
@@ -201,7 +201,7 @@ def _cheapest(
 
 
 def reachable_turn(scale: Scale, time_to_go: float) -> float:
-    """How far the swing foot can still change the touchdown angle [rad].
+    """Change of the touchdown angle that the swing foot can still make [rad].
 
     Args:
         scale: units of the template.
@@ -299,7 +299,7 @@ def choose_stiffnesses(
 def choose_after_touchdown(
     rollout: TemplateRollout, node: Node, sensed: TemplateState, report: SectionReport
 ) -> Decision | None:
-    """What is still free as a foot lands, chosen from where it did.
+    """Choice of what is still free as a foot lands, from where it did.
 
     Arguments as for :func:`choose_stiffnesses`.
 
@@ -370,7 +370,7 @@ def choose_assist(
 
 
 def _change(drift: Callable[[float], float | None], bound: float) -> float:
-    """Where the drift is zero by the rule of false position, or as small as the bound allows."""
+    """Change that makes the drift zero, by false position, or as small as the bound allows."""
     none = drift(0.0)
     if none is None:
         return 0.0

@@ -158,7 +158,7 @@ def robot_gait_for_speed(
 
 
 def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
-    """What the legs' swing asks for, estimated with a straight leg that follows the quintic.
+    """Speed and torque of the legs' swing, estimated with a straight leg that follows the quintic.
 
     Args:
         robot: last updated with straight legs, as :func:`template_for` leaves it.

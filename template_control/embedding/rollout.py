@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ReplanOptions(Checked):
-    """When a stride is planned anew between two sections.
+    """Conditions of a new plan between two sections.
 
     Attributes:
         speed: deviation of the forward speed from the path's [m/s].
@@ -59,7 +59,7 @@ _TARGETS = {size: Annotated[Array, Shape((size,))] for size in (2, 3)}
 
 
 class RoutePlanners:
-    """Decides at the sections of a route.
+    """Decisions at the sections of a route.
 
     Args:
         route: which stride comes next, and towards which state.
@@ -215,7 +215,7 @@ class RoutePlanners:
 
 
 class TemplateRollout:
-    """Runs the template from the robot's state.
+    """Strides of the template from the robot's state.
 
     Args:
         planners: of the route.
@@ -325,7 +325,7 @@ class TemplateRollout:
         return strides, whole and all(stride.completed for stride in strides)
 
     def ahead(self, node: Node, sensed: TemplateState) -> EndOfStride:
-        """Where the present stride ends from here, by its controls.
+        """End of the present stride from here, by its controls.
 
         Args:
             node: of the automaton, the robot's.

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def unrolled(lowest: float, state: Array, radius: float) -> float:
-    """The place that a rolling foot has its lowest point in as the CoM is over it.
+    """Place of a rolling foot's lowest point as the CoM is over it.
 
     That point moves on by the radius times the angle that the leg turns by. So the phase would go
     on more slowly than the CoM, and the step would end later and slower than planned.
@@ -37,7 +37,9 @@ def unrolled(lowest: float, state: Array, radius: float) -> float:
 
 
 def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
-    """Where the lowest point of a foot lands whose toe is to be at ``toe``: :func:`unrolled` back.
+    """Landing place of the lowest point of a foot whose toe is to be at ``toe``.
+
+    The inverse of :func:`unrolled`.
 
     Args:
         toe: x of the template's toe [m].
@@ -49,7 +51,7 @@ def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
 
 @dataclass
 class TemplateState:
-    """What the robot feels, in the template's terms; overwritten at every tick.
+    """State of the robot in the template's terms; overwritten at every tick.
 
     Attributes:
         state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s], y over the template's ground. Where
@@ -73,7 +75,7 @@ class TemplateState:
 
 
 class StateObserver:
-    """Reads the robot's state on the template's ground, which the foot that landed last stands on.
+    """Observer of the robot's state on the template's ground, that of the foot that landed last.
 
     Args:
         robot: the model; every tick updates it.
@@ -198,7 +200,7 @@ class StateObserver:
 
 @dataclass(frozen=True)
 class EstimatorState:
-    """What the controller's learners know at a section.
+    """Estimates of the controller's learners at a section.
 
     Attributes:
         load: the load factor.
@@ -213,7 +215,7 @@ class EstimatorState:
 
 @dataclass(frozen=True)
 class SectionReport:
-    """What the controller knew and chose at a section.
+    """Knowledge and choice of the controller at a section.
 
     Attributes:
         time: at which the section was reached [s].

@@ -51,7 +51,7 @@ _ANGLE_DROP = 0.15  # [rad] by which the touchdown angle of an overdue touchdown
 
 
 class StrideSupervisor:
-    """Decides at the sections, keeps the decision and the path, and plans again on the way.
+    """Supervisor of a stride: decision at its section, path, and new plans on the way.
 
     Args:
         route: which stride comes next, and towards which state.
@@ -388,7 +388,7 @@ class StrideSupervisor:
         self.event_times = self.path.event_times(passed)
 
     def landing(self, foot: int) -> Landing:
-        """Where and when on the path a foot next touches down."""
+        """Next touchdown of a foot on the path."""
         return self.path.landings[self.feet.index(foot)]
 
     @property

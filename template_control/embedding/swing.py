@@ -75,7 +75,7 @@ class SwingOptions(Checked):
 
     @cached_property
     def shape(self) -> tuple[float, float, float, float, float, float]:
-        """What :func:`swing_step` takes of it: a tuple, which is quick to hand over."""
+        """Numbers for :func:`swing_step`: a tuple, which is quick to hand over."""
         descent = inf if self.descent is None else self.descent
         return self.clearance, self.rise, descent, self.landing_speed, self.horizon, self.early
 

@@ -1,3 +1,1 @@
-"""The controller of a robot that nothing holds: the sagittal one, and what keeps it from falling
-sideways and from turning.
-"""
+"""Controller of a floating-base robot: the sagittal one, and balance to the side and in yaw."""

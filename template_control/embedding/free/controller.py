@@ -1,4 +1,4 @@
-"""The controller of a free robot: the sagittal one on an (x, z) view, and the rest beside it.
+"""Controller of a floating-base robot: the sagittal one on an (x, z) view, and what it lacks.
 
 The sagittal controller runs as it is: of :class:`~template_control.robot.FloatingBaseBiped` it
 sees x and z in the heading frame. Here that frame is turned, the feet are placed sideways, and the
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.free.kernels import FREE
 from template_control.embedding.free.lateral import (
     BEYOND,
     SIDES,
@@ -32,19 +31,33 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Event, Leg
 from template_control.slip.lateral.gait import LateralWish
+from template_control.slip.lateral.placing import LATERAL
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import Scale
-from template_control.warm_up import ready
+from template_control.warm_up import Part, ready
 from template_control.whole_body.solver import Solution, Stance
+from template_control.whole_body.tasks import follow_foot
 
 Array = NDArray[np.float64]
 
 _SIDE = 1  # y, to the left
 
 
+def foot_in_plane() -> None:
+    """A foot's rows, of arrays that are parts of those in space: every second of their numbers."""
+    places, jacobian = np.zeros((2, 3))[:, ::2], np.zeros((2, 3, 2))[:, ::2]
+    wish = np.zeros((2, 2, 3)), np.zeros(2)
+    feels = places, places, jacobian, places
+    follow_foot(0, feels, wish, 0.0, (1.0,) * 4, np.zeros((2, 5)))
+
+
+FREE = (*LATERAL, Part(foot_in_plane, 0.3))
+"""Kernels of a floating-base robot's tick, without its planner's."""
+
+
 class FreeController(EmbeddingController):
-    """Joint torques of a robot that nothing holds.
+    """Joint torques of a floating-base robot.
 
     Args:
         robot: the (nominal) model; every tick updates it.
@@ -54,7 +67,7 @@ class FreeController(EmbeddingController):
         automaton: of the route's strides.
 
     Attributes:
-        sideways: where the feet land to the left or right.
+        lateral: where the feet land to the left or right.
     """
 
     robot: FloatingBaseBiped

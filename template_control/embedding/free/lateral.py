@@ -51,7 +51,7 @@ _GAIN = 0.8  # share that a steeper angle must leave of the error's price to be 
 
 
 class LateralForecast(NamedTuple):
-    """What is expected of a step to the side.
+    """Forecast of the next foothold to the side.
 
     Attributes:
         beyond: how far the wanted foothold is beyond its bounds [m]; NaN where none is known.
@@ -63,7 +63,7 @@ class LateralForecast(NamedTuple):
 
 
 def lateral_forecast(found: Placement, aim: LateralAim) -> LateralForecast:
-    """What is expected of a foothold.
+    """Forecast of a foothold.
 
     Args:
         found: the foothold.
@@ -115,7 +115,7 @@ class LateralPlanner:
     Args:
         parameters: the template.
         options: of the reference template.
-        wish: step width, motion aside, turn.
+        wish: step width, lateral motion, turn.
 
     Attributes:
         learnt: what the robot adds to the template's sideways motion.
@@ -203,7 +203,7 @@ class LateralPlanner:
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
 
     def forecast(self, path: TemplatePath, time: float, com: Array, feet: Array) -> LateralForecast:
-        """What is to be expected of the next foothold.
+        """Forecast of the next foothold.
 
         Args:
             path, time, com, feet: as for :meth:`foothold`.

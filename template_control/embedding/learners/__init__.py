@@ -1,1 +1,1 @@
-"""What is learnt from step to step: the load, and the drift that no control cancels."""
+"""Learners from step to step: load, momentum, lean of the trunk, friction."""

@@ -1,4 +1,4 @@
-"""How slippery the ground is, learnt where a foot slides."""
+"""Friction coefficient of the ground, learnt where a foot slides."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class FrictionOptions(Checked):
 
 @dataclass
 class _Slide:
-    """What a foot has felt since it began to slide.
+    """Forces and time of a foot since it began to slide.
 
     Attributes:
         standing: time since touchdown [s].

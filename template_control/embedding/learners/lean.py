@@ -1,4 +1,4 @@
-"""How far the trunk leans: by kind of stride and speed, and on average over a stride.
+"""Lean of the trunk: by kind of stride and speed, and on average over a stride.
 
 A trunk that leans forward carries the CoM ahead of the hips, and moves load from the knees to the
 hips. Within a running stride the pitch oscillates, as the legs' swing takes angular momentum from

@@ -1,4 +1,4 @@
-"""The learners of a stride: when each of them learns, and what they know."""
+"""Learners of a stride: when each of them learns, and their estimates."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class Learners:
-    """What is learnt from stride to stride.
+    """Learners from stride to stride.
 
     Args:
         options: of each, scaled to the template.
@@ -45,7 +45,7 @@ class Learners:
 
     @property
     def state(self) -> EstimatorState:
-        """What they know now."""
+        """Their estimates now."""
         return EstimatorState(self.load.factor, self.trim.acceleration, self.lean.correction)
 
     def end_stride(self, section: Section, state: Array, nominal: bool) -> None:
