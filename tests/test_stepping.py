@@ -152,7 +152,7 @@ def test_a_robot_walks_slowly_with_the_family_by_speed_and_closes_its_feet():
 def test_a_robot_that_falls_has_no_capture_point_ahead(planners):
     """Its CoM may be below where its foot was to stand."""
     height, speed = 0.9, 0.5
-    capture = planners["sb"].passes.capture
+    capture = planners["sb"].landings.capture
     above = np.array([[0.2, speed, 0.0], [height, 0.0, 0.0]])
     assert capture(above) == pytest.approx(0.2 + speed * np.sqrt(height / P.gravity))
     below = np.array([[0.2, speed, 0.0], [-0.1, 0.0, 0.0]])

@@ -20,7 +20,7 @@ from template_control.errors import RobotError
 
 Array = NDArray[np.float64]
 
-_LOG = logging.getLogger("template_control")
+_LOG = logging.getLogger(__name__)
 
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """Of an ``<inertia>``: the upper triangle, row by row."""

@@ -28,7 +28,7 @@ from template_control.robot.urdf import (
 
 Array = NDArray[np.float64]
 
-_LOG = logging.getLogger("template_control")
+_LOG = logging.getLogger(__name__)
 _PACKAGE = ("package://", "model://")  # what the name of a package's mesh begins with
 
 
