@@ -49,9 +49,9 @@ def held(monkeypatch):
     """What each run holds: plant, controller and options."""
     found, loop = [], simulation._loop
 
-    def looking(world, controller, recorder, o, until):
-        found.append((world[0], controller, o))
-        return loop(world, controller, recorder, o, until)
+    def looking(plant, backend, senses, controller, recorder, o, **until):
+        found.append((plant, controller, o))
+        return loop(plant, backend, senses, controller, recorder, o, **until)
 
     monkeypatch.setattr(simulation, "_loop", looking)
     return found

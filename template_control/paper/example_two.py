@@ -201,7 +201,7 @@ PLANNERS: dict[str, Callable[[WalkingGait], Planner]] = {
         for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)
     },
 }
-TEMPLATE, FULL_GRIP = "template alone", "ideal, full grip"
+ALONE, FULL_GRIP = "template alone", "ideal, full grip"
 PLANTS: dict[str, tuple[PlantOptions | IdealOptions, EmbeddingOptions]] = {
     FULL_GRIP: (IdealOptions(), EmbeddingOptions(friction=GRIP, friction_margin=1.0)),
     "ideal": (IdealOptions(), EmbeddingOptions()),
@@ -303,7 +303,7 @@ def template_walk(planner: str, steps: int = STEPS) -> Walk:
 
 def _walk(case: tuple[str, str]) -> Walk:
     planner, plant = case
-    return template_walk(planner) if plant == TEMPLATE else robot_walk(planner, plant)[0]
+    return template_walk(planner) if plant == ALONE else robot_walk(planner, plant)[0]
 
 
 def _texts(walk: Walk) -> tuple[str, ...]:
@@ -331,7 +331,7 @@ def _numbers(walk: Walk) -> dict[str, Any]:
 
 def fig12() -> Reproduction:
     """From z_0: where the robot settles, by planner and by plant."""
-    plants, first = (TEMPLATE, *PLANTS), next(iter(PLANNERS))
+    plants, first = (ALONE, *PLANTS), next(iter(PLANNERS))
     # What full grip changes is the robot's, whatever its planner.
     cases = [
         (planner, plant)
