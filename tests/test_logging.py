@@ -60,7 +60,7 @@ def told_of(impulse, robot, gait, caplog, catches=True):
 
 @pytest.mark.slow(seconds=3)
 def test_every_section_is_told(robot, default_gait, caplog):
-    record, told = told_of(-60.0, robot, default_gait, caplog)
+    record, told = told_of(-35.0, robot, default_gait, caplog)
     texts = [m.getMessage() for m in told if m.levelno == logging.DEBUG]
     assert sum("wanted" in text for text in texts) == record.steps == 4
     # What a section decided; a plan between two sections may replace it in the record.
