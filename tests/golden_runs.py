@@ -1,8 +1,8 @@
 """Golden runs: twelve short runs whose results a change of the code must keep.
 
 ``python tests/golden_runs.py compare OLD NEW`` runs them on two commits on this machine and demands
-equal bits. ``tests/test_golden.py`` compares with files, within tolerances: other processors round
-otherwise. ``python tests/golden_runs.py make --because REASON`` writes these files anew, says
+equal bits. ``tests/system/test_golden.py`` compares with files, within tolerances: other processors
+round otherwise. ``python tests/golden_runs.py make --because REASON`` writes these files anew, says
 what changed, and adds the reason to ``tests/golden/CHANGES.md``.
 """
 
@@ -17,9 +17,9 @@ from datetime import date
 from pathlib import Path
 
 import numpy as np
+from places import EXAMPLES, ROOT, TESTS
 
-ROOT = Path(__file__).resolve().parents[1]
-FILES = ROOT / "tests" / "golden"
+FILES = TESTS / "golden"
 CHANGES = FILES / "CHANGES.md"
 COMMANDS = {
     "walk": "walk --steps 8",
@@ -44,7 +44,7 @@ def run(name, folder):
     """Arrays of one run, as its ``run.npz`` has them."""
     from template_control.cli.main import main
 
-    words = COMMANDS[name].format(examples=ROOT / "examples").split()
+    words = COMMANDS[name].format(examples=EXAMPLES).split()
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         status = main([*words, "--no-figures", "--output", str(folder)])
@@ -107,14 +107,14 @@ def digests(root):
     code = (
         "import sys, tempfile, hashlib; sys.path[:0] = sys.argv[1:]\n"
         "import golden_runs as g, numpy as np, pathlib\n"
-        "g.ROOT = pathlib.Path(sys.argv[1])\n"
+        "g.EXAMPLES = pathlib.Path(sys.argv[1]) / 'examples'\n"
         "for name in g.COMMANDS:\n"
         "    with tempfile.TemporaryDirectory() as folder:\n"
         "        arrays = g.run(name, folder)\n"
         "    data = b''.join(np.ascontiguousarray(a).tobytes() for a in arrays.values())\n"
         "    print(name, hashlib.sha256(data).hexdigest()[:16], flush=True)\n"
     )
-    words = [sys.executable, "-c", code, str(root), str(ROOT / "tests")]
+    words = [sys.executable, "-c", code, str(root), str(TESTS)]
     path = {**os.environ, "PYTHONPATH": str(root)}
     done = subprocess.run(words, stdout=subprocess.PIPE, text=True, env=path, check=True)
     return dict(line.split() for line in done.stdout.splitlines())

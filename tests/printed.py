@@ -1,12 +1,12 @@
 """Commands that the README prints and that a test of their own runs as printed."""
 
 import shlex
-from pathlib import Path
+
+from places import ROOT
 
 from template_control.cli.main import main
 from template_control.run.record import Record
 
-ROOT = Path(__file__).resolve().parents[1]
 EXAMPLE_ONE = "template-control go examples/example_one.toml --robot runner"
 ZERO_FIVE_ZERO = "template-control go examples/zero_five_zero.toml --robot runner --no-figures"
 

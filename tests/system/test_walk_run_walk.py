@@ -2,10 +2,10 @@
 
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import EXAMPLES
 from printed import EXAMPLE_ONE
 from printed import go as go_as_printed
 
@@ -13,8 +13,6 @@ import template_control as tc
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment, load_scenario
-
-EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 def go(example, name, **options):

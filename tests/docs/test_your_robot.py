@@ -1,16 +1,16 @@
 """The messages that docs/your_robot.md explains are the ones a user gets."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DOCS
 
 import template_control as tc
 from template_control.plant.bullet import BulletPlant, pybullet
 from template_control.robot.library import robot_path
 
-PAGE = (Path(__file__).parents[1] / "docs" / "your_robot.md").read_text()
+PAGE = (DOCS / "your_robot.md").read_text()
 BOLT_FEET = ("FL_FOOT", "FR_FOOT")
 BOLT_JOINTS = ("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE")
 

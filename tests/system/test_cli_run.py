@@ -4,11 +4,11 @@ import json
 import re
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from places import EXAMPLES
 
 import template_control as tc
 from template_control.cli import report as kept
@@ -25,7 +25,7 @@ KEYS = {
     "control_tick_seconds", "qp_solve_seconds", "real_time_factor", "record",
 }  # fmt: skip
 STEPS = 3
-SPEEDS = str(Path(__file__).parents[1] / "examples" / "walk_speeds.toml")
+SPEEDS = str(EXAMPLES / "walk_speeds.toml")
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,10 @@
 """``run.toml`` of every kind of run holds what the run used, and repeats it."""
 
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import EXAMPLES
 
 from template_control.cli.main import main
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
@@ -19,8 +19,6 @@ from template_control.run.options import SimulationOptions
 from template_control.run.record import load_record
 from template_control.run.specs import GaitSpec, RobotSpec
 from template_control.slip.similarity import Scale, scaled
-
-EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
 LINES = {
     "walk": "walk --steps 2",

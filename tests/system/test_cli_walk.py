@@ -4,10 +4,10 @@ import json
 import subprocess
 import sys
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 
 from template_control.cli import report as kept
 from template_control.cli.main import main
@@ -17,7 +17,6 @@ from template_control.run.config import RunConfig
 from template_control.run.record import Record
 from template_control.view.figures import FIGURES, save_figures
 
-ROOT = Path(__file__).parents[1]
 KEYS = {
     "robot", "gait", "steps", "fell", "fall_reason", "duration", "mean_speed", "vlo_target",
     "vlo_mean_last_50", "com_error_rms", "com_error_max", "joint_torque", "saturated_share",

@@ -1,11 +1,11 @@
 """The script that counts what pushes do to a robot's runs."""
 
 import importlib.util
-from pathlib import Path
 
 import pytest
+from places import EXAMPLES
 
-SCRIPT = Path(__file__).resolve().parents[1] / "examples" / "push_tables.py"
+SCRIPT = EXAMPLES / "push_tables.py"
 
 
 @pytest.fixture(scope="module")

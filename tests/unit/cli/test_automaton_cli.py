@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import same_color
 from matplotlib.patches import FancyArrowPatch
+from places import ROOT
 
 from template_control.cli.automaton import describe, save
 from template_control.cli.main import main
@@ -116,7 +117,7 @@ def test_json_is_all_there_is_on_stdout_and_equals_the_data(tmp_path):
         text=True,
         timeout=120,
         cwd=tmp_path,
-        env={"PYTHONPATH": str(Path(__file__).parents[1])},
+        env={"PYTHONPATH": str(ROOT)},
     )
     assert done.returncode == 0, done.stderr
     assert read(json.loads(done.stdout)) == AUTOMATON

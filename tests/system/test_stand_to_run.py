@@ -1,14 +1,12 @@
 """From standing through walking to running, and back to a stand: one file, two engines."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from places import EXAMPLES
 from printed import ZERO_FIVE_ZERO, go
 
 import template_control as tc
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
 ENGINES = {"pybullet": tc.PlantOptions(), "mujoco": tc.MujocoOptions()}
 
 

@@ -2,10 +2,10 @@
 
 import re
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DOCS
 
 import template_control as tc
 from template_control.cli.main import main
@@ -20,7 +20,6 @@ from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.scenario.route import SteadyRoute, StrideGoal
 from template_control.whole_body.tasks import ComTask
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
 OPTIONS = tc.SimulationOptions(steps=4, record_every=10)
 
 

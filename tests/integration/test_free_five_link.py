@@ -2,10 +2,10 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DOCS
 
 import template_control as tc
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
@@ -167,7 +167,7 @@ def test_a_urdf_that_is_wrong_is_told(load, text, old, new, told):
 
 # -- the messages that docs/your_free_robot.md explains -----------------------------------------
 
-PAGE = (Path(__file__).parents[1] / "docs" / "your_free_robot.md").read_text()
+PAGE = (DOCS / "your_free_robot.md").read_text()
 HIP = 'name="left_hip" type="revolute"'
 ARM = """<link name="arm"><inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1"
   iyz="0" izz="0.1"/></inertial></link><joint name="elbow" type="revolute"><parent link="trunk"/>

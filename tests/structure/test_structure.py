@@ -1,7 +1,7 @@
 """The library's structure: who imports whom, how large things are, and what is written down.
 
-``python tests/test_structure.py`` lists the public functions and classes that do not tell their
-arguments.
+``python tests/structure/test_structure.py`` lists the public functions and classes that do not
+tell their arguments.
 """
 
 import ast
@@ -13,7 +13,7 @@ import pytest
 
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "template_control"
 # A room imports from itself and from rooms of earlier stages; those of one stage are independent.
 STAGES = (

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import EXAMPLES
 
 from template_control.cli.main import main
 from template_control.errors import RecordError, ScenarioError
@@ -16,7 +17,7 @@ from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment, example_one, load_scenario
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "example_one.toml"
+EXAMPLE = EXAMPLES / "example_one.toml"
 
 
 @pytest.fixture(scope="module", params=[MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT])

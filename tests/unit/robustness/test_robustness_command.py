@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from places import DOCS
 
 from template_control.cli import robustness as command
 from template_control.cli.main import build_parser, main
@@ -14,8 +15,6 @@ from template_control.robot.library import robot_path
 from template_control.robustness import disturbances, severity_sweep
 from template_control.robustness.disturbances import DISTURBANCES
 from template_control.run.specs import RobotSpec
-
-DOCS = Path(__file__).parents[1] / "docs"
 
 
 @pytest.fixture

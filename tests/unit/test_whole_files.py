@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
 from template_control.cli.main import main
 from template_control.errors import RecordError
@@ -15,8 +16,6 @@ from template_control.run.record import Record
 from template_control.storage import atomic_path
 from template_control.view.figures import save_figures
 from template_control.view.replay.replay import save_film, save_html
-
-ROOT = Path(__file__).parents[1]
 
 
 @contextmanager

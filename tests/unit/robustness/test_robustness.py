@@ -2,7 +2,6 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -40,7 +39,6 @@ from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.view.trial_figures import robustness_figure
 
-DOCS = Path(__file__).parents[1] / "docs"
 BY_NAME = {d.name: d for d in DISTURBANCES}
 
 

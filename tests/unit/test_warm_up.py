@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from places import EXAMPLES
 
 from template_control import warm_up
 from template_control.warm_up import Part
@@ -111,18 +112,18 @@ def test_after_a_warm_up_no_command_compiles(tmp_path):
             check=True,
         )
 
-    cache, examples = tmp_path / "cache", Path(__file__).parents[1] / "examples"
+    cache = tmp_path / "cache"
     command("warm-up")
     warm = kept()
     assert len(warm) > 100
     for words in (
         "walk --steps 3 --push 60@1 --no-figures",
         "run --steps 2 --no-figures",
-        f"go {examples}/zero_five_zero.toml --robot runner --steps 5 --no-figures",
+        f"go {EXAMPLES}/zero_five_zero.toml --robot runner --steps 5 --no-figures",
         "walk --steps 2 --from-stand --to-stand --plant ideal --no-figures",
         "walk --steps 2 --plant mujoco --terrain slope:angle=2 --no-figures",
         "walk --robot bolt --free --steps 2 --no-figures",
-        f"slip {examples}/example_one.toml",
+        f"slip {EXAMPLES}/example_one.toml",
         "gaits",
         "reproduce table3",
     ):

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import TESTS
 from sweep_work import alive, hold, square, wait_until
 
 import template_control as tc
@@ -110,7 +111,7 @@ with workers(2) as pool:
     print(*{pool.submit(os.getpid).result() for _ in range(8)}, flush=True)
     list(pool.map(hold, [0.5] * 100))
 """
-    paths = [str(Path(__file__).parent), os.getcwd(), os.environ.get("PYTHONPATH", "")]
+    paths = [str(TESTS), os.getcwd(), os.environ.get("PYTHONPATH", "")]
     process = subprocess.Popen(
         [sys.executable, "-c", code],
         stdout=subprocess.PIPE,

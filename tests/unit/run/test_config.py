@@ -6,10 +6,10 @@ import shutil
 import sys
 import tomllib
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DOCS
 
 import template_control as tc
 from template_control import settings
@@ -250,7 +250,7 @@ def test_a_second_run_says_that_it_replaces_the_first(tmp_path, capfd):
 
 
 def test_the_file_that_the_page_shows_is_understood(tmp_path):
-    page = (Path(__file__).parents[1] / "docs" / "options.md").read_text()
+    page = (DOCS / "options.md").read_text()
     (shown,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     path = tmp_path / "shown.toml"
     path.write_text(shown)

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from places import ROOT, TESTS
 from sweep_work import (
     COUNT,
     P,
@@ -108,8 +109,7 @@ quietly(logged, grid(x=range(COUNT)), {path!r}, {executor}, seed=1)
 
 def start_killed(path, executor="None"):
     """The sweep of ``logged`` in a process of its own, which leads a process group."""
-    tests = str(Path(__file__).parent)
-    paths = os.pathsep.join([tests, str(Path(tests).parent), os.environ.get("PYTHONPATH", "")])
+    paths = os.pathsep.join([str(TESTS), str(ROOT), os.environ.get("PYTHONPATH", "")])
     return subprocess.Popen(
         [sys.executable, "-c", KILLED.format(path=str(path), executor=executor)],
         env={**os.environ, "PYTHONPATH": paths},

@@ -1,12 +1,12 @@
 """The robot in MuJoCo: against Pinocchio, against mechanics, and as a world to walk and run in."""
 
 import sys
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import EXAMPLES
 
 import template_control as tc
 from template_control.cli.main import main
@@ -15,7 +15,6 @@ from template_control.plant import MujocoPlant
 from template_control.robot.library import ROBOTS
 from template_control.robot.terms import PLANAR_DOF
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
 G = 9.81
 
 

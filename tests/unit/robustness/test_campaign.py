@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from places import DOCS
 
 from template_control import settings
 from template_control.cli import campaign as command
@@ -28,7 +29,7 @@ from template_control.run.record import Record
 from template_control.run.specs import RobotSpec
 from template_control.view.trial_figures import campaign_figure
 
-PAGE = (Path(__file__).parents[1] / "docs" / "campaign.md").read_text()
+PAGE = (DOCS / "campaign.md").read_text()
 RANGES = [f.name for f in fields(DisturbanceDistribution) if f.name not in ("within", "after")]
 
 
