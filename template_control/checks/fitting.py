@@ -354,10 +354,12 @@ _COMPOUND: dict[Any, Callable[..., Any]] = {
 def _instance(value: Any, kind: type) -> Any:
     if getattr(kind, "_is_protocol", False):
         missing = [name for name in _members(kind) if not _has(value, name)]
-        if isinstance(value, type) or 2 * len(missing) > len(_members(kind)):
+        if isinstance(value, type) or 2 * len(missing) > len(_members(kind)) + 1:
             raise Refused(words_for(kind))
         if missing:  # meant as one, as it seems
-            raise Refused(f"{words_for(kind)} (this one lacks {', '.join(missing)})")
+            base = inspect.isabstract(kind) and kind not in type(value).__mro__
+            mend = f": derive it from {kind.__name__}" if base else ""
+            raise Refused(f"{words_for(kind)} (this one lacks {', '.join(missing)}{mend})")
         return value
     if not isinstance(value, kind):
         raise Refused(words_for(kind))
@@ -428,7 +430,26 @@ def answered(kind: type[T], method: Callable[P, Any], *args: P.args, **kwargs: P
     Raises:
         ParameterError: if it returns something else.
     """
+    return _of_kind(kind, method, asked(method, *args, **kwargs))
+
+
+def answered_or_none(
+    kind: type[T], method: Callable[P, Any], *args: P.args, **kwargs: P.kwargs
+) -> T | None:
+    """As :func:`answered`, of a method that may return None as well.
+
+    Args:
+        kind: of what it returns.
+        method, args, kwargs: as for :func:`asked`.
+
+    Raises:
+        ParameterError: if it returns something else.
+    """
     answer = asked(method, *args, **kwargs)
+    return None if answer is None else _of_kind(kind, method, answer)
+
+
+def _of_kind(kind: type[T], method: Callable[..., Any], answer: Any) -> T:
     if not isinstance(answer, kind):
         raise ParameterError(
             f"{name_of(method)} returned {shown(answer)}: return a {kind.__name__}"

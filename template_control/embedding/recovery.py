@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from template_control.checks.fitting import asked
 from template_control.embedding.planners.planner import (
-    BreakingPlanner,
-    CurvePlanner,
+    Cause,
+    Context,
     Decision,
-    FreeControls,
+    RestContext,
     decided,
+    rest_decided,
 )
 from template_control.embedding.replanning import free_controls
 from template_control.embedding.rollout import TemplateRollout
@@ -94,7 +95,7 @@ def _goes_on(
 def _decision(
     rollout: TemplateRollout, node: Node, report: SectionReport, sensed: TemplateState, turn: float
 ) -> Decision | None:
-    """Decision where the goal of ``report`` begins at ``node``; None by no such planner.
+    """Decision where the goal of ``report`` begins at ``node``; None by a planner that has none.
 
     Its decision is the one of the stride that is left.
     """
@@ -102,14 +103,12 @@ def _decision(
     planner = rollout.planners.of(goal)
     if node.name in rollout.curved:
         return _along_curve(rollout, node, sensed, goal, present)
-    if not isinstance(planner, BreakingPlanner):
-        return None
     slots = free_controls(rollout.automaton, node)
     if node.edge(Event.TOUCHDOWN) is not None:
         slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
     ahead = rollout.ahead(node, sensed)
-    free = FreeControls(slots, turn)
-    return decided(planner.break_into, ahead, present.controls, goal.target, free)
+    context = RestContext(ahead, present, goal.target, slots, turn, Cause.NO_FUTURE)
+    return rest_decided(planner, context)
 
 
 def _along_curve(
@@ -145,10 +144,10 @@ def curve_or_step(
     if not decision.feasible:
         for kind in STEP_OUT.get(node, ()):
             other = rollout.planners.planners.get(kind)
-            if not isinstance(other, CurvePlanner):
+            if other is None:
                 continue
             start = rollout.automaton.starts[kind]
-            first = decided(other.decide, REST.of(state))
+            first = decided(other.decide, Context(REST.of(state), cause=Cause.NO_FUTURE))
             instead, step = rollout.curve(start, sensed, state, other, first)
             if instead.feasible:
                 goal = replace(report.goal, stride=kind)

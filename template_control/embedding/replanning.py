@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
-from math import asin, atan2, hypot
+from math import asin, atan2, hypot, isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from template_control.embedding.learners.momentum import uncontrolled
 from template_control.embedding.planners.planner import (
+    Cause,
+    Context,
     Decision,
     EndOfStride,
-    PricingPlanner,
+    RestContext,
     decided,
-    lands,
+    rest_decided,
 )
 from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
 from template_control.embedding.rollout import TemplateRollout
@@ -159,7 +161,7 @@ def choose_legs(
         free: slots of the stiffnesses that the rest of the stride depends on.
         nominal: (NUM_SLOTS,) the gait's controls.
         scale: units of the template.
-        price: of the state where a stride ends, to the planner of the next one.
+        price: of the state where a stride ends, to the planner of the next one; nan: it knows none.
     """
     stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE and nominal[slot] > 0.0]
     base = nominal[stiff]
@@ -183,6 +185,8 @@ def _cheapest(
     """The cheapest of a grid within the bounds, and of controls ``u`` that lead to ``end``."""
     stiff = prior.slots
     least = np.inf if end is None else pricing.price(end) + pricing.effort(u[stiff])
+    if isnan(least):
+        return u, end
     points = max(2, round(TRIES ** (1.0 / max(len(stiff), 1))))
     axes = [np.linspace(*ends, points) for ends in zip(prior.lower, prior.upper, strict=True)]
     for x in np.array(list(product(*axes))):
@@ -245,6 +249,7 @@ def choose_all_controls(
     sensed: TemplateState,
     report: SectionReport,
     angles: tuple[float, float],
+    cause: Cause,
 ) -> Decision | None:
     """Decide anew at the section state from which the template would have come to here.
 
@@ -256,6 +261,7 @@ def choose_all_controls(
         sensed: the robot's state.
         report: of the present stride.
         angles: least and greatest touchdown angle that the swing foot can still reach [rad].
+        cause: of the new decision.
 
     Returns:
         None where the template cannot have come from a section.
@@ -264,7 +270,9 @@ def choose_all_controls(
 
     def decide(so_far: Array) -> Decision | None:
         z = rollout.backward_to_section(node, so_far, sensed)
-        return None if z is None else decided(planner.decide, z, report.goal.target, angles)
+        if z is None:
+            return None
+        return decided(planner.decide, Context(z, report.goal.target, angles, cause))
 
     decision = decide(report.decision.controls)
     if decision is not None and decision.feasible:
@@ -275,7 +283,11 @@ def choose_all_controls(
 
 
 def choose_stiffnesses(
-    rollout: TemplateRollout, node: Node, sensed: TemplateState, report: SectionReport
+    rollout: TemplateRollout,
+    node: Node,
+    sensed: TemplateState,
+    report: SectionReport,
+    cause: Cause,
 ) -> Decision | None:
     """Let the planner choose the stiffnesses that the rest of the stride depends on.
 
@@ -284,16 +296,15 @@ def choose_stiffnesses(
         node: of the automaton, the robot's.
         sensed: the robot's state.
         report: of the present stride.
+        cause: of the new decision.
 
     Returns:
-        None of a planner that has no ``land``.
+        None of a planner of whole strides.
     """
-    planner = rollout.planners.of(report.goal)
-    if not lands(planner):
-        return None
     free = free_controls(rollout.automaton, node)
-    ahead = rollout.ahead(node, sensed)
-    return decided(planner.land, ahead, report.decision, report.goal.target, free)
+    ahead, target = rollout.ahead(node, sensed), report.goal.target
+    context = RestContext(ahead, report.decision, target, free, cause=cause)
+    return rest_decided(rollout.planners.of(report.goal), context)
 
 
 def choose_after_touchdown(
@@ -306,12 +317,12 @@ def choose_after_touchdown(
     Returns:
         None where what was decided holds on.
     """
-    decision = choose_stiffnesses(rollout, node, sensed, report)
+    decision = choose_stiffnesses(rollout, node, sensed, report, Cause.TOUCHDOWN)
     if decision is not None:
         return decision
     angle = ballistic_touchdown_angle(sensed, rollout.planners.route.parameters)
     start = rollout.automaton.start(report.goal.stride)
-    return choose_all_controls(rollout, start, sensed, report, (angle, angle))
+    return choose_all_controls(rollout, start, sensed, report, (angle, angle), Cause.TOUCHDOWN)
 
 
 def choose_on_unexpected_ground(
@@ -336,7 +347,7 @@ def choose_on_unexpected_ground(
     target = report.target[: len(report.goal.target)]
     # After a step up the end nearest to the gait is the best: three steps later the walk is
     # back. The cheapest one goes on with a stride of half the speed.
-    price = planner.price if height_error < 0.0 and isinstance(planner, PricingPlanner) else None
+    price = planner.cost if height_error < 0.0 else None
     return choose_legs(ahead, report.decision, target, free, nominal, rollout.scale, price)
 
 

@@ -14,10 +14,10 @@ from template_control.checks.checked import Checked
 from template_control.checks.fitting import asked, check, name_of, shown
 from template_control.checks.ranges import NotNegative, Range, Shape, Triple
 from template_control.embedding.planners.planner import (
-    CurvePlanner,
+    Cause,
+    Context,
     Decision,
     EndOfStride,
-    ForgettingPlanner,
     Planner,
     Planners,
     curved,
@@ -171,7 +171,7 @@ class RoutePlanners:
         goal = reports[-1].goal if wanted is None else wanted
         planner = self.of(goal)
         other = reports and reports[-1].goal.stride != goal.stride
-        if other and isinstance(planner, ForgettingPlanner):
+        if other:
             asked(planner.forget)
         decision, start = self.plan(section, z, goal)
         seconds = time.perf_counter() - begin
@@ -202,12 +202,12 @@ class RoutePlanners:
             goal: the stride that begins.
         """
         planner = self.of(goal)
-        decision = decided(planner.decide, z, goal.target)
+        decision = decided(planner.decide, Context(z, goal.target))
         if decision.lasting:
             return decision, z
         for share in _CALMER:
             start = section.damped(z, share, _HIGHEST * self.route.parameters.rest_length)
-            damped = decided(planner.decide, start, goal.target)
+            damped = decided(planner.decide, Context(start, goal.target))
             if damped.lasting:  # from there; from here a run may be the better way
                 feasible = decision.feasible
                 return replace(damped, feasible=feasible, lasting=False, nominal=False), start
@@ -282,10 +282,6 @@ class TemplateRollout:
         Raises:
             ParameterError: if the planner has none.
         """
-        if not isinstance(planner, CurvePlanner):
-            raise ParameterError(
-                f"{type(planner).__name__} plans no curve for node {node}: give it a method curve"
-            )
         start = np.column_stack((state[:2], state[2:4], sensed.acceleration))
         return curved(planner.curve, node, start, _toes(sensed), decision)
 
@@ -314,7 +310,8 @@ class TemplateRollout:
             section = section_of(self.automaton.sections(start)[1])
             z = section.of(last.state)
             then = self.planners.ahead(section, z, at) or goal
-            ahead = decided(self.planners.of(then).decide, z, then.target)
+            context = Context(z, then.target, cause=Cause.FUTURE)
+            ahead = decided(self.planners.of(then).decide, context)
             whole = whole and ahead.lasting
             start = self.automaton.start(then.stride).name
             if start in self.curved:

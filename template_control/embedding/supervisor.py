@@ -12,16 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.fitting import answered
+from template_control.checks.fitting import answered_or_none
 from template_control.embedding.com_path import Landing, TemplatePath, join
 from template_control.embedding.planners.planner import (
-    BreakingPlanner,
-    CurvePlanner,
+    Cause,
     Decision,
     Planner,
     Planners,
-    PricingPlanner,
-    SlopePlanner,
 )
 from template_control.embedding.recovery import curve_or_step, find_recovery
 from template_control.embedding.replanning import (
@@ -96,6 +93,12 @@ class StrideSupervisor:
         self._planned_at = 0.0
         self._viable = True  # the template completes the path's strides, and goes on
         self._recovering = False  # into the present stride
+        self._knows_slopes = False  # the present stride's planner
+        self._curved_kinds = {
+            kind
+            for kind, start in automaton.starts.items()
+            if any(node.name in curved for node in automaton.stride(start))
+        }
         self._speed_excess = (
             0.0  # speed at the stride's section less the wanted, and what came on top
         )
@@ -130,6 +133,11 @@ class StrideSupervisor:
     def planner(self) -> Planner:
         """The planner of the present stride."""
         return self._planners.of(self.reports[-1].goal)
+
+    @property
+    def _along_curve(self) -> bool:
+        """Whether a curve carries the present stride, at least in part."""
+        return self.reports[-1].goal.stride in self._curved_kinds
 
     # -- decisions ----
 
@@ -219,13 +227,10 @@ class StrideSupervisor:
         return not self._viable and (self._recovering or self._retry_planning())
 
     def _retry_planning(self) -> bool:
-        """Whether no stride went on, or the planner knows what the next ones are worth.
-
-        Such a planner may find another way. One along a curve is left to it.
-        """
-        if isinstance(self.planner, CurvePlanner):
+        """Whether the planner may find another way. One along a curve is left to it."""
+        if self._along_curve:
             return False
-        return not self.reports[-1].decision.feasible or isinstance(self.planner, PricingPlanner)
+        return not self.reports[-1].decision.feasible or self.planner.retries
 
     def replan(self, node: Node, sensed: TemplateState, phase_time: float, now: float) -> Node:
         """Plan again from here; until a leg lands, the stride's controls are still free.
@@ -246,16 +251,18 @@ class StrideSupervisor:
             other = self._recover(node, sensed, phase_time, now)
             if other is not None:
                 return other
-            if not isinstance(self.planner, BreakingPlanner):
-                self.set_decision(choose_stiffnesses(rollout, node, sensed, report))
+            if self._along_curve:
+                self.set_decision(
+                    choose_stiffnesses(rollout, node, sensed, report, Cause.DEVIATION)
+                )
             return self.follow(node, sensed, now)
         lasting = True
         if node.name != self.automaton.starts[report.goal.stride] or node.name in self.curved:
-            self.set_decision(choose_stiffnesses(rollout, node, sensed, report))
+            self.set_decision(choose_stiffnesses(rollout, node, sensed, report, Cause.DEVIATION))
         else:
             to_go = self.time_of(Event.TOUCHDOWN) - phase_time
             angles = reachable_angles(rollout, node, sensed, report, to_go)
-            decision = choose_all_controls(rollout, node, sensed, report, angles)
+            decision = choose_all_controls(rollout, node, sensed, report, angles, Cause.DEVIATION)
             self.set_decision(decision)
             lasting = decision is None or decision.lasting
         node = self.follow(node, sensed, now)
@@ -306,17 +313,18 @@ class StrideSupervisor:
         Returns:
             The slope that is planned for: 0 by a planner that knows none, or no gait there.
         """
-        report, ground = self.reports[-1], self.parameters
+        report = self.reports[-1]
         # All of them: the strides ahead may be others' than the present one.
         answers = {
-            id(planner): answered(SlipParameters, planner.on_slope, slope)
-            for planner in self.planners.values()
-            if isinstance(planner, SlopePlanner)
+            kind: answered_or_none(SlipParameters, planner.on_slope, slope)
+            for kind, planner in self.planners.items()
         }
-        ground = answers.get(id(self.planner), ground)
-        if isinstance(self.planner, CurvePlanner) and ground.slope:
+        answer = answers[report.goal.stride]
+        self._knows_slopes = answer is not None
+        ground = answer or self.parameters
+        if self._along_curve and ground.slope:
             # No spring carries along a curve, but in the strides after it.
-            assists = (answer.assist for answer in answers.values())
+            assists = (other.assist for other in answers.values() if other is not None)
             ground = replace(ground, assist=next(filter(None, assists), 0.0))
         if self._rollout.set_ground(ground):
             self.set_decision(replace(report.decision, nominal=False))
@@ -332,8 +340,7 @@ class StrideSupervisor:
 
         Arguments as for :meth:`follow`. The assist is a slope's: it is left to planners of slopes.
         """
-        planner = self.planner
-        if isinstance(planner, SlopePlanner) and not isinstance(planner, CurvePlanner):
+        if self._knows_slopes and not self._along_curve:
             choose_assist(self._rollout, node, sensed, self.reports[-1])
 
     # -- the path ----

@@ -15,7 +15,7 @@ from template_control.embedding.modes import GuardOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
-from template_control.embedding.planners.planner import Planner
+from template_control.embedding.planners.planner import Context, Planner
 from template_control.embedding.robot_template import paper_gait, template_for
 from template_control.paper.reproduction import Reproduction
 from template_control.plant.bullet import PlantOptions
@@ -291,7 +291,7 @@ def template_walk(planner: str, steps: int = STEPS) -> Walk:
     chooses, step = PLANNERS[planner](gait), ReturnMap(gait.parameters)
     states, fall = [np.array(start_state(gait))], ""
     for k in range(steps):
-        decision = chooses.decide(states[-1])
+        decision = chooses.decide(Context(states[-1]))
         z, outcome = step.step(states[-1], decision.controls)
         if outcome is not Outcome.SECTION:
             fall = f"{outcome.reason}, in step {k + 1}"

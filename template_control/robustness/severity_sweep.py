@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from template_control import settings
 from template_control.checks.checked import checked
+from template_control.embedding.planners.planner import Context
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.robustness.disturbances import (
     AFTER,
@@ -72,7 +73,7 @@ def _returns(where: Situation, z: Array, strides: int, settled: float) -> bool:
     step = ReturnMap(gait.parameters, gait.stride)
     planner.reset()
     for _ in range(strides):
-        z, outcome = step.step(z, planner.decide(z).controls)
+        z, outcome = step.step(z, planner.decide(Context(z)).controls)
         if outcome is not Outcome.SECTION:
             return False
     return bool((abs(z[:2] / gait.state[:2] - 1.0) < settled).all())

@@ -18,7 +18,7 @@ from template_control.embedding.ground import STEEPEST
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.planner import Planner, Planners
-from template_control.embedding.standing.options import standing_pose
+from template_control.embedding.standing.curves import standing_pose
 from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.filters import NoiseFilter

@@ -9,7 +9,7 @@ import pytest
 import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.default import default_planners
-from template_control.embedding.planners.planner import BreakingPlanner, FreeControls
+from template_control.embedding.planners.planner import Cause, Decision, RestContext
 from template_control.embedding.replanning import free_controls
 from template_control.embedding.robot_route import robot_route
 from template_control.embedding.rollout import ReplanOptions
@@ -151,7 +151,6 @@ def test_a_walker_that_takes_off_lands_on_the_other_foot_and_runs():
 def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
     route = catching()
     planner = default_planners(route)["wr"]
-    assert isinstance(planner, BreakingPlanner)
     node, state = AUTOMATON.node("SS_av^wr"), VLO.state([1.9, 0.985, 0.1])
     u, target = WALK.controls, running_gait(P, 1.9).apex
 
@@ -159,8 +158,9 @@ def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
         stride = simulate_stride(P, node.name, state, u)
         return APEX.of(stride.state), stride.outcome
 
-    free = FreeControls([int(Slot.TOUCHDOWN_ANGLE), *free_controls(AUTOMATON, node)], turn)
-    decision = planner.break_into(ahead, u, target, free)
+    free = [int(Slot.TOUCHDOWN_ANGLE), *free_controls(AUTOMATON, node)]
+    left = Decision(u, WALK.vlo, True, True, True)
+    decision = planner.decide_rest(RestContext(ahead, left, target, free, turn, Cause.NO_FUTURE))
     assert decision.feasible
     assert not decision.nominal
     end, outcome = ahead(decision.controls)

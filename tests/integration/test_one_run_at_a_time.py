@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.embedding.planners.planner import Context
 from template_control.embedding.planners.transition import RUN_TO_WALK, TransitionPlanner
 from template_control.embedding.robot_route import robot_route
 from template_control.errors import ParameterError
@@ -21,13 +22,13 @@ OPTIONS = tc.SimulationOptions(steps=3, record_every=10)
 def test_a_planner_forgets_the_gaits_of_an_earlier_run(kind, gait):
     planner, fresh = kind(gait), kind(gait)
     z = gait.vlo * [1.01, 1.0, 1.0]
-    first = planner.decide(z)
+    first = planner.decide(Context(z))
     other = walking_gait(gait.parameters, 0.95)
-    planner.observe(planner.decide(z, other.vlo), other.vlo + 0.01)
+    planner.observe(planner.decide(Context(z, other.vlo)), other.vlo + 0.01)
     assert planner.gait.vlo[0] == pytest.approx(0.95)
     planner.reset()
     assert planner.gait is gait
-    for again in (planner.decide(z), fresh.decide(z)):
+    for again in (planner.decide(Context(z)), fresh.decide(Context(z))):
         np.testing.assert_array_equal(again.controls, first.controls)
         np.testing.assert_array_equal(again.predicted, first.predicted)
 
@@ -36,18 +37,18 @@ def test_running_and_transition_planners_forget_the_gaits_of_an_earlier_run():
     slow, fast = (running_gait(tc.SlipParameters(), speed) for speed in (3.0, 3.5))
     planner, fresh = tc.RunningPlanner(slow), tc.RunningPlanner(slow)
     z = slow.apex * [1.01, 1.0]
-    planner.observe(planner.decide(z, fast.apex), z)
+    planner.observe(planner.decide(Context(z, fast.apex)), z)
     assert planner.gait.apex[0] == 3.5
     planner.reset()
     assert planner.gait is slow
-    again, first = planner.decide(z), fresh.decide(z)
+    again, first = planner.decide(Context(z)), fresh.decide(Context(z))
     np.testing.assert_array_equal(again.controls, first.controls)
     np.testing.assert_array_equal(again.predicted, first.predicted)
 
     walk = partial(walking_gait, tc.SlipParameters())
     landing = TransitionPlanner("rw", planner, lambda speed: walk(min(speed, 1.2)), RUN_TO_WALK)
     own = landing.gait
-    landing.decide(z, walk(0.95).vlo)
+    landing.decide(Context(z, walk(0.95).vlo))
     assert landing.gait is not own
     landing.reset()
     assert landing.gait is own

@@ -11,7 +11,7 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PHASES
-from template_control.embedding.planners.planner import Decision
+from template_control.embedding.planners.planner import Context, Decision, Planner
 from template_control.errors import DivergedError, GaitError, ParameterError
 from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.run.record import Record, recorded
@@ -23,7 +23,7 @@ from template_control.whole_body.tasks import ComTask
 OPTIONS = tc.SimulationOptions(steps=4, record_every=10)
 
 
-class Mine:
+class Mine(Planner):
     """The library's planner behind a class of the user's own, which fails from a stride on."""
 
     def __init__(self, gait, fail=None, member="decide", after=2):
@@ -45,11 +45,11 @@ class Mine:
         self.strides = 0
         self._inner.reset()
 
-    def decide(self, z, target=None, angles=(-np.inf, np.inf)):
-        return self._answer("decide", z, target, angles)
+    def decide(self, context):
+        return self._answer("decide", context)
 
-    def land(self, ahead, decision, target, free):
-        return self._answer("land", ahead, decision, target, free)
+    def decide_rest(self, context):
+        return self._answer("decide_rest", context)
 
     def observe(self, decision, z):
         self.strides += 1
@@ -79,11 +79,16 @@ def _nan(decision):
 FAILURES = [
     ("decide", _bug, ZeroDivisionError, "division by zero"),
     ("observe", _bug, ZeroDivisionError, "division by zero"),
-    ("land", _bug, ZeroDivisionError, "division by zero"),
+    ("decide_rest", _bug, ZeroDivisionError, "division by zero"),
     ("decide", _no_gait, GaitError, r"^Mine\.decide: no gait here"),
     ("decide", _diverges, ParameterError, r"^Mine\.decide: the state of five-link is not finite"),
     ("decide", lambda _: None, ParameterError, r"^Mine\.decide returned None: return a Decision"),
-    ("land", lambda _: 3.0, ParameterError, r"^Mine\.land returned 3: return a Decision"),
+    (
+        "decide_rest",
+        lambda _: 3.0,
+        ParameterError,
+        r"^Mine\.decide_rest returned 3: return a Decision",
+    ),
     ("decide", _five, ParameterError, r"^Mine\.decide: .*an array of 6 numbers; it has 5"),
     ("decide", _nan, ParameterError, r"^Mine\.decide returned the controls \[nan, .*: return fin"),
     ("offset", lambda _: np.zeros(2), ParameterError, r"^Mine\.offset is .*: give an array of 3"),
@@ -219,13 +224,23 @@ def test_another_error_of_a_plant_is_no_fall(robot, default_gait):
     assert recorded(caught.value).metadata["error"] == "no licence"
 
 
-@pytest.mark.parametrize("lacking", ["offset", "observe", "gait", "reset"])
-def test_what_a_planner_lacks_is_named(robot, default_gait, lacking):
-    members = {n: lambda *_: None for n in ("gait", "offset", "reset", "decide", "observe")}
-    members.pop(lacking)
-    lame = type("Lame", (), members)()
-    with pytest.raises(ParameterError, match=rf"or a Planner \(this one lacks {lacking}\)"):
-        tc.simulate(robot, lame)
+def test_what_a_planner_lacks_is_named(robot):
+    class Lame(Planner):
+        def decide(self, context):
+            raise AssertionError("it is not asked")
+
+    with pytest.raises(ParameterError, match=r"or a Planner \(this one lacks gait\)"):
+        tc.simulate(robot, Lame())
+    with pytest.raises(TypeError, match="decide"):
+        type("Idle", (Planner,), {})()
+
+
+def test_a_planner_without_the_base_class_is_told_to_derive_from_it(robot, default_gait):
+    members = {name: lambda *_: None for name in ("offset", "reset", "decide", "observe")}
+    bare = type("Bare", (), {"gait": default_gait, **members})()
+    text = r"a Planner \(this one lacks .*forget.*: derive it from Planner\)"
+    with pytest.raises(ParameterError, match=text):
+        tc.simulate(robot, bare)
 
 
 @pytest.mark.parametrize("run", [False, True])
@@ -296,17 +311,14 @@ def _table(page, heading):
 
 
 def test_the_pages_tables_have_every_field_and_number():
-    members, decision = [
+    members, context, decision = [
         _table("your_planner.md", "| member | what it is |"),
+        _table("your_planner.md", "| in a context | what it is |"),
         _table("your_planner.md", "| field | what it is |"),
     ]
-    assert [re.sub(r"\(.*", "", row[0].strip("`")) for row in members] == [
-        "gait",
-        "offset",
-        "reset",
-        "decide",
-        "observe",
-    ]
+    public = {name for name in (*vars(Planner), *Planner.__annotations__) if name[0] != "_"}
+    assert {re.sub(r"\(.*", "", row[0].strip("`")) for row in members} == public
+    assert [row[0].strip("`") for row in context] == list(Context._fields)
     assert [row[0].strip("`") for row in decision] == [f.name for f in fields(Decision)]
     words = {5: "five", 6: "six", 7: "seven"}
     assert decision[0][1].startswith(f"{words[NUM_SLOTS]} numbers by `Slot`")

@@ -1,13 +1,16 @@
 """Standing, and starting to walk, on ground that is not level."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import template_control as tc
 from template_control.embedding.ground import SlopeEstimate
 from template_control.embedding.leg_forces import leg_forces
-from template_control.embedding.standing.options import standing_pose
-from template_control.embedding.standing.stepping import standing_planners
+from template_control.embedding.planners.planner import Context
+from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
+from template_control.embedding.standing.planners import standing_planners
 from template_control.errors import ParameterError
 from template_control.run.config import RunConfig
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -35,12 +38,10 @@ def walked(plant, degrees, steps=12, **more):
 def test_who_rests_is_over_the_middle_of_the_feet(degrees):
     """The weight's line through the CoM meets the ground there, and both legs bear half."""
     slope = np.radians(degrees)
-    planner = standing_planners(P)["s"]
-    planner.on_slope(slope)
-    feet = planner._between(TOES)
+    feet = BetweenFeet(TOES, replace(P, slope=slope), StandingOptions())
     com = feet.at_rest(0.15)
     assert com[0, 0] - com[1, 0] * np.tan(slope) == pytest.approx(0.15)
-    body = np.array([P.mass, *planner.parameters.gravity_parts, P.rest_length, 0.0])
+    body = np.array([P.mass, *feet.parameters.gravity_parts, P.rest_length, 0.0])
     forces = np.empty((2, 2))
     row = np.array([0.0, 1.0, 0.0, *TOES, np.nan, np.nan])
     leg_forces(row, 0.0, com.T.ravel(), body, forces)
@@ -53,9 +54,9 @@ def test_who_rests_is_over_the_middle_of_the_feet(degrees):
 def test_a_start_comes_over_the_front_foot(degrees):
     """At VLO the CoM is fast enough to pass the vertical over the foot, which lies uphill."""
     planner = standing_planners(P)["sw"]
-    planner.on_slope(np.radians(degrees))
-    rest = planner._between(TOES).at_rest(0.15)
-    decision = planner.decide(rest[:, 0], np.array([1.1, 0.978, 0.0]))
+    ground = planner.on_slope(np.radians(degrees))
+    rest = BetweenFeet(TOES, ground, StandingOptions()).at_rest(0.15)
+    decision = planner.decide(Context(rest[:, 0], np.array([1.1, 0.978, 0.0])))
     decision, stride = planner.curve(AUTOMATON.start("sw").name, rest, TOES, decision)
     assert stride.outcome is Outcome.SECTION
     x, y, speed, _ = stride.state
@@ -65,11 +66,14 @@ def test_a_start_comes_over_the_front_foot(degrees):
 
 
 def test_planners_are_level_again_after_a_reset():
-    for planner in standing_planners(P).values():
-        if hasattr(planner, "on_slope"):
-            assert planner.on_slope(0.05).slope == 0.05
-            planner.reset()
-            assert planner.parameters == P
+    for kind, planner in standing_planners(P).items():
+        there = planner.on_slope(0.05)
+        if kind in ("sf", "sb"):
+            assert there is None, "a step knows level ground only"
+            continue
+        assert there.slope == 0.05
+        planner.reset()
+        assert planner.on_slope(0.0) == P
 
 
 @pytest.mark.parametrize("degrees", [-6.0, -1.0, 0.0, 4.0])

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import Clock, PhaseControl
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.planners.planner import Decision, Planner
 from template_control.errors import ParameterError
 from template_control.robot.library import load_robot
 from template_control.robot.start import Pose
@@ -119,7 +119,7 @@ class Hop:
     step_length: float = 0.0
 
 
-class Deadbeat:
+class Deadbeat(Planner):
     """The controls that lead to the target in one hop, by least squares on the exact map."""
 
     def __init__(self, height):
@@ -133,7 +133,8 @@ class Deadbeat:
     def reset(self):
         self.offset = np.zeros(3)
 
-    def decide(self, z, target=None, angles=ANY_ANGLE):
+    def decide(self, context):
+        z, target, angles, _ = context
         aim = (self.gait.state if target is None else target) - self.offset[:2]
         low, high = np.maximum(angles[0], 1.3), np.minimum(angles[1], np.pi - 1.3)
 

@@ -84,11 +84,11 @@ def test_after_a_step_down_the_legs_lead_where_the_next_step_can_brake(gait):
     decision = Decision(gait.controls, gait.vlo, True, True, True)
     free = [Slot.K_SC, Slot.K_SD]
     near = choose_legs(ahead, decision, gait.vlo, free, gait.controls, SCALE)
-    cheap = choose_legs(ahead, decision, gait.vlo, free, gait.controls, SCALE, planner.price)
+    cheap = choose_legs(ahead, decision, gait.vlo, free, gait.controls, SCALE, planner.cost)
     end, outcome = ahead(cheap.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(cheap.predicted, end)
-    assert planner.price(end) < 0.7 * planner.price(near.predicted)
+    assert planner.cost(end) < 0.7 * planner.cost(near.predicted)
 
 
 @pytest.mark.parametrize(("name", "high"), [("five-link", True), ("rabbit", False)])

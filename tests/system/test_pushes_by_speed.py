@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.embedding.planners.planner import Context
 from template_control.slip.similarity import REFERENCE
 
 
@@ -12,7 +13,7 @@ def test_the_earliest_touchdown_leaves_the_gaits_alone(speed):
     """A fast gait's foot is down before a slow one's could be."""
     gait = tc.gait_for_speed(REFERENCE, float(speed))
     for rise in (-0.01, 0.0, 0.01):
-        assert tc.LqrPlanner(gait).decide(gait.vlo + [0.0, 0.0, rise]).nominal
+        assert tc.LqrPlanner(gait).decide(Context(gait.vlo + [0.0, 0.0, rise])).nominal
 
 
 @pytest.mark.slow(seconds=12)

@@ -24,7 +24,13 @@ from template_control.embedding.free.lateral import (
     early_touchdown,
 )
 from template_control.embedding.free.options import FreeOptions
-from template_control.embedding.planners.planner import Decision, Planner, Planners, decided
+from template_control.embedding.planners.planner import (
+    Context,
+    Decision,
+    Planner,
+    Planners,
+    decided,
+)
 from template_control.embedding.swing import quintic_step
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -143,7 +149,7 @@ class FreeController(EmbeddingController):
         report, z, planner = supervisor.reports[-1], section.of(sensed.state), self.planner
 
         def decide(least: float) -> Decision:
-            return decided(planner.decide, z, report.goal.target, (least, inf))
+            return decided(planner.decide, Context(z, report.goal.target, (least, inf)))
 
         def look(decision: Decision) -> LateralForecast:
             if decision is not supervisor.reports[-1].decision:

@@ -33,7 +33,7 @@ from template_control.embedding.planners.look_ahead import (
     look_ahead,
 )
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.planners.planner import ANY_ANGLE, Context, Decision, Planner
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -41,7 +41,7 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator, controls
-from template_control.slip.gaits.gait import WalkingGait, with_push_off
+from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route
@@ -85,7 +85,7 @@ class AheadOptions(Checked):
     cheap: Positive = tuned(20.0)
 
 
-class AheadPlanner:
+class AheadPlanner(Planner):
     """Planner of several steps at once towards a gait of the family by speed.
 
     A governor tries shares of the wanted change of speed and takes the first whose plan is cheap.
@@ -100,7 +100,10 @@ class AheadPlanner:
     Attributes:
         options: scaled to the template.
         table: the gaits.
+        gait: that the last plan led to.
     """
+
+    gait: WalkingGait
 
     @checked
     def __init__(
@@ -121,29 +124,14 @@ class AheadPlanner:
             np.empty((o.steps + 1, PADDED)), np.empty((o.steps, CONTROLS)), np.empty(WIDTH)
         )
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
-        self._speed = self._first
+        self._lead_to(self._first)
         self._lqr = LqrPlanner(self.gait)
+        self.offset = self._lqr.offset
 
     @property
     def speeds(self) -> tuple[float, float]:
         """Slowest and fastest dx/dt at VLO [m/s]."""
         return float(self.table.speed[0]), float(self.table.speed[-1])
-
-    @property
-    def gait(self) -> WalkingGait:
-        """The gait that the last plan led to."""
-        row = row_at(self.table, self._speed)
-        k = float(row[STIFFNESS])
-        own = replace(self.parameters, leg_stiffness=k)
-        u = controls(float(row[STATE + PADDED]), k, k)
-        z = row[STATE : STATE + PADDED].copy()
-        length, duration = float(row[STEP_LENGTH]), float(row[STEP_DURATION])
-        return with_push_off(WalkingGait("walk", own, z, u, length, duration))
-
-    @property
-    def offset(self) -> Array:
-        """(3,) estimate of the robot's VLO state less the template's after one step."""
-        return self._lqr.offset
 
     def __repr__(self) -> str:
         low, high = self.speeds
@@ -151,16 +139,31 @@ class AheadPlanner:
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`."""
-        self._speed = self._first
+        self._lead_to(self._first)
         self._lqr.reset()
+        self.offset = self._lqr.offset
 
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
+    def _lead_to(self, speed: float) -> None:
+        """Aim at the gait with another speed at VLO [m/s]."""
+        self._speed = speed
+        row = row_at(self.table, speed)
+        k = float(row[STIFFNESS])
+        self.gait = WalkingGait(
+            "walk",
+            replace(self.parameters, leg_stiffness=k),
+            row[STATE : STATE + PADDED].copy(),
+            controls(float(row[STATE + PADDED]), k, k, k_push=k),
+            float(row[STEP_LENGTH]),
+            float(row[STEP_DURATION]),
+            STRIDE,
+        )
+
+    def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`; of the target the speed counts.
 
         The decision is nominal where a plan was cheap, whatever was accepted.
         """
+        z, target, angles, _ = context
         wanted = self._speed if target is None else float(target[0])
         low, high = self.speeds
         present = min(max(float(z[0]), low), high)
@@ -180,7 +183,7 @@ class AheadPlanner:
 
     def _decision(self, speed: float, wanted: float, nominal: bool) -> Decision:
         """The first step of the last plan."""
-        self._speed = speed
+        self._lead_to(speed)
         u = np.zeros(NUM_SLOTS)
         u[SLOTS] = self._plan.controls[0]
         u[SLOTS[1:]] *= self._plan.row[STIFFNESS]
@@ -194,10 +197,10 @@ class AheadPlanner:
         spacing = self._spacing
         low, high = self.speeds
         speed = min(max(spacing * round(float(z[0]) / spacing), low), high)
-        decision = self._lqr.decide(z, np.array([speed, 0.0, 0.0]), angles)
+        decision = self._lqr.decide(Context(z, np.array([speed, 0.0, 0.0]), angles))
         cost, near = cheapest
         if decision.lasting or not np.isfinite(cost):
-            self._speed = float(self._lqr.gait.vlo[0])
+            self._lead_to(float(self._lqr.gait.vlo[0]))
             return replace(decision, nominal=False, accepted=self._speed)
         self._look(z, near, angles)
         return self._decision(near, wanted, False)
@@ -205,6 +208,7 @@ class AheadPlanner:
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
         self._lqr.observe(decision, z)
+        self.offset = self._lqr.offset
 
 
 def plan_problem(parameters: SlipParameters, table: GaitTable) -> PlanProblem:
@@ -258,7 +262,7 @@ def check_feasibility(route: Route, planner: AheadPlanner) -> None:
         goal = route.next(VLO, z, now)
         if goal is None:
             break
-        decision = planner.decide(z, goal.target)
+        decision = planner.decide(Context(z, goal.target))
         wanted = float(goal.target[0])
         accepted = wanted if decision.accepted is None else decision.accepted
         if not decision.feasible or abs(accepted - wanted) > behind:

@@ -16,8 +16,8 @@ from template_control.embedding.planners.transition import (
     WALK_TO_RUN,
     TransitionPlanner,
 )
-from template_control.embedding.standing.options import StandingOptions
-from template_control.embedding.standing.stepping import (
+from template_control.embedding.standing.curves import StandingOptions
+from template_control.embedding.standing.planners import (
     gaits_by_speed,
     recovery_planners,
     standing_planners,

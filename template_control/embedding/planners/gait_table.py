@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,7 @@ STATE_TOLERANCE = np.array([0.06, 0.006, 0.04])
 """Differences of dx/dt, y, dy/dt from a gait's that cost 1 [m/s, m, m/s], for the reference."""
 CONTROL_TOLERANCE = np.array([0.04, 0.15, 0.15, 0.15])
 """Differences of alpha [rad], kappa_1, kappa_2 and kappa_p from a gait's that cost 1."""
-STRIDE = StrideKind.WALK_PUSH_OFF
+STRIDE: Final = StrideKind.WALK_PUSH_OFF
 """The steps of these gaits."""
 SLOTS = np.array([int(slot) for slot in WALKING_SLOTS[STRIDE]])
 """Their controls."""

@@ -8,7 +8,6 @@ gait and not beside it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
@@ -17,12 +16,16 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import (
-    NotNegative,
-    Positive,
-    Share,
+from template_control.checks.ranges import NotNegative, Positive, Share
+from template_control.embedding.planners.planner import (
+    ANY_ANGLE,
+    Cause,
+    Context,
+    Decision,
+    EndOfStride,
+    Planner,
+    RestContext,
 )
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision, EndOfStride
 from template_control.embedding.planners.step_search import (
     EFFORT,
     FALL_PRICE,
@@ -181,23 +184,20 @@ class Rest(NamedTuple):
     change: Array | None
 
 
-def choose_rest(
-    law: Law, costs: Array, ahead: EndOfStride, controls: Array, free: Sequence[int]
-) -> Rest:
+def choose_rest(law: Law, costs: Array, context: RestContext) -> Rest:
     """Controls with the least cost-to-go at the step's end, and the least change.
 
     Args:
         law: the planner's, with its bounds.
         costs: (c,) of its controls' squared changes.
-        ahead: where the rest of the step leads.
-        controls: (NUM_SLOTS,) that hold so far.
-        free: slots of the stiffnesses that the rest depends on.
+        context: of the rest of the step.
     """
+    ahead, controls = context.ahead, context.decision.controls
     before, outcome = ahead(controls)
     completed = outcome is Outcome.SECTION
     slow = before[0] < law.target[0] if completed else outcome is not Outcome.UNWANTED_FLIGHT
     softest = _SOFTEST_REST if slow else 0.0
-    places = [place for place, slot in enumerate(law.slots) if place and slot in free]
+    places = [place for place, slot in enumerate(law.slots) if place and slot in context.free]
     slots = [int(law.slots[place]) for place in places]
     change = law.stiffness / np.sqrt(costs[places])
     lower = np.maximum(law.lower[places], softest) * law.stiffness
@@ -212,7 +212,7 @@ def choose_rest(
     return Rest(u, end, end - before if completed else None)
 
 
-class LqrPlanner:
+class LqrPlanner(Planner):
     """u = u_s - K (z - z_s), where the template completes its step; else a search.
 
     Args:
@@ -224,6 +224,9 @@ class LqrPlanner:
         offset: (3,) the estimate of d.
         a, b: (3, 3), (3, c) state and control Jacobians of the VLO map at the gait.
     """
+
+    gait: WalkingGait
+    retries = True
 
     @checked
     def __init__(self, gait: WalkingGait, options: LqrOptions | None = None) -> None:
@@ -265,7 +268,7 @@ class LqrPlanner:
         self._settle_on(self._family.reset())
 
     def forget(self) -> None:
-        """See :meth:`~.planner.ForgettingPlanner.forget`.
+        """See :meth:`~.planner.Planner.forget`.
 
         What the robot adds to dx/dt depends on how its trunk moves. A five-link robot that leans
         for a run to come gains 0.02 m/s in each walking step; after the run it stands up, and
@@ -276,7 +279,7 @@ class LqrPlanner:
         self._law = self._aim()
 
     def on_slope(self, slope: float) -> SlipParameters:
-        """See :meth:`~.planner.SlopePlanner.on_slope`; without a gait there the ground is level."""
+        """See :meth:`~.planner.Planner.on_slope`; without a gait there the ground is level."""
         if slope != self._slope:
             self._slope = slope
             self._settle_on(self.gait)
@@ -350,33 +353,31 @@ class LqrPlanner:
             shift = settling_map(a, b, np.array(o.tolerance), self._change_weight) @ rest
         return shift
 
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
+    def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO.
 
         The law leads to the symmetric gait with the target's speed, and with that gait's
         height. Where no gait is that slow or fast it leads to the nearest, and the decision is
         not nominal.
         """
-        gait, reachable = self._family.towards(self.gait, target)
+        gait, reachable = self._family.towards(self.gait, context.target)
         if gait is not self.gait:
             self._settle_on(gait)
-        law = self._law
+        law, angles = self._law, context.angles
         if angles != ANY_ANGLE:
             lower, upper = law.lower.copy(), law.upper.copy()
             lower[0] = min(max(lower[0], angles[0]), upper[0])
             upper[0] = max(min(upper[0], angles[1]), lower[0])
             law = law._replace(lower=lower, upper=upper)
-        u, first, cost, nominal = self._best(law, z)
+        u, first, cost, nominal = self._best(law, context.z)
         slots, units = control_units(self._here)
         controls = self._here.controls.copy()
         controls[slots] = u * units
         nominal = nominal and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
 
-    def price(self, z: Array) -> float:
-        """See :meth:`~.planner.PricingPlanner.price`: with the step after the next."""
+    def cost(self, z: Array) -> float:
+        """See :meth:`~.planner.Planner.cost`: with the step after the next."""
         return self._best(self._law, z)[2]
 
     def _best(self, law: Law, z: Array) -> tuple[Array, Array, float, bool]:
@@ -385,17 +386,18 @@ class LqrPlanner:
         cost, own = choose(law, s, z, u, first)
         return u, first, cost, own
 
-    def land(
-        self, ahead: EndOfStride, decision: Decision, target: Array, free: Sequence[int]
-    ) -> Decision:
-        """See :meth:`~.planner.LandingPlanner.land`.
+    def decide_rest(self, context: RestContext) -> Decision | None:
+        """See :meth:`~.planner.Planner.decide_rest`; nothing breaks into a walking step.
 
         Without push-off there is too little to choose. The offset is still learnt from the whole
         step: its prediction moves by as much as the choice does.
         """
+        decision = context.decision
+        if context.cause is Cause.NO_FUTURE:
+            return None
         if not self._pushes:
             return decision
-        u, end, change = choose_rest(self._law, self._costs, ahead, decision.controls, free)
+        u, end, change = choose_rest(self._law, self._costs, context)
         if end is None:
             return replace(decision, feasible=False, nominal=False)
         if change is None:

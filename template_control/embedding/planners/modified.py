@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, NotNegative, Positive
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.planners.planner import Context, Decision, Planner
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot, StrideKind
 from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
 from template_control.slip.dynamics.kernel import new_scratch
@@ -45,23 +45,21 @@ class ModifiedOptions(Checked):
     map_kind: MapKind = MapKind.EXACT
 
 
-class ModifiedPlanner:
+class ModifiedPlanner(Planner):
     """kappa_1 = k0, kappa_2 by equation (38), alpha by search on a return map.
 
     Args:
         gait: to reach at the next VLO, in the paper's steps without push-off.
         options: bounds.
-
-    Attributes:
-        offset: zero; the paper's planner learns nothing.
     """
+
+    gait: WalkingGait
 
     @checked
     def __init__(self, gait: WalkingGait, options: ModifiedOptions | None = None) -> None:
         gait = without_push_off(gait)
         self.gait = gait
         self.options = scaled(options or ModifiedOptions(), Scale.of(gait.parameters))
-        self.offset: Array = np.zeros(3)
         self._family = WalkingFamily(gait)
         self._scratch = new_scratch()
         self._kernel = stride_kernel(gait.parameters, StrideKind.WALK)
@@ -75,10 +73,9 @@ class ModifiedPlanner:
         """See :class:`~.planner.Planner`: back to the gait it was made for."""
         self.gait = self._family.reset()
 
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
+    def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO."""
+        z, target, angles, _ = context
         self.gait, reachable = self._family.towards(self.gait, target)
         p, o = self.gait.parameters, self.options
         predicted = np.empty(3)
@@ -96,6 +93,3 @@ class ModifiedPlanner:
         feasible = outcome == Outcome.SECTION
         nominal = reachable and feasible and residual < o.tolerance**2
         return Decision(controls, predicted, feasible, feasible, nominal)
-
-    def observe(self, decision: Decision, z: Array) -> None:
-        """See :meth:`~.planner.Planner.observe`; the paper's planner learns nothing."""

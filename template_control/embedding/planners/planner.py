@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
-from typing import Annotated, ParamSpec, Protocol, TypeGuard, runtime_checkable
+from enum import Enum, auto
+from math import isfinite, nan
+from typing import Annotated, NamedTuple, ParamSpec, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
-from template_control.checks.fitting import answered, name_of
+from template_control.checks.fitting import answered, answered_or_none, name_of
 from template_control.checks.ranges import Shape
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
+from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -50,39 +53,39 @@ class Decision(Checked):
     accepted: float | None = None
 
 
-@runtime_checkable
-class Planner(Protocol):
-    """Choice of the controls of one kind of stride at its section."""
+class Cause(Enum):
+    """Cause of a decision."""
 
-    @property
-    def gait(self) -> Gait:
-        """The gait that the planner leads to; the last target chose it."""
+    SECTION = auto()
+    """A stride begins."""
+    FUTURE = auto()
+    """The stride after the present one, whose foothold must be known in time."""
+    TOUCHDOWN = auto()
+    """A foot has landed."""
+    GROUND_HEIGHT = auto()
+    """A foot has landed on ground that is higher or lower than expected."""
+    DEVIATION = auto()
+    """A disturbance has carried the robot away from its path."""
+    NO_FUTURE = auto()
+    """The present stride, or the one after it, cannot be completed."""
 
-    @property
-    def offset(self) -> Array:
-        """(3,) estimate of the robot's section state less the template's after one stride."""
 
-    def reset(self) -> None:
-        """Forget what was learnt; a run calls it before its first stride."""
+class Context(NamedTuple):
+    """Question for a whole stride.
 
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
-        """Controls for a stride from section state ``z``.
+    Attributes:
+        z: (n,) section state that the stride begins in: dx/dt, y and, at VLO, dy/dt
+            [m/s, m, m/s]. Within a stride it is the one from which the template would have come
+            to where the robot is.
+        target: (n,) state wanted at the section where the stride ends; None: the gait's own.
+        angles: least and greatest touchdown angle that the swing foot can still reach [rad].
+        cause: of the question.
+    """
 
-        Args:
-            z: (n,) the state: dx/dt, y and, at VLO, dy/dt [m/s, m, m/s].
-            target: (n,) state wanted at the section where the stride ends; None: the gait's own.
-            angles: least and greatest touchdown angle that the swing foot can still reach [rad].
-        """
-
-    def observe(self, decision: Decision, z: Array) -> None:
-        """Learn from a stride that has ended.
-
-        Args:
-            decision: the decision that planned the stride.
-            z: (n,) section state in which it ended, as for :meth:`decide`.
-        """
+    z: Array
+    target: Array | None = None
+    angles: tuple[float, float] = ANY_ANGLE
+    cause: Cause = Cause.SECTION
 
 
 class EndOfStride(Protocol):
@@ -92,88 +95,105 @@ class EndOfStride(Protocol):
         """(m,) state at the section where it ends, and how, with (NUM_SLOTS,) controls ``u``."""
 
 
-@dataclass(frozen=True)
-class FreeControls:
-    """Controls that can still be chosen within a stride.
+class RestContext(NamedTuple):
+    """Question for the rest of a stride that has begun.
 
     Attributes:
-        slots: that the rest of the stride depends on.
-        turn: how far the touchdown angle can still be changed [rad].
+        ahead: where it leads.
+        decision: what holds so far; of the stride that is left, where ``cause`` is NO_FUTURE.
+        target: (m,) state wanted at the section where the stride ends.
+        free: slots that the rest depends on and that can still be chosen.
+        turn: how far the touchdown angle can still be changed [rad], where it is free.
+        cause: of the question. NO_FUTURE: the robot would break into this stride from another one.
     """
 
-    slots: Sequence[int]
-    turn: float
+    ahead: EndOfStride
+    decision: Decision
+    target: Array
+    free: Sequence[int]
+    turn: float = 0.0
+    cause: Cause = Cause.DEVIATION
 
 
 @runtime_checkable
-class LandingPlanner(Planner, Protocol):
-    """A planner that knows how to choose again where a foot has landed.
+class Planner(Protocol):
+    """Base class of planners: choice of the controls of one kind of stride.
 
-    Of any other, :meth:`Planner.decide` is asked, for the section state from which the template
-    would have come there.
+    A planner has :attr:`gait` and :meth:`decide`; all else has a default.
+
+    Attributes:
+        gait: that the planner leads to; the last target chose it.
+        offset: (3,) estimate of the robot's section state less the template's after one stride.
+        retries: a path that does not lead on is planned again and again, and not only where the
+            present stride cannot be completed.
     """
 
-    def land(
-        self, ahead: EndOfStride, decision: Decision, target: Array, free: Sequence[int]
-    ) -> Decision:
-        """Controls for the rest of a stride.
+    gait: Gait
+    offset: Array = np.zeros(PADDED)
+    retries: bool = False
+
+    def reset(self) -> None:
+        """Forget what was learnt; a run calls it before its first stride."""
+        return
+
+    @abstractmethod
+    def decide(self, context: Context) -> Decision:
+        """Controls for a whole stride; it may be asked several times a stride.
 
         Args:
-            ahead: where it leads.
-            decision: what holds so far.
-            target: (m,) state wanted at the section where the stride ends.
-            free: slots of the stiffnesses that the rest depends on.
+            context: section state, target, and what is free.
         """
 
+    def decide_rest(self, context: RestContext) -> Decision | None:
+        """Controls for the rest of a stride that has begun.
 
-def lands(planner: Planner) -> TypeGuard[LandingPlanner]:
-    """Whether a planner is a :class:`LandingPlanner`.
+        Args:
+            context: where the rest leads, and what is free.
 
-    ``isinstance`` goes through all members of a protocol, which is long in a tick.
-    """
-    return hasattr(planner, "land")
+        Returns:
+            None by a planner of whole strides: as a foot lands :meth:`decide` is asked, for the
+            section state from which the template would have come there; else what was decided
+            holds.
+        """
+        return None
 
+    def observe(self, decision: Decision, z: Array) -> None:
+        """Learn from a stride that has ended.
 
-@runtime_checkable
-class PricingPlanner(Planner, Protocol):
-    """A planner that tells what a state is worth to its next strides."""
+        Args:
+            decision: the decision that planned the stride.
+            z: (n,) section state in which it ended.
+        """
+        return
 
-    def price(self, z: Array) -> float:
-        """The least cost that the planner knows from section state ``z`` (n,) on."""
+    def forget(self) -> None:
+        """Forget what is true of another way of moving only; gait and slope stay.
 
+        It is called where the planner's kind of stride follows another one.
+        """
+        return
 
-@runtime_checkable
-class SlopePlanner(Planner, Protocol):
-    """A planner that knows slopes; of any other the ground is level."""
+    def cost(self, z: Array) -> float:
+        """The least cost that the planner knows from section state ``z`` (n,) on; nan: none."""
+        return nan
 
-    def on_slope(self, slope: float) -> SlipParameters:
-        """Plan for ground that rises from now on; :meth:`~Planner.reset` makes it level.
+    def on_slope(self, slope: float) -> SlipParameters | None:
+        """Plan for ground that rises from now on; :meth:`reset` makes it level.
 
         Args:
             slope: its angle, uphill positive [rad]. States are told in axes that are turned with
-                the ground. :attr:`~Planner.gait` stays the one of level ground.
+                the ground. :attr:`gait` stays the one of level ground.
 
         Returns:
-            The template on the ground that is planned for, with its assist.
+            The template on the ground that is planned for, with its assist; None by a planner
+            that knows level ground only.
         """
-
-
-@runtime_checkable
-class ForgettingPlanner(Planner, Protocol):
-    """A planner that learns anew, in part, where its kind of stride follows another one."""
-
-    def forget(self) -> None:
-        """Forget what was true of another way of moving only; gait and slope stay."""
-
-
-@runtime_checkable
-class CurvePlanner(Planner, Protocol):
-    """A planner that leads the CoM along a curve in time where no spring carries it."""
+        return None
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
     ) -> tuple[Decision, Stride]:
-        """The rest of a stride.
+        """The rest of a stride along a curve in time, where no spring carries the CoM.
 
         Args:
             node: of the automaton, where the robot is.
@@ -183,24 +203,13 @@ class CurvePlanner(Planner, Protocol):
 
         Returns:
             What holds from now on, and the stride from here.
+
+        Raises:
+            ParameterError: by a planner that has none.
         """
-
-
-@runtime_checkable
-class BreakingPlanner(Planner, Protocol):
-    """A planner of a stride that the robot can break into within another one."""
-
-    def break_into(
-        self, ahead: EndOfStride, controls: Array, target: Array, free: FreeControls
-    ) -> Decision:
-        """Controls for a stride from within.
-
-        Args:
-            ahead: where it leads.
-            controls: (NUM_SLOTS,) u of the stride that is left.
-            target: (m,) state wanted at the section where the stride ends.
-            free: what of u can still be chosen.
-        """
+        raise ParameterError(
+            f"{type(self).__name__} plans no curve for node {node}: give it a method curve"
+        )
 
 
 def decided(method: Callable[P, Decision], *args: P.args, **kwargs: P.kwargs) -> Decision:
@@ -219,13 +228,29 @@ def decided(method: Callable[P, Decision], *args: P.args, **kwargs: P.kwargs) ->
     return decision
 
 
+def rest_decided(planner: Planner, context: RestContext) -> Decision | None:
+    """A planner's decision for the rest of a stride, checked as :func:`decided`; None: it has none.
+
+    Args:
+        planner: of the stride.
+        context: of its rest.
+
+    Raises:
+        ParameterError: as there.
+    """
+    decision = answered_or_none(Decision, planner.decide_rest, context)
+    if decision is not None:
+        _check_controls(planner.decide_rest, decision)
+    return decision
+
+
 def curved(
     method: Callable[P, tuple[Decision, Stride]], *args: P.args, **kwargs: P.kwargs
 ) -> tuple[Decision, Stride]:
     """A planner's decision along a curve, and the stride from there.
 
     Args:
-        method: :meth:`CurvePlanner.curve` of the planner.
+        method: :meth:`Planner.curve` of the planner.
         args, kwargs: its arguments.
 
     Raises:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, NotNegative, Positive
 from template_control.compiled import compiled
-from template_control.embedding.planners.planner import ANY_ANGLE, Decision
+from template_control.embedding.planners.planner import Context, Decision, Planner
 from template_control.embedding.planners.stride_solver import (
     FromSection,
     NearbyStrides,
@@ -123,7 +123,7 @@ AGILE = RunningOptions(
 where the smallest difference counts."""
 
 
-class RunningPlanner:
+class RunningPlanner(Planner):
     """min |(P(z, u) + d - z*) / tolerance|^2 + |(u - u_g) / change|^2 over bounded u.
 
     Args:
@@ -134,6 +134,8 @@ class RunningPlanner:
         gait: the one of the last target.
         offset: (3,) the estimate of d.
     """
+
+    gait: RunningGait
 
     @checked
     def __init__(self, gait: RunningGait, options: RunningOptions | None = None) -> None:
@@ -150,7 +152,7 @@ class RunningPlanner:
         self._miss = _MISS * self._scale.speed
         self._strides = NearbyStrides(_TOLERANCE * self._scale.state[:2], o.near)
         # Compile now what a stride would otherwise wait for.
-        self.decide(gait.apex)
+        self.decide(Context(gait.apex))
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`: back to the gait it was made for, without an offset."""
@@ -158,10 +160,9 @@ class RunningPlanner:
         self.gait = self._family.reset()
         self._strides.forget()
 
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
+    def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a running step from apex to apex."""
+        z, target, angles, _ = context
         if target is not None and target[0] != self.gait.apex[0]:
             self.gait = self._family.at(float(target[0]))
         wanted = self.gait.apex if target is None else target

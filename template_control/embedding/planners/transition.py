@@ -7,7 +7,7 @@ target, the next gait's planner makes good.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.embedding.planners.planner import (
-    ANY_ANGLE,
+    Cause,
+    Context,
     Decision,
-    EndOfStride,
-    FreeControls,
     Planner,
+    RestContext,
     decided,
 )
 from template_control.embedding.planners.stride_solver import (
@@ -33,7 +33,6 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import PADDED
 from template_control.slip.similarity import Scale, scaled, tuned
 
 Array = NDArray[np.float64]
@@ -96,7 +95,7 @@ RUN_TO_WALK = TransitionOptions(
 """Angle and both stiffnesses, as in Section IV-C2."""
 
 
-class TransitionPlanner:
+class TransitionPlanner(Planner):
     """min |(P(z, u) - z*) / tolerance|^2 + |(u - u_0) / change|^2 over bounded u.
 
     Args:
@@ -108,7 +107,6 @@ class TransitionPlanner:
 
     Attributes:
         gait: the one of the last target.
-        offset: (3,) zero: a stride that is made once teaches nothing.
     """
 
     @checked
@@ -124,7 +122,6 @@ class TransitionPlanner:
         scale = Scale.of(p)
         self.options = scaled(options, scale)
         self._tolerance = TOLERANCE * scale.state
-        self.offset: Array = np.zeros(PADDED)
         self._map = ReturnMap(p, stride)
         self.gait = self._first = after(float(before.gait.state[0]))
 
@@ -132,13 +129,9 @@ class TransitionPlanner:
         """See :class:`~.planner.Planner`: back to the gait it was made for."""
         self.gait = self._first
 
-    def observe(self, decision: Decision, z: Array) -> None:
-        """See :meth:`~.planner.Planner.observe`."""
-
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
+    def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`."""
+        z, target, angles, _ = context
         if target is not None and target[0] != self.gait.state[0]:
             self.gait = self._after(float(target[0]))
         wanted = self.gait.state if target is None else target
@@ -148,12 +141,12 @@ class TransitionPlanner:
         u, end = solve_stride(FromSection(self._map, z, prior.slots), wanted, prior, tolerance)
         return self._decision(u, end, wanted)
 
-    def land(
-        self, ahead: EndOfStride, decision: Decision, target: Array, free: Sequence[int]
-    ) -> Decision:
-        """See :meth:`~.planner.LandingPlanner.land`."""
-        controls = decision.controls
-        stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE]
+    def decide_rest(self, context: RestContext) -> Decision:
+        """See :meth:`~.planner.Planner.decide_rest`."""
+        if context.cause is Cause.NO_FUTURE:
+            return self._break_into(context)
+        ahead, target, controls = context.ahead, context.target, context.decision.controls
+        stiff = [slot for slot in context.free if slot != Slot.TOUCHDOWN_ANGLE]
         base = controls[stiff]
         lower, upper = (share * base for share in _AGAIN_BOUNDS)
         table = np.array([base, _AGAIN * base, lower, upper])
@@ -162,22 +155,18 @@ class TransitionPlanner:
         u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
         return self._decision(u, end, target)
 
-    def break_into(
-        self, ahead: EndOfStride, controls: Array, target: Array, free: FreeControls
-    ) -> Decision:
-        """See :meth:`~.planner.BreakingPlanner.break_into`.
-
-        u_0 is that of the gait that the stride leads to; what is not free here stays.
-        """
+    def _break_into(self, context: RestContext) -> Decision:
+        """From another stride. u_0 is the next gait's; what is not free here stays."""
+        controls, target, turn = context.decision.controls, context.target, context.turn
         o, gait = self.options, self._after(float(target[0]))
         own = [slot for slot in o.slots if slot != Slot.TOUCHDOWN_ANGLE]
         chosen = {Slot.TOUCHDOWN_ANGLE: Slot.TOUCHDOWN_ANGLE} | dict(zip(own, _LEGS, strict=False))
-        slots = [slot for slot in free.slots if slot in chosen]
+        slots = [slot for slot in context.free if slot in chosen]
         turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
         base = gait.controls[[chosen[Slot(slot)] for slot in slots]]
         now, wanted = float(controls[Slot.TOUCHDOWN_ANGLE]), gait.controls[Slot.TOUCHDOWN_ANGLE]
-        flattest = max(now - free.turn, min(now, wanted + _BROKEN_ANGLES[0]))
-        steepest = min(now + free.turn, max(now, wanted + _BROKEN_ANGLES[1]))
+        flattest = max(now - turn, min(now, wanted + _BROKEN_ANGLES[0]))
+        steepest = min(now + turn, max(now, wanted + _BROKEN_ANGLES[1]))
         softest, stiffest = _BROKEN_BOUNDS
         lower = np.where(turns, flattest, softest * base)
         upper = np.where(turns, steepest, stiffest * base)
@@ -187,7 +176,7 @@ class TransitionPlanner:
         u[own] = gait.controls[[chosen[slot] for slot in own]]
         prior = Prior(u, slots, np.array([base, change, lower, upper]), _ROUNDS)
         tolerance = self._tolerance[: len(target)]
-        u, end = solve_stride(FromHere(ahead, slots), target, prior, tolerance)
+        u, end = solve_stride(FromHere(context.ahead, slots), target, prior, tolerance)
         return self._decision(u, end, target)
 
     def _decision(self, u: Array, end: Array | None, wanted: Array) -> Decision:
@@ -203,7 +192,7 @@ class TransitionPlanner:
         low, high = np.array(o.bounds).T
         lower = np.where(turns, base + low, base * low)
         upper = np.where(turns, base + high, base * high)
-        controls = decided(self._before.decide, z).controls.copy()
+        controls = decided(self._before.decide, Context(z)).controls.copy()
         if angles[0] == angles[1]:
             controls[Slot.TOUCHDOWN_ANGLE] = angles[0]
             lower[turns] = upper[turns] = angles[0]

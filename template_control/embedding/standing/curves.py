@@ -6,21 +6,76 @@ legs within their reach, and of those the quickest.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked, checked
+from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.embedding.com_path import TERMS, Quintic, quintics
-from template_control.embedding.standing.options import PLACE, StandingOptions
+from template_control.robot.start import Pose
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.similarity import Scale
+from template_control.slip.scenario.scenario import STAND_HEIGHT
+from template_control.slip.similarity import LENGTH, Scale, scaled, tuned
 from template_control.warm_up import Part
 
 Array = NDArray[np.float64]
+
+SPACING = 0.3
+"""Distance of the feet where a run begins, over l0."""
+PLACE = 0.5
+"""Place of the CoM between the feet, as a share of their spacing from the rear one."""
+
+
+@dataclass(frozen=True)
+class StandingOptions(Checked):
+    """Tuning of a stand, and of the curves of the CoM between the feet.
+
+    Attributes:
+        height: of the CoM over the ground [m].
+        slack: the centre of pressure may be this far outside the feet [m]; the QP keeps it
+            inside, and the CoM a little off its curve.
+        reach: longest way from a foot on the ground to the CoM, over l0.
+    """
+
+    height: Positive = tuned(STAND_HEIGHT, LENGTH)
+    slack: NotNegative = tuned(0.005, LENGTH)
+    reach: Positive = tuned(1.025)
+
+
+@checked
+def standing_pose(
+    parameters: SlipParameters,
+    spacing: Positive | None = None,
+    options: StandingOptions | None = None,
+    ground: Callable[[float], float] | None = None,
+) -> Pose:
+    """At rest on both feet, the rear one at x = 0.
+
+    Args:
+        parameters: the robot's template.
+        spacing: of the feet [m]; None: 0.3 l0.
+        options: tuning, for the reference template.
+        ground: its height [m] at an x [m]; None: level.
+    """
+    o = scaled(options or StandingOptions(), Scale.of(parameters))
+    apart = SPACING * parameters.rest_length if spacing is None else spacing
+    rear, front = (0.0, 0.0) if ground is None else (ground(0.0), ground(apart))
+    # From the ground at right angles to it, as the axes of a slope have it.
+    over = o.height * hypot(1.0, (front - rear) / apart)
+    return Pose(
+        com=np.array([PLACE * apart, rear + PLACE * (front - rear) + over]),
+        com_velocity=np.zeros(2),
+        feet=np.array([[0.0, rear], [apart, front]]),
+        feet_velocity=np.zeros((2, 2)),
+    )
+
 
 _SAMPLES = 20  # of a curve, beside its start
 _TERMS = 6
@@ -164,6 +219,10 @@ class BetweenFeet:
     parameters: SlipParameters
     options: StandingOptions
 
+    def fits(self, found: Found) -> bool:
+        """Whether a curve keeps the centre of pressure between the feet, but for the slack."""
+        return found.excess <= self.options.slack
+
     @cached_property
     def _pace(self) -> float:
         return _PACE * Scale.of(self.parameters).speed
@@ -270,7 +329,7 @@ class BetweenFeet:
             What was found, and the number of the end.
         """
         found, number = self.best(self.loaded(start) if lands else start, ends)
-        if lands or found.excess <= self.options.slack:
+        if lands or self.fits(found):
             return found, number
         for share in _SHIFTS:
             place = self.place(share)
@@ -295,3 +354,17 @@ class BetweenFeet:
             max(first.excess, second.excess),
             first.cost + second.cost,
         )
+
+
+def with_rest(pieces: tuple[Quintic, ...], duration: float) -> tuple[Quintic, ...]:
+    """A curve to rest, and some time in which the robot comes to it.
+
+    Args:
+        pieces: of the curve.
+        duration: of the rest [s]; none is added where it is not positive.
+    """
+    if duration <= 0.0:
+        return pieces
+    still = np.zeros_like(pieces[-1].coefficients)
+    still[:, 0] = pieces[-1].end()[:, 0]
+    return (*pieces, Quintic(still, duration))

@@ -9,10 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.standing.curves import STAND
-from template_control.embedding.standing.options import StandingOptions
+from template_control.embedding.standing.curves import STAND, BetweenFeet, StandingOptions
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
 from template_control.slip.gaits.gait import Gait
@@ -104,22 +102,16 @@ class PassTable:
         parameters: the template.
         options: tuning, for that template.
         family: the gaits.
-        automaton: of the strides.
     """
 
     def __init__(
-        self,
-        parameters: SlipParameters,
-        options: StandingOptions,
-        family: GaitsBySpeed,
-        automaton: Automaton = AUTOMATON,
+        self, parameters: SlipParameters, options: StandingOptions, family: GaitsBySpeed
     ) -> None:
         ready(STAND)
         self.parameters, self.options, self.family = parameters, options, family
         self.scale = Scale.of(parameters)
-        self._automaton = automaton
-        self._simulator = StrideSimulator(parameters, automaton)
-        self._node = automaton.start(StrideKind.WALK).name
+        self._simulator = StrideSimulator(parameters, AUTOMATON)
+        self._node = AUTOMATON.start(StrideKind.WALK).name
         self._known: dict[float, SingleSupportPass] = {}
         self._ways: dict[float, Array] = {}
         unit = parameters.speed_unit
@@ -137,7 +129,11 @@ class PassTable:
             slope: its angle, uphill positive [rad].
         """
         ground = replace(self.parameters, slope=slope)
-        return PassTable(ground, self.options, self.family, self._automaton)
+        return PassTable(ground, self.options, self.family)
+
+    def feet(self, toes: tuple[float, float]) -> BetweenFeet:
+        """Both feet on the ground, at x of the rear and the front one [m]."""
+        return BetweenFeet(toes, self.parameters, self.options)
 
     def between(self, wanted: float, present: float) -> list[float]:
         """Speeds at VLO that are tried, the best first [m/s].
@@ -192,7 +188,7 @@ class PassTable:
         u = controls(_FLAT, over.stiffness, over.stiffness)
         # Uphill is downhill for one who walks back.
         back = replace(self.parameters, slope=-self.parameters.slope)
-        simulator = StrideSimulator(back, self._automaton)
+        simulator = StrideSimulator(back, AUTOMATON)
         past = simulator.run(self._node, [0.0, height, speed, -vertical], u)
         shortest, longest = (time * self.scale.time for time in _SINGLE)
         # Whatever ends the stride: before it the leg pushes.

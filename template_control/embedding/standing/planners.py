@@ -1,45 +1,63 @@
-"""Planners of standing, of starting to walk, of changing the speed of a walk and of stopping."""
+"""Planners of strides along curves: standing, starting to walk, changing speed, stopping, a step.
+
+A step from a stand goes over one leg, whose foot stays, to where the other lands. It closes the
+feet after a walk, and catches a stand that is pushed too hard. A step back is the mirror image of
+one forward: all is planned forward, and turned round.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.com_path import Quintic, chained, timed_stride
-from template_control.embedding.planners.planner import (
-    ANY_ANGLE,
-    Decision,
-    EndOfStride,
-    LandingPlanner,
-    decided,
+from template_control.checks.checked import checked
+from template_control.embedding.com_path import TERMS, Quintic, chained, timed_stride
+from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
+from template_control.embedding.standing.curves import (
+    PLACE,
+    BetweenFeet,
+    Found,
+    StandingOptions,
+    with_rest,
 )
-from template_control.embedding.standing.curves import BetweenFeet, Found
-from template_control.embedding.standing.options import StandingOptions
 from template_control.embedding.standing.passes import (
+    NIMBLE,
+    STEP_DURATION,
+    GaitsBySpeed,
+    LandingTable,
     PassTable,
     SingleSupportPass,
+    StepPass,
     Touchdown,
     width_price,
 )
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot, StrideKind
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, controls
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.maps.section import PADDED
+from template_control.slip.gaits.walking_by_speed import speed_range, walking_by_speed, walking_gait
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.similarity import Scale
+from template_control.slip.similarity import Scale, scaled
 
 Array = NDArray[np.float64]
 
+_CURVED = (
+    StrideKind.STAND,
+    StrideKind.STAND_TO_WALK,
+    StrideKind.WALK_TO_STAND,
+    StrideKind.CHANGE_SPEED,
+)
 _TRIALS = 6  # of speeds, where a step's angle is chosen
 BEAT = 0.5
 """A stand is planned anew, and the route asked, after this time [s], for the reference template; a
 step from a stand ends this long after its curve, when the robot has come to rest too."""
 _STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
+_SOON = 1e-3  # [s]
+_LAUNCH = 0.05  # excess with which a step is still made, over l0; without it the robot would fall
 
 
 @dataclass(frozen=True)
@@ -76,192 +94,104 @@ class StandingGait:
         return cls(parameters, state, np.zeros(NUM_SLOTS), BEAT * Scale.of(parameters).time)
 
 
-class Curves:
-    """Common part of the planners of curves: they learn nothing.
+class CurvePlanner(Planner):
+    """Planner of a stride whose CoM follows a curve in time while both feet stand.
+
+    A stride that ends at rest leads to where one stands; another one to a liftoff from which the
+    template passes VLO with the speed that is wanted. One that begins at VLO chooses its step
+    before: the one after which rest, or that speed, can be had best.
 
     Args:
         passes: over a leg.
-        automaton: of the strides.
+        stride: its kind.
+        walk: the walk's planner, which chooses on one leg; None: nobody does.
     """
 
-    def __init__(self, passes: PassTable, automaton: Automaton = AUTOMATON) -> None:
-        self.parameters, self.options = passes.parameters, passes.options
-        self.passes, self.automaton = passes, automaton
-        self.gait: Gait = StandingGait.of(self.parameters, self.options)
-        self.offset: Array = np.zeros(PADDED)
-        self.beat = BEAT * passes.scale.time
-
-    def reset(self) -> None:
-        """See :class:`~.planner.Planner`."""
-
-    def observe(self, decision: Decision, z: Array) -> None:
-        """See :meth:`~.planner.Planner.observe`."""
-
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
-        """See :class:`~.planner.Planner`: what is chosen depends on the feet, so ``curve`` does."""
-        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
-
-    def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
-        """The decision for a step (None: there is none) to a state ``end`` (3,)."""
-        angle, before = (_STEEP, self.parameters.leg_stiffness) if step is None else step[:2]
-        u = controls(angle, before, stiffness)
-        return Decision(u, end.copy(), step is not None, True, False)
-
-    def _price(self, step: Touchdown, found: Found) -> float:
-        """Of a step and the curve after it [m]."""
-        return found.cost + width_price(step.toes[1], self.parameters)
-
-    def _between(self, toes: tuple[float, float]) -> BetweenFeet:
-        return BetweenFeet(toes, self.parameters, self.options)
-
-    def _stilled(self, found: Found, duration: float) -> tuple[Quintic, ...]:
-        """A curve to rest, and some time [s] in which the robot comes to it."""
-        if duration <= 0.0:
-            return found.pieces
-        still = np.zeros_like(found.pieces[-1].coefficients)
-        still[:, 0] = found.pieces[-1].end()[:, 0]
-        return (*found.pieces, Quintic(still, duration))
-
-    def _fits(self, found: Found) -> bool:
-        return found.excess <= self.options.slack
-
-    def _away(
-        self, feet: BetweenFeet, start: Array, speeds: list[float], lands: bool
-    ) -> tuple[Found, SingleSupportPass, Array]:
-        """Curve to a liftoff that leads to VLO, with the first speed that there is a curve to.
-
-        Args:
-            feet: on the ground.
-            start: (2, 3) x and y, each position, velocity, acceleration.
-            speeds: at VLO [m/s], the best first.
-            lands: see :meth:`BetweenFeet.to_liftoff`.
-
-        Returns:
-            The curve, the VLO, and the (2, 3) state at liftoff.
-        """
-        ways = []
-        for speed in speeds:
-            over = self.passes.at(speed)
-            ends = self.passes.approach(over, feet.toes[1])
-            found, i = feet.to_liftoff(start, ends, lands)
-            ways.append((found, over, ends[i]))
-            if self._fits(found):
-                return ways[-1]
-        return min(ways, key=lambda way: way[0].cost)
-
-    def _leaving(
-        self, node: str, feet: BetweenFeet, way: tuple[Found, SingleSupportPass, Array], u: Array
-    ) -> tuple[Array, Stride]:
-        """Controls and stride of a curve to a liftoff, and on to VLO."""
-        found, over, liftoff = way
-        changed = u.copy()
-        changed[Slot.K_SD] = over.stiffness
-        first = timed_stride(self.automaton, node, found.pieces, feet.toes)
-        state = liftoff[:, :2].T.ravel()
-        second = self.passes.arriving(first.node, state, changed, first.toes)
-        return changed, chained(first, second)
-
-
-class SlopeCurves(Curves):
-    """Curves that know slopes: CoM and feet are those of axes that lean with the ground."""
+    def __init__(self, passes: PassTable, stride: str, walk: Planner | None = None) -> None:
+        begin, end = AUTOMATON.sections(AUTOMATON.starts[stride])
+        self._lands, self._rests = begin is not Event.REST, end is Event.REST
+        self._passes, self._walk = passes, walk
+        self._beat = BEAT * passes.scale.time
+        stand = StandingGait.of(passes.parameters, passes.options)
+        self.gait: Gait = stand if walk is None else walk.gait
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`: the ground is level again."""
         self.on_slope(0.0)
 
     def on_slope(self, slope: float) -> SlipParameters:
-        """See :meth:`~.planner.SlopePlanner.on_slope`."""
-        if slope != self.parameters.slope:
-            self.passes = self.passes.on_slope(slope)
-            self.parameters = self.passes.parameters
-        return self.parameters
+        """See :meth:`~.planner.Planner.on_slope`; CoM and feet are those of axes that lean."""
+        if slope != self._passes.parameters.slope:
+            self._passes = self._passes.on_slope(slope)
+        return self._passes.parameters
 
-
-class StandPlanner(SlopeCurves):
-    """Planner of a stand: the CoM comes to rest between the feet, and stays there."""
-
-    lands = False
-
-    def curve(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
-    ) -> tuple[Decision, Stride]:
-        """See :class:`~.planner.CurvePlanner`."""
-        found = self._between(toes).to_rest(start, self.lands)
-        left = self.beat - sum(piece.duration for piece in found.pieces)
-        stride = timed_stride(self.automaton, node, self._stilled(found, left), toes)
-        return replace(decision, feasible=self._fits(found)), stride
-
-
-class StartPlanner(SlopeCurves):
-    """Planner of a start: back, and forward to where the rear foot lifts off."""
-
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
-        """See :class:`~.planner.Planner`."""
-        wanted = self.gait.state if target is None else target
-        return Decision(controls(_STEEP, 0.0, 0.0), np.array(wanted), True, True, False)
-
-    def curve(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
-    ) -> tuple[Decision, Stride]:
-        """See :class:`~.planner.CurvePlanner`."""
-        feet = self._between(toes)
-        speeds = self.passes.between(float(decision.predicted[0]), 0.0)
-        way = self._away(feet, start, speeds, False)
-        u, stride = self._leaving(node, feet, way, decision.controls)
-        return replace(decision, controls=u, feasible=self._fits(way[0])), stride
-
-
-class StopPlanner(StandPlanner):
-    """Planner of the last step, and of the rest after it."""
-
-    lands = True
-
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
-        """See :class:`~.planner.Planner`: the step after which the CoM comes to rest best."""
-
-        def cost(step: Touchdown) -> float:
-            found = self._between(step.toes).to_rest(step.state, True)
-            return self._price(step, found)
-
-        steps = self.passes.touchdowns(z, angles)
-        return self._step(min(steps, key=cost) if steps else None, self.gait.state, 0.0)
-
-
-class SpeedChangePlanner(SlopeCurves):
-    """Planner of a step to another speed."""
-
-    def decide(
-        self, z: Array, target: Array | None = None, angles: tuple[float, float] = ANY_ANGLE
-    ) -> Decision:
-        """See :class:`~.planner.Planner`: the step after which the speed can be had best."""
+    def decide(self, context: Context) -> Decision:
+        """See :class:`~.planner.Planner`; what depends on the feet, ``curve`` chooses."""
+        z, target, angles, _ = context
+        if not self._lands:
+            if self._rests or target is None:
+                target = self.gait.state
+            u = self.gait.controls if self._rests else controls(_STEEP, 0.0, 0.0)
+            return Decision(u, np.array(target), True, True, False)
+        steps = self._passes.touchdowns(z, angles)
+        if self._rests:
+            return self._step(min(steps, key=self._rest_price, default=None), self.gait.state, 0.0)
         present = float(z[0])
-        wanted = present if target is None else float(target[0])
-        steps = self.passes.touchdowns(z, angles)
-        speeds = self.passes.between(wanted, present)
+        speeds = self._passes.between(present if target is None else float(target[0]), present)
         if not steps:
-            over = self.passes.at(speeds[0])
+            over = self._passes.at(speeds[0])
             return self._step(None, over.vlo, over.stiffness)
         step, over = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS])
         return self._step(step, over.vlo, over.stiffness)
+
+    def decide_rest(self, context: RestContext) -> Decision | None:
+        """See :meth:`~.planner.Planner.decide_rest`."""
+        return None if self._walk is None else self._walk.decide_rest(context)
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :meth:`~.planner.Planner.curve`."""
+        feet = self._passes.feet(toes)
+        if self._rests:
+            found = feet.to_rest(start, self._lands)
+            left = self._beat - sum(piece.duration for piece in found.pieces)
+            stride = timed_stride(AUTOMATON, node, with_rest(found.pieces, left), toes)
+            return replace(decision, feasible=feet.fits(found)), stride
+        found, over, liftoff = self._away(feet, start, float(decision.predicted[0]))
+        u = decision.controls.copy()
+        u[Slot.K_SD] = over.stiffness
+        first = timed_stride(AUTOMATON, node, found.pieces, toes)
+        second = self._passes.arriving(first.node, liftoff[:, :2].T.ravel(), u, first.toes)
+        return replace(decision, controls=u, feasible=feet.fits(found)), chained(first, second)
+
+    def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
+        """The decision for a step (None: there is none) to a state ``end`` (3,)."""
+        k0 = self._passes.parameters.leg_stiffness
+        angle, before = (_STEEP, k0) if step is None else step[:2]
+        u = controls(angle, before, stiffness)
+        return Decision(u, end.copy(), step is not None, True, False)
+
+    def _price(self, step: Touchdown, found: Found) -> float:
+        """Of a step and the curve after it [m]."""
+        return found.cost + width_price(step.toes[1], self._passes.parameters)
+
+    def _rest_price(self, step: Touchdown) -> float:
+        return self._price(step, self._passes.feet(step.toes).to_rest(step.state, True))
 
     def _towards(
         self, steps: list[Touchdown], speeds: list[float]
     ) -> tuple[Touchdown, SingleSupportPass]:
         """The step after which the first of the speeds can be had, and the VLO it leads to."""
-        best = (np.inf, steps[0], self.passes.at(speeds[0]))
+        best = (np.inf, steps[0], self._passes.at(speeds[0]))
         for speed in speeds:
-            over = self.passes.at(speed)
+            over = self._passes.at(speed)
             fits = False
             for step in steps:
-                ends = self.passes.approach(over, step.toes[1])
-                found, _ = self._between(step.toes).to_liftoff(step.state, ends, True)
-                fits = fits or self._fits(found)
+                feet = self._passes.feet(step.toes)
+                ends = self._passes.approach(over, step.toes[1])
+                found, _ = feet.to_liftoff(step.state, ends, True)
+                fits = fits or feet.fits(found)
                 price = self._price(step, found)
                 if price < best[0]:
                     best = price, step, over
@@ -269,35 +199,245 @@ class SpeedChangePlanner(SlopeCurves):
                 break
         return best[1:]
 
-    def curve(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
-    ) -> tuple[Decision, Stride]:
-        """See :class:`~.planner.CurvePlanner`."""
-        feet = self._between(toes)
-        present = float(start[0, 1])
-        speeds = self.passes.between(float(decision.predicted[0]), present)
-        way = self._away(feet, start, speeds, True)
-        u, stride = self._leaving(node, feet, way, decision.controls)
-        return replace(decision, controls=u, feasible=self._fits(way[0])), stride
+    def _away(
+        self, feet: BetweenFeet, start: Array, wanted: float
+    ) -> tuple[Found, SingleSupportPass, Array]:
+        """Curve to a liftoff (2, 3), with the first speed at VLO that there is a curve to."""
+        ways = []
+        for speed in self._passes.between(wanted, float(start[0, 1]) if self._lands else 0.0):
+            over = self._passes.at(speed)
+            ends = self._passes.approach(over, feet.toes[1])
+            found, i = feet.to_liftoff(start, ends, self._lands)
+            ways.append((found, over, ends[i]))
+            if feet.fits(found):
+                return ways[-1]
+        return min(ways, key=lambda way: way[0].cost)
 
 
-class DoubleSupportRecovery(SpeedChangePlanner):
-    """Recovery of a walk that is too slow: both feet carry it to a liftoff that leads to VLO.
+class Away(NamedTuple):
+    """A curve to a liftoff, and the pass from there.
 
-    On one leg the walk's planner chooses.
+    Attributes:
+        found: the curve.
+        over: the pass.
+        liftoff: (2, 3) x and y at liftoff, each position, velocity and acceleration.
+        price: of all [m].
+    """
+
+    found: Found
+    over: StepPass
+    liftoff: Array
+    price: float
+
+
+class StepPlanner(Planner):
+    """Planner of one step from a stand to a stand.
 
     Args:
         passes: over a leg.
-        walk: the walk's planner.
+        stride: which of the automaton's it makes; the leg that lifts off first tells its direction.
+        landings: of another such planner, to share; None: its own.
     """
 
-    def __init__(self, passes: PassTable, walk: LandingPlanner) -> None:
-        super().__init__(passes)
-        self._walk = walk
-        self.gait = walk.gait
+    def __init__(
+        self, passes: PassTable, stride: str, landings: LandingTable | None = None
+    ) -> None:
+        first = AUTOMATON.start(stride)
+        ahead = first.edge(Event.REAR_LIFTOFF) is not None
+        self._way = 1.0 if ahead else -1.0
+        lifts = Event.REAR_LIFTOFF if ahead else Event.FRONT_LIFTOFF
+        self._single = AUTOMATON.successor(first.name, lifts)
+        self._ways = {
+            first.name: self._lift,
+            self._single: self._swing,
+            AUTOMATON.successor(self._single, Event.TOUCHDOWN): self._rest,
+        }
+        self._passes = passes
+        self._launch = _LAUNCH * passes.parameters.rest_length
+        self._beat = BEAT * passes.scale.time
+        self.landings = landings or LandingTable(passes, self._single)
+        gait = StandingGait.of(passes.parameters, passes.options)
+        duration = STEP_DURATION * passes.scale.time
+        self.gait: Gait = replace(gait, stride=stride, step_duration=duration)
 
-    def land(
-        self, ahead: EndOfStride, decision: Decision, target: Array, free: Sequence[int]
-    ) -> Decision:
-        """See :meth:`~.planner.LandingPlanner.land`."""
-        return decided(self._walk.land, ahead, decision, target, free)
+    def decide(self, context: Context) -> Decision:
+        """See :class:`~.planner.Planner`: what is chosen depends on the feet, so ``curve`` does."""
+        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
+
+    def curve(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """See :meth:`~.planner.Planner.curve`."""
+        return self._ways[node](node, start, toes, decision)
+
+    def _lift(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """Both feet stand: to the liftoff from which the step ends best."""
+        ahead = self._turned(start)
+        feet = self._passes.feet(toes if self._way > 0.0 else (-toes[1], -toes[0]))
+        away = self._best_away(feet, ahead)
+        u = self._controls(away.over.landing.angle, away.over.stiffness)
+        first = timed_stride(AUTOMATON, node, self._back(away.found.pieces), toes)
+        state = self._turned(away.liftoff)[:, :2].T.ravel()
+        stands = first.toes if self._way > 0.0 else np.array(toes)
+        second, _ = self._landed(state, u, stands)
+        middle = feet.place(PLACE) - feet.margin
+        fits = away.found.excess <= self._launch and self.landings.capture(ahead) >= middle
+        return replace(decision, controls=u, feasible=fits), chained(first, second)
+
+    def _best_away(self, feet: BetweenFeet, start: Array) -> Away:
+        """The curve to a liftoff, forward, after which the step ends best."""
+        ways, nimble = [], NIMBLE * self._passes.scale.speed
+        for over in self.landings.known:
+            far = feet.spacing + over.landing.toe
+            in_time = over.landing.time - over.times >= far / nimble
+            in_time[0] = True  # whatever it is, it has to do
+            ends = over.states[in_time].copy()
+            ends[:, 0, 0] += feet.toes[1]
+            for loads in (True, False):
+                found, i = feet.to_liftoff(start, ends, loads)
+                ways.append(Away(found, over, ends[i], found.cost + over.landing.price))
+                if feet.fits(found):
+                    break
+        if not any(feet.fits(away.found) for away in ways):
+            ways += self._at_once(feet, start)
+        return min(ways, key=lambda away: away.price)
+
+    def _at_once(self, feet: BetweenFeet, start: Array) -> list[Away]:
+        """The liftoff that is made now: the CoM may be past the foot that stays."""
+        stiffness = self.landings.carrying(start, feet.toes[1])
+        best = self.landings.best(start, stiffness, feet.toes[::-1])
+        if best is None:
+            return []
+        on = np.zeros((2, TERMS))
+        on[:, :2] = start[:, :2]
+        soon = Quintic(on, _SOON)
+        price = self.landings.hurried(best, feet.toes[0])
+        over = StepPass(stiffness, np.zeros(0), np.zeros(0), best)
+        return [Away(Found((soon,), 0.0, 0.0), over, soon.end(), price)]
+
+    def _swing(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """One foot stands: to the landing after which the CoM comes to rest best.
+
+        The foot cannot take it up where the CoM falls to the other side. A leg whose stiffness
+        nobody has chosen yet carries the weight.
+        """
+        ahead = self._turned(start)
+        foot = (self._way * toes[0], self._way * toes[1])
+        stiffness = float(decision.controls[Slot.K_SC]) or self.landings.carrying(ahead, foot[0])
+        best = self.landings.best(ahead, stiffness, foot)
+        u = decision.controls
+        if best is not None:
+            u = self._controls(best.angle, stiffness)
+        stride, landed = self._landed(start[:, :2].T.ravel(), u, np.array(toes))
+        falls = self.landings.capture(ahead) > foot[0]
+        return replace(decision, controls=u, feasible=landed and falls), stride
+
+    def _rest(
+        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+    ) -> tuple[Decision, Stride]:
+        """The foot has landed: the curve to rest, seen in the direction of the step."""
+        feet = self._passes.feet((self._way * toes[0], self._way * toes[1]))
+        found = feet.to_rest(self._turned(start), True)
+        pieces = self._back(with_rest(found.pieces, self._beat))
+        stride = timed_stride(AUTOMATON, node, pieces, toes)
+        return replace(decision, feasible=feet.fits(found)), stride
+
+    def _turned(self, state: Array) -> Array:
+        """(2, 3) x and y with their derivatives, seen in the direction of the step."""
+        return state * np.array([[self._way], [1.0]])
+
+    def _back(self, pieces: tuple[Quintic, ...]) -> list[Quintic]:
+        """The pieces of a curve, planned forward, in the world."""
+        return [Quintic(self._turned(piece.coefficients), piece.duration) for piece in pieces]
+
+    def _controls(self, angle: float, stiffness: float) -> Array:
+        """Controls of a step with a touchdown angle as seen in its direction."""
+        u = np.zeros(NUM_SLOTS)
+        u[Slot.TOUCHDOWN_ANGLE] = angle if self._way > 0.0 else np.pi - angle
+        u[Slot.K_SC] = stiffness
+        return u
+
+    def _landed(self, state: Array, u: Array, toes: Array) -> tuple[Stride, bool]:
+        """The stride from single stance to rest, and whether the foot lands."""
+        stride = self._passes.arriving(self._single, state, u, toes)
+        events = [event for event in stride.events if event.event is Event.TOUCHDOWN]
+        if not events:
+            return stride, False
+        landing = events[0]
+        rows = int(np.searchsorted(stride.meta[:, 0], landing.time - 1e-12))
+        foot = float(landing.state[0] + self._passes.parameters.rest_length * np.cos(u[0]))
+        both = (float(toes[0]), foot)
+        cut = replace(
+            stride,
+            outcome=Outcome.SECTION,
+            node=landing.target,
+            state=landing.state,
+            toes=np.array(both),
+            duration=landing.time,
+            events=(landing,),
+            cx=stride.cx[:rows],
+            cy=stride.cy[:rows],
+            meta=stride.meta[:rows],
+        )
+        end = stride.sample(np.nextafter(landing.time, 0.0))[0].reshape(3, 2).T
+        so_far = Decision(u, self.gait.state, True, True, False)
+        _, rest = self._rest(landing.target, end, both, so_far)
+        return chained(cut, rest), True
+
+
+def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
+    """The gaits of the family by speed, with push-off; slower walks pass over a stiff leg.
+
+    Args:
+        parameters: the template.
+    """
+    chain = walking_by_speed().chains[-1]
+    unit = parameters.speed_unit
+    ends = (float(chain.vlo_speed[0]) * unit, float(chain.vlo_speed[-1]) * unit)
+    return GaitsBySpeed(partial(chain.gait, parameters), ends)
+
+
+def recovery_planners(walk: Planner, options: StandingOptions) -> dict[str, Planner]:
+    """Planners of what a slow walk breaks into: both feet carry it on, or it stops and starts.
+
+    Args:
+        walk: the walk's planner.
+        options: tuning, for the reference template.
+    """
+    p = walk.gait.parameters
+    passes = PassTable(p, scaled(options, Scale.of(p)), gaits_by_speed(p))
+    return {
+        StrideKind.CHANGE_SPEED: CurvePlanner(passes, StrideKind.CHANGE_SPEED, walk),
+        StrideKind.WALK_TO_STAND: CurvePlanner(passes, StrideKind.WALK_TO_STAND),
+        StrideKind.STEP_BACK: StepPlanner(passes, StrideKind.STEP_BACK),
+        StrideKind.STAND_TO_WALK: CurvePlanner(passes, StrideKind.STAND_TO_WALK),
+    }
+
+
+@checked
+def standing_planners(
+    parameters: SlipParameters,
+    options: StandingOptions | None = None,
+    family: GaitsBySpeed | None = None,
+) -> dict[str, Planner]:
+    """A planner for standing, starting to walk, stopping, changing a walk's speed, and a step.
+
+    Args:
+        parameters: the template.
+        options: tuning, for the reference template.
+        family: the gaits that a walk may have, such as :func:`gaits_by_speed`; None: the library's
+            own.
+    """
+    gaits = family or GaitsBySpeed(partial(walking_gait, parameters), speed_range(parameters))
+    o = scaled(options or StandingOptions(), Scale.of(parameters))
+    passes = PassTable(parameters, o, gaits)
+    forward = StepPlanner(passes, StrideKind.STEP_FORWARD)
+    return {
+        **{kind: CurvePlanner(passes, kind) for kind in _CURVED},
+        StrideKind.STEP_FORWARD: forward,
+        StrideKind.STEP_BACK: StepPlanner(passes, StrideKind.STEP_BACK, forward.landings),
+    }

@@ -36,7 +36,7 @@ from template_control.embedding.planners.look_ahead import (
     residuals,
     slopes,
 )
-from template_control.embedding.planners.planner import ANY_ANGLE
+from template_control.embedding.planners.planner import ANY_ANGLE, Context
 from template_control.embedding.planners.step_search import TOP_MARGIN
 from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
@@ -106,7 +106,7 @@ def test_derivatives_are_those_of_the_residuals():
 def test_a_gait_is_kept(planner, speed):
     row = row_at(table(), speed)
     z = row[STATE : STATE + 3]
-    decision = planner.decide(z, z)
+    decision = planner.decide(Context(z, z))
     assert decision.accepted is None
     assert decision.nominal
     np.testing.assert_allclose(decision.predicted, z, atol=2e-3)
@@ -133,9 +133,9 @@ def test_a_plan_stays_within_its_bounds(seed):
 
 def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
     z = row_at(table(), 0.9)[STATE : STATE + 3]
-    free = planner.decide(z, z + [0.1, 0.0, 0.0])
+    free = planner.decide(Context(z, z + [0.1, 0.0, 0.0]))
     angle = free.controls[0] + 0.01
-    held = planner.decide(z, z + [0.1, 0.0, 0.0], (angle, angle + 1e-9))
+    held = planner.decide(Context(z, z + [0.1, 0.0, 0.0], (angle, angle + 1e-9)))
     assert held.controls[0] == pytest.approx(angle, abs=1e-8)
 
 
@@ -149,9 +149,9 @@ def test_dy_dt_costs_above_its_bound():
 
 def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
     z = row_at(table(), 0.9)[STATE : STATE + 3]
-    taken = planner.decide(z, z + [0.05, 0.0, 0.0])
+    taken = planner.decide(Context(z, z + [0.05, 0.0, 0.0]))
     assert taken.accepted is None
-    reduced = planner.decide(z, z + [0.5, 0.0, 0.0])
+    reduced = planner.decide(Context(z, z + [0.5, 0.0, 0.0]))
     assert 0.9 < reduced.accepted <= 0.9 + OPTIONS.pace
     assert 0.9 < reduced.predicted[0] < reduced.accepted
     assert planner.gait.vlo[0] == pytest.approx(reduced.accepted)
@@ -161,7 +161,7 @@ def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
 def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
     there = planner.speeds[end]
     z = row_at(table(), there)[STATE : STATE + 3]
-    decision = planner.decide(z, np.array([wanted, z[1], 0.0]))
+    decision = planner.decide(Context(z, np.array([wanted, z[1], 0.0])))
     assert decision.accepted == pytest.approx(there)
 
 
@@ -169,7 +169,7 @@ def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
 def test_a_plan_that_is_not_cheap_gives_way_to_a_search():
     hasty = AheadPlanner(P, AheadOptions(cheap=1e-9))
     z = row_at(table(), 0.9)[STATE : STATE + 3] + [0.1, 0.0, 0.0]
-    decision = hasty.decide(z, z)
+    decision = hasty.decide(Context(z, z))
     assert decision.feasible
     assert decision.lasting
     assert not decision.nominal
@@ -180,7 +180,7 @@ def test_the_template_goes_through_all_speeds_and_back(planner):
     """Across the gap of the family too, up and down."""
     step, z, speeds = ReturnMap(P, "wp"), walking_by_speed().gait_for(P, 0.35).vlo, []
     for wanted in [1.3] * 28 + [0.27] * 28:
-        decision = planner.decide(z, np.array([wanted, 0.0, 0.0]))
+        decision = planner.decide(Context(z, np.array([wanted, 0.0, 0.0])))
         assert decision.nominal
         z, outcome = step.step(z, decision.controls)
         assert outcome is Outcome.SECTION

@@ -14,6 +14,7 @@ from template_control.embedding.learners.momentum import (
 )
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.planners.planner import Context, RestContext
 from template_control.embedding.replanning import (
     AGILITY,
     SOONEST,
@@ -41,7 +42,7 @@ def planner(request, gait):
 
 
 def test_planner_leaves_the_gait_alone(planner, gait):
-    decision = planner.decide(gait.vlo)
+    decision = planner.decide(Context(gait.vlo))
     assert decision.feasible
     assert decision.nominal
     np.testing.assert_allclose(decision.predicted, gait.vlo, atol=4e-3)
@@ -50,7 +51,7 @@ def test_planner_leaves_the_gait_alone(planner, gait):
 
 def test_prediction_is_the_exact_map(planner, gait):
     z = gait.vlo + [0.02, 0.003, -0.03]
-    decision = planner.decide(z)
+    decision = planner.decide(Context(z))
     z_next, outcome = ReturnMap(P).step(z, decision.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(decision.predicted, z_next, atol=1e-9)
@@ -60,7 +61,7 @@ def test_prediction_is_the_exact_map(planner, gait):
 @settings(max_examples=60, deadline=None)
 def test_planner_answers_for_every_state(brisk_gait, speed, height, vertical):
     for kind in (LqrPlanner, ModifiedPlanner):
-        decision = kind(brisk_gait).decide(np.array([speed, height, vertical]))
+        decision = kind(brisk_gait).decide(Context(np.array([speed, height, vertical])))
         alpha = decision.controls[Slot.TOUCHDOWN_ANGLE]
         assert np.all(np.isfinite(decision.controls))
         # Above asin(y / l0) the foot would be under the ground already.
@@ -74,7 +75,7 @@ def test_planner_answers_for_every_state(brisk_gait, speed, height, vertical):
 def test_a_foot_can_be_given_time_until_touchdown(gait, z):
     earliest, times = 0.03, []
     for options in (LqrOptions(earliest_touchdown=t) for t in (0.0, earliest)):
-        decision = LqrPlanner(gait, options).decide(np.array(z))
+        decision = LqrPlanner(gait, options).decide(Context(np.array(z)))
         assert decision.feasible
         stride = simulate_stride(P, STRIDE_START["w"], VLO.state(z), decision.controls)
         times.append(stride.time_of(Event.TOUCHDOWN))
@@ -84,7 +85,9 @@ def test_a_foot_can_be_given_time_until_touchdown(gait, z):
 
 def test_time_until_touchdown_changes_nothing_where_there_is_enough(gait):
     z = gait.vlo + [0.02, 0.003, -0.03]
-    hasty, calm = (LqrPlanner(gait, LqrOptions(earliest_touchdown=t)).decide(z) for t in (0, 0.1))
+    hasty, calm = (
+        LqrPlanner(gait, LqrOptions(earliest_touchdown=t)).decide(Context(z)) for t in (0, 0.1)
+    )
     np.testing.assert_array_equal(hasty.controls, calm.controls)
 
 
@@ -92,7 +95,7 @@ def test_time_until_touchdown_changes_nothing_where_there_is_enough(gait):
 def test_lqr_brings_the_template_back(gait, shift):
     planner, z = LqrPlanner(gait), gait.vlo + shift
     for _ in range(25):
-        z, outcome = ReturnMap(P).step(z, planner.decide(z).controls)
+        z, outcome = ReturnMap(P).step(z, planner.decide(Context(z)).controls)
         assert outcome is Outcome.SECTION
     np.testing.assert_allclose(z, gait.vlo, atol=2e-3)
 
@@ -102,7 +105,7 @@ def test_lqr_settles_on_target_in_spite_of_an_offset(gait):
     planner, z = LqrPlanner(gait), gait.vlo.copy()
     offset = np.array([0.008, -0.001, 0.02])
     for _ in range(80):
-        decision = planner.decide(z)
+        decision = planner.decide(Context(z))
         z, outcome = ReturnMap(P).step(z, decision.controls)
         assert outcome is Outcome.SECTION
         z = z + offset
@@ -115,7 +118,7 @@ def test_lqr_settles_on_target_in_spite_of_an_offset(gait):
 def test_modified_planner_meets_the_energy_of_equation_38(gait):
     planner = ModifiedPlanner(gait)
     z = gait.vlo + [0.03, 0.002, 0.0]
-    decision = planner.decide(z)
+    decision = planner.decide(Context(z))
     k0, k2 = P.leg_stiffness, decision.controls[Slot.K_SD]
     assert k2 != k0
     # Stance stiffness is back at k0 at the next VLO; the reset's energy is part of (38) only
@@ -127,7 +130,7 @@ def test_modified_planner_meets_the_energy_of_equation_38(gait):
 
 
 def test_unreachable_state_is_said(planner, gait):
-    decision = planner.decide(gait.vlo + [0.5, 0.01, 0.3])
+    decision = planner.decide(Context(gait.vlo + [0.5, 0.01, 0.3]))
     assert not decision.nominal
 
 
@@ -157,7 +160,9 @@ def test_a_walk_after_a_run_forgets_what_its_steps_added_to_the_speed(gait, befo
         fresh = LqrPlanner(gait)
         fresh.offset = np.array(kept)
         fresh.forget()
-        np.testing.assert_array_equal(there.decision.controls, fresh.decide(gait.vlo).controls)
+        np.testing.assert_array_equal(
+            there.decision.controls, fresh.decide(Context(gait.vlo)).controls
+        )
 
 
 def test_overdue_ground_keeps_the_template_in_single_stance(gait):
@@ -180,7 +185,7 @@ def test_overdue_ground_keeps_the_template_in_single_stance(gait):
 def test_a_template_that_would_take_off_is_planned_from_the_ground(gait):
     supervisor = planned(gait)
     high = np.array([1.1, 0.999, 0.4])
-    assert not supervisor.planners["w"].decide(high).feasible
+    assert not supervisor.planners["w"].decide(Context(high)).feasible
     sensed = TemplateState(np.array([0.0, high[1], high[0], high[2]]), np.zeros(2))
     supervisor.decide(VLO, sensed, 0.0, NOTHING)
     report = supervisor.reports[0]
@@ -209,7 +214,7 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
     soonest = max(min(left, SOONEST, SOONEST_SHARE * gait.step_duration), 0.002)
     most = min(u[0] + change, touchdown_angle_after(sensed, P, u[Slot.K_SC], soonest))
     supervisor.replan(node, sensed, later, later)
-    expected = LqrPlanner(gait).decide(z, angles=(min(u[0] - change, most), most)).controls
+    expected = LqrPlanner(gait).decide(Context(z, angles=(min(u[0] - change, most), most))).controls
     np.testing.assert_allclose(supervisor.reports[0].decision.controls, expected, rtol=1e-6)
     assert supervisor.time_of(Event.TOUCHDOWN) >= 0.9 * soonest
     assert len(supervisor.reports) == 1
@@ -296,7 +301,7 @@ def test_a_slow_robot_gets_no_step_that_its_knees_do_not_carry(z):
     """Two-link legs, whose knees are straight at 1.095 m, and 350 N m: five-link's."""
     gait, free = tc.default_gait(tc.load_robot("five-link")), LqrOptions(knee_load_price=0.0)
     z = np.array(z)
-    without, bounded = (LqrPlanner(gait, o).decide(z) for o in (free, LqrOptions()))
+    without, bounded = (LqrPlanner(gait, o).decide(Context(z)) for o in (free, LqrOptions()))
     assert knee_moment(gait, z, without.controls) > 400.0
     assert knee_moment(gait, z, bounded.controls) < 360.0
     assert bounded.lasting
@@ -314,8 +319,8 @@ def test_the_rest_of_a_slow_step_is_not_made_soft():
             # A softer leg always ends nearer to the gait.
             return end + (gait.vlo - end) * 2.0 * (1.0 - u[Slot.K_SD] / k0), Outcome.SECTION
 
-        decision = planner.decide(gait.vlo)
-        found = planner.land(ahead, decision, gait.vlo, slots)
+        decision = planner.decide(Context(gait.vlo))
+        found = planner.decide_rest(RestContext(ahead, decision, gait.vlo, slots))
         assert found.controls[Slot.K_SD] >= least * k0 - 1.0
         assert found.controls[Slot.K_SD] < k0
     assert found.controls[Slot.K_SD] < 0.75 * k0

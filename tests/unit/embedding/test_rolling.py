@@ -5,6 +5,7 @@ import pytest
 
 import template_control as tc
 from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.planner import Context
 from template_control.embedding.state import rolled, unrolled
 
 RADIUS = 0.045
@@ -29,7 +30,7 @@ OFFSET = np.array([-0.0012, 0.0012, 0.002])
 def learnt(planner):
     """Let the planner believe in an offset, as if many steps had shown it."""
     for _ in range(60):
-        decision = planner.decide(planner.gait.vlo)
+        decision = planner.decide(Context(planner.gait.vlo))
         surprise = OFFSET - planner.offset
         planner.observe(decision, decision.predicted + surprise)
 
@@ -39,7 +40,7 @@ def test_the_settled_state_is_a_fixed_point_of_the_exact_map():
     learnt(planner)
     np.testing.assert_allclose(planner.offset, OFFSET, atol=1e-6)
     settled = planner._law.target
-    ends = planner.decide(settled).predicted
+    ends = planner.decide(Context(settled)).predicted
     np.testing.assert_allclose(ends, settled, atol=1e-5)
 
 
@@ -49,5 +50,5 @@ def test_a_walk_does_not_settle_beside_its_gait():
     learnt(planner)
     z = planner.gait.vlo + [-0.02, 0.003, -0.02]
     for _ in range(30):
-        z = planner.decide(z).predicted
+        z = planner.decide(Context(z)).predicted
     assert np.all(np.abs(z - planner.gait.vlo) < [0.002, 0.001, 0.01])

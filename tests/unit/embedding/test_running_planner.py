@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.planners.planner import Planner
+from template_control.embedding.planners.planner import Context, Planner
 from template_control.embedding.planners.running import (
     AGILE,
     OFFSET_GAIN,
@@ -37,7 +37,7 @@ def planner(gait):
 
 def test_planner_leaves_the_gait_alone(planner, gait):
     assert isinstance(planner, Planner)
-    decision = planner.decide(gait.apex)
+    decision = planner.decide(Context(gait.apex))
     assert decision.feasible
     assert decision.nominal
     np.testing.assert_allclose(decision.controls, gait.controls, rtol=1e-9)
@@ -46,7 +46,7 @@ def test_planner_leaves_the_gait_alone(planner, gait):
 
 def test_an_error_is_nearly_gone_after_one_stride(planner, gait):
     z = gait.apex + [0.05, 0.004]
-    decision = planner.decide(z)
+    decision = planner.decide(Context(z))
     assert decision.nominal
     end, outcome = ReturnMap(P, "r").step(z, decision.controls)
     assert outcome is Outcome.SECTION
@@ -58,12 +58,12 @@ def test_an_error_is_nearly_gone_after_one_stride(planner, gait):
 @pytest.mark.parametrize("speed", [2.0, 4.0])
 def test_a_far_target_is_approached_step_by_step(planner, speed):
     z, target, step = np.array([3.0, 0.97]), running_gait(P, speed).apex, ReturnMap(P, "r")
-    decision = planner.decide(z, target)
+    decision = planner.decide(Context(z, target))
     assert decision.feasible
     assert not decision.nominal, "nothing is learnt on the way"
     for _ in range(60):
         before = z
-        z, outcome = step.step(z, planner.decide(z, target).controls)
+        z, outcome = step.step(z, planner.decide(Context(z, target)).controls)
         assert outcome is Outcome.SECTION
         assert abs(z[0] - before[0]) < 2.0 * OPTIONS.pace
     np.testing.assert_allclose(z, target, atol=2e-3)
@@ -74,7 +74,7 @@ def test_a_far_target_is_approached_step_by_step(planner, speed):
 @settings(max_examples=60, deadline=None)
 def test_planner_answers_within_its_bounds(speed, height, target):
     planner = RunningPlanner(running_gait(P, 3.0))
-    decision = planner.decide(np.array([speed, height]), np.array([target, 0.97]))
+    decision = planner.decide(Context(np.array([speed, height]), np.array([target, 0.97])))
     u = decision.controls
     assert np.all(np.isfinite(u))
     assert np.all(np.isfinite(decision.predicted))
@@ -85,7 +85,7 @@ def test_planner_answers_within_its_bounds(speed, height, target):
 
 def test_after_touchdown_only_the_stiffnesses_are_free(planner, gait):
     angle = gait.controls[Slot.TOUCHDOWN_ANGLE] + 0.01
-    decision = planner.decide(gait.apex, None, (angle, angle))
+    decision = planner.decide(Context(gait.apex, None, (angle, angle)))
     assert decision.controls[Slot.TOUCHDOWN_ANGLE] == angle
     assert decision.controls[Slot.K_SC] != decision.controls[Slot.K_SD]
     u = gait.controls.copy()
@@ -100,7 +100,7 @@ def test_what_every_stride_adds_is_learnt(planner, gait):
     step, extra = ReturnMap(P, "r"), np.array([-0.03, 0.004])
     z = gait.apex
     for _ in range(60):
-        decision = planner.decide(z)
+        decision = planner.decide(Context(z))
         z = step.step(z, decision.controls)[0] + extra
         planner.observe(decision, z)
     np.testing.assert_allclose(planner.offset[:2], extra, atol=1e-4)
@@ -112,7 +112,7 @@ def test_what_every_stride_adds_is_learnt(planner, gait):
 
 
 def test_a_push_is_no_offset(planner, gait):
-    decision = planner.decide(gait.apex)
+    decision = planner.decide(Context(gait.apex))
     planner.observe(decision, gait.apex + [1.0, -0.1])
     limit = SURPRISE_BOUND * OFFSET_GAIN
     np.testing.assert_allclose(planner.offset[:2], limit * [1.0, -1.0])
@@ -123,8 +123,8 @@ def test_templates_of_all_sizes_are_planned_alike(planner, gait):
     speed = np.sqrt(small.gravity * small.rest_length / (P.gravity * P.rest_length))
     other = RunningPlanner(running_gait(small, 3.0 * speed))
     z = gait.apex + [0.1, -0.005]
-    u = planner.decide(z).controls
-    v = other.decide(z * [speed, small.rest_length]).controls
+    u = planner.decide(Context(z)).controls
+    v = other.decide(Context(z * [speed, small.rest_length])).controls
     unit = P.mass * P.gravity / P.rest_length
     other_unit = small.mass * small.gravity / small.rest_length
     np.testing.assert_allclose(v[0], u[0], rtol=1e-6)
@@ -135,7 +135,7 @@ def test_templates_of_all_sizes_are_planned_alike(planner, gait):
 @pytest.mark.parametrize("speed", [3.2, 2.7, 2.5, 2.25])
 def test_a_run_that_is_too_fast_slows_down_whatever_it_is_asked_for(options, speed):
     z, target = np.array([speed, 0.971]), running_gait(P, max(speed - 0.6, 1.9)).apex
-    decision = RunningPlanner(running_gait(P, 1.5), options).decide(z, target)
+    decision = RunningPlanner(running_gait(P, 1.5), options).decide(Context(z, target))
     end, outcome = ReturnMap(P, "r").step(z, decision.controls)
     assert outcome is Outcome.SECTION
     assert end[0] - speed < -0.12, "the great change that is asked for made it 0.05 m/s once"

@@ -5,6 +5,7 @@ import pytest
 
 import template_control as tc
 from template_control.embedding import gaits_by_speed, standing_planners, standing_pose
+from template_control.embedding.planners.planner import Context
 from template_control.embedding.standing.passes import CLOSING
 from template_control.run.options import Push
 from template_control.slip import Event
@@ -28,7 +29,7 @@ def step(planners, kind, case):
     """Decision and stride from the middle between two feet, the rear one at 0."""
     apart, speed = case
     start = np.array([[0.5 * apart, STEPS[kind] * speed, 0.0], [0.97, 0.0, 0.0]])
-    first = planners[kind].decide(REST.of(start[:, :2].T.ravel()))
+    first = planners[kind].decide(Context(REST.of(start[:, :2].T.ravel())))
     return planners[kind].curve(AUTOMATON.starts[kind], start, (0.0, apart), first)
 
 
@@ -81,13 +82,13 @@ def test_a_step_is_made_where_the_feet_do_not_hold(planners, speed, holds, kind)
     """And in the direction in which the robot falls."""
     start, toes = np.array([[0.05, speed, 0.0], [0.97, 0.0, 0.0]]), (0.0, 0.1)
     z, node = REST.of(start[:, :2].T.ravel()), "DS_ar^s"
-    stand, _ = planners["s"].curve(node, start, toes, planners["s"].decide(z))
+    stand, _ = planners["s"].curve(node, start, toes, planners["s"].decide(Context(z)))
     assert stand.feasible == holds
     fit = [
         other
         for other in STEP_OUT[node]
         if planners[other]
-        .curve(AUTOMATON.starts[other], start, toes, planners[other].decide(z))[0]
+        .curve(AUTOMATON.starts[other], start, toes, planners[other].decide(Context(z)))[0]
         .feasible
     ]
     assert holds or fit == [kind]

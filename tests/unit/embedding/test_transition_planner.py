@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.planners.planner import Decision, LandingPlanner, Planner
+from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.planners.transition import (
     RUN_TO_WALK,
@@ -58,13 +58,13 @@ def run_to_walk(**options):
 @pytest.mark.parametrize("planner", [walk_to_run(), run_to_walk()])
 def test_it_is_a_planner_that_chooses_again_where_a_foot_has_landed(planner):
     assert isinstance(planner, Planner)
-    assert isinstance(planner, LandingPlanner)
+    assert type(planner).decide_rest is not Planner.decide_rest
 
 
 @pytest.mark.parametrize("speed", [1.3, 1.5, 2.0])
 def test_from_the_walk_it_comes_to_the_run_within_tolerance(speed):
     target, planner = runs(speed).apex, walk_to_run()
-    decision = planner.decide(WALK.vlo, target)
+    decision = planner.decide(Context(WALK.vlo, target))
     end, outcome = ReturnMap(P, "wr").step(WALK.vlo, decision.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(decision.predicted, [*end, 0.0], atol=1e-12)
@@ -79,7 +79,7 @@ def test_from_the_walk_it_comes_to_the_run_within_tolerance(speed):
 @pytest.mark.parametrize("speed", [1.25, 1.4])
 def test_from_the_run_it_comes_near_the_walk_with_legs_that_a_knee_can_be(speed):
     z = runs(speed).apex
-    decision = run_to_walk().decide(z, WALK.vlo)
+    decision = run_to_walk().decide(Context(z, WALK.vlo))
     end, outcome = ReturnMap(P, "rw").step(z, decision.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(decision.predicted, end, atol=1e-12)
@@ -87,7 +87,7 @@ def test_from_the_run_it_comes_near_the_walk_with_legs_that_a_knee_can_be(speed)
     assert np.all(np.abs(end - WALK.vlo) < 4.0 * tolerance)
     # The walking planner makes good what is left.
     for _ in range(8):
-        end, outcome = ReturnMap(P, "w").step(end, WALKING.decide(end).controls)
+        end, outcome = ReturnMap(P, "w").step(end, WALKING.decide(Context(end)).controls)
         assert outcome is Outcome.SECTION
     assert np.all(np.abs(end - WALK.vlo) < 0.3 * tolerance)
 
@@ -95,7 +95,7 @@ def test_from_the_run_it_comes_near_the_walk_with_legs_that_a_knee_can_be(speed)
 @given(speed=st.floats(0.9, 1.3), height=st.floats(0.955, 0.995), target=st.floats(1.2, 2.5))
 @settings(max_examples=25, deadline=None)
 def test_walk_to_run_keeps_its_bounds(speed, height, target):
-    decision = walk_to_run().decide(np.array([speed, height, 0.0]), runs(target).apex)
+    decision = walk_to_run().decide(Context(np.array([speed, height, 0.0]), runs(target).apex))
     share = decision.controls[[Slot.K_SC_WR, Slot.K_SD_WR]] / (UNIT * np.array(WALK_TO_RUN.base))
     assert np.all(share >= 0.5 - 1e-12)
     assert np.all(share <= 2.0 + 1e-12)
@@ -104,7 +104,9 @@ def test_walk_to_run_keeps_its_bounds(speed, height, target):
 @given(speed=st.floats(0.9, 2.5), height=st.floats(0.93, 1.05), target=st.floats(0.7, 1.2))
 @settings(max_examples=25, deadline=None)
 def test_run_to_walk_keeps_its_bounds(speed, height, target):
-    decision = run_to_walk().decide(np.array([speed, height]), np.array([target, 0.978, 0.0]))
+    decision = run_to_walk().decide(
+        Context(np.array([speed, height]), np.array([target, 0.978, 0.0]))
+    )
     angle = decision.controls[Slot.TOUCHDOWN_ANGLE]
     assert angle < np.arcsin(min(height, 1.0)), "the foot would be on the ground at once"
     assert angle <= RUN_TO_WALK.base[0] + RUN_TO_WALK.bounds[0][1] + 1e-12
@@ -115,18 +117,18 @@ def test_run_to_walk_keeps_its_bounds(speed, height, target):
 
 @pytest.mark.parametrize("angle", [1.3, 1.34])
 def test_an_angle_that_is_given_stays(angle):
-    decision = run_to_walk().decide(runs(1.3).apex, WALK.vlo, (angle, angle))
+    decision = run_to_walk().decide(Context(runs(1.3).apex, WALK.vlo, (angle, angle)))
     assert decision.controls[Slot.TOUCHDOWN_ANGLE] == angle
 
 
 @pytest.mark.parametrize("base", [(4.0, 4.0), (60.0, 60.0)])
 def test_where_the_base_fails_a_grid_finds_a_stride(base):
     step, target = ReturnMap(P, "wr"), runs(1.3).apex
-    u = WALKING.decide(WALK.vlo).controls.copy()
+    u = WALKING.decide(Context(WALK.vlo)).controls.copy()
     u[[Slot.K_SC_WR, Slot.K_SD_WR]] = UNIT * np.array(base)
     assert step.step(WALK.vlo, u)[1] is not Outcome.SECTION
     wide = walk_to_run(base=base, bounds=((0.2, 6.0), (0.2, 6.0)))
-    decision = wide.decide(WALK.vlo, target)
+    decision = wide.decide(Context(WALK.vlo, target))
     assert decision.feasible
     end, outcome = step.step(WALK.vlo, decision.controls)
     assert outcome is Outcome.SECTION
@@ -136,7 +138,7 @@ def test_where_the_base_fails_a_grid_finds_a_stride(base):
 def test_where_nothing_is_found_it_says_so_and_keeps_to_its_base():
     narrow = walk_to_run(base=(4.0, 4.0), bounds=((0.9, 1.1), (0.9, 1.1)))
     target = runs(1.3).apex
-    decision = narrow.decide(WALK.vlo, target)
+    decision = narrow.decide(Context(WALK.vlo, target))
     assert not decision.feasible
     assert not decision.lasting
     np.testing.assert_allclose(decision.controls[[Slot.K_SC_WR, Slot.K_SD_WR]], 4.0 * UNIT)
@@ -171,11 +173,11 @@ CASES = {
 @pytest.mark.parametrize("stride", CASES)
 def test_what_is_chosen_within_a_stride_is_what_the_whole_stride_does(stride):
     planner, z, begin, event, end, target = CASES[stride]
-    first = planner.decide(z)
+    first = planner.decide(Context(z))
     node, state, toes = middle(stride, z, begin, first.controls, event)
     free = free_controls(AUTOMATON, AUTOMATON.node(node))
     ahead = ahead_from(node, state, toes, end)
-    again = planner.land(ahead, first, target, free)
+    again = planner.decide_rest(RestContext(ahead, first, target, free))
     assert again.feasible
     kept = [slot for slot in Slot if slot not in free]
     np.testing.assert_array_equal(again.controls[kept], first.controls[kept])
@@ -191,11 +193,13 @@ def test_what_is_chosen_within_a_stride_is_what_the_whole_stride_does(stride):
 
 def test_a_leg_that_has_landed_elsewhere_gets_other_stiffnesses():
     planner, z, begin, event, end, target = CASES["rw"]
-    first = planner.decide(z, target)
+    first = planner.decide(Context(z, target))
     node, state, toes = middle("rw", z, begin, first.controls, event)
     state[2] += 0.1  # faster than planned
     ahead = ahead_from(node, state, toes, end)
-    again = planner.land(ahead, first, target, free_controls(AUTOMATON, AUTOMATON.node(node)))
+    again = planner.decide_rest(
+        RestContext(ahead, first, target, free_controls(AUTOMATON, AUTOMATON.node(node)))
+    )
     tolerance = TOLERANCE
     left, right = (
         np.linalg.norm((ahead(d.controls)[0] - target) / tolerance) for d in (first, again)
@@ -243,12 +247,12 @@ def test_a_push_within_a_transition_gets_other_stiffnesses():
 
 def test_where_the_rest_cannot_be_done_the_controls_stay():
     planner, z, *_, target = CASES["rw"]
-    first = planner.decide(z, target)
+    first = planner.decide(Context(z, target))
 
     def fails(u):
         return np.zeros(3), Outcome.FALL
 
-    again = planner.land(fails, first, target, [Slot.K_SC, Slot.K_SD])
+    again = planner.decide_rest(RestContext(fails, first, target, [Slot.K_SC, Slot.K_SD]))
     assert isinstance(again, Decision)
     assert not again.feasible
     np.testing.assert_array_equal(again.controls, first.controls)
@@ -273,8 +277,8 @@ def test_templates_of_all_sizes_change_alike(stride):
         other = TransitionPlanner("rw", run, partial(walking_gait, small), RUN_TO_WALK)
     planner, z, *_, target = CASES[stride]
     sizes = np.array([ratio, small.rest_length, ratio])
-    u = planner.decide(z, target).controls
-    v = other.decide(z * sizes[: len(z)], target * sizes[: len(target)]).controls
+    u = planner.decide(Context(z, target)).controls
+    v = other.decide(Context(z * sizes[: len(z)], target * sizes[: len(target)])).controls
     np.testing.assert_allclose(v[0], u[0], rtol=1e-4)
     np.testing.assert_allclose(v[1:] / unit, u[1:] / UNIT, rtol=1e-3)
 

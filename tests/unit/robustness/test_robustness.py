@@ -10,6 +10,7 @@ import template_control as tc
 from template_control import settings
 from template_control.cli import robustness as command
 from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.planner import Context
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.library import load_robot
@@ -347,7 +348,7 @@ def come_back(gait, planner, impulse):
     planner.reset()
     z = gait.vlo + [impulse / gait.parameters.mass, 0.0, 0.0]
     for _ in range(20):
-        u = planner.decide(z).controls
+        u = planner.decide(Context(z)).controls
         stride = simulate_stride(gait.parameters, STRIDE_START[gait.stride], VLO.state(z), u)
         if not stride.completed:
             return False

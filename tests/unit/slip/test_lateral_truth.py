@@ -7,6 +7,7 @@ from space_slip import acceleration as space_acceleration
 from space_slip import energy, step
 
 from template_control.embedding import LqrPlanner
+from template_control.embedding.planners.planner import Context
 from template_control.slip import (
     LateralLearningOptions,
     LateralLearnt,
@@ -129,7 +130,7 @@ class Walker:
         self.heading = self.heading.turned(self.wish.turn, self.toe)
         start, side = self.local(), self.side
         z = start[[3, 2, 5]]
-        decision = self.planner.decide(z)
+        decision = self.planner.decide(Context(z))
         _, path = planar(z, decision.controls)
         cycle = lateral_cycle(LATERAL, self.wish, self.learnt.offset)
         aim = lateral_aim(LATERAL, cycle, side, self.learnt, OPTIONS)

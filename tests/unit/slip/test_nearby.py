@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from template_control.embedding.planners import stride_solver
-from template_control.embedding.planners.planner import ANY_ANGLE
+from template_control.embedding.planners.planner import ANY_ANGLE, Context
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.planners.stride_solver import (
     FromSection,
@@ -92,6 +92,8 @@ def test_a_planner_that_is_reset_decides_as_a_new_one(gait):
     first = RunningPlanner(gait)
     first.reset()
     for state in (gait.apex, gait.apex + 0.5 * NEAR):
-        planner.decide(state)
+        planner.decide(Context(state))
     planner.reset()
-    np.testing.assert_array_equal(planner.decide(z).controls, first.decide(z).controls)
+    np.testing.assert_array_equal(
+        planner.decide(Context(z)).controls, first.decide(Context(z)).controls
+    )

@@ -6,6 +6,7 @@ import pytest
 from template_control.embedding.learners.momentum import uncontrolled
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.planners.planner import Cause, Context, RestContext
 from template_control.embedding.replanning import free_controls
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome, Phase, Slot
@@ -72,7 +73,7 @@ def test_it_gives_the_controls_the_third_direction(gait, pushing):
 def test_the_planner_settles_on_the_gait_whatever_the_robot_adds(pushing):
     planner, step, z = LqrPlanner(pushing), ReturnMap(P, "wp"), pushing.vlo.copy()
     for _ in range(80):
-        decision = planner.decide(z)
+        decision = planner.decide(Context(z))
         z_next = step.step(z, decision.controls)[0] + [0.01, -0.001, 0.02]
         planner.observe(decision, z_next)
         z = z_next
@@ -84,7 +85,7 @@ def test_the_planner_completes_steps_far_from_the_gait(pushing):
     rng = np.random.default_rng(5)
     for _ in range(20):
         z = pushing.vlo + rng.uniform(-1.0, 1.0, 3) * [0.2, 0.01, 0.2]
-        decision = planner.decide(z)
+        decision = planner.decide(Context(z))
         assert decision.feasible
         k = decision.controls[Slot.K_PUSH]
         assert 0.5 * K0 - 1e-6 <= k <= 1.5 * K0 + 1e-6
@@ -96,16 +97,16 @@ def test_the_planner_completes_steps_far_from_the_gait(pushing):
 )
 def test_the_search_takes_no_step_that_only_the_closed_form_completes(pushing, slow):
     planner = LqrPlanner(pushing)
-    decision = planner.decide(np.array(slow))
+    decision = planner.decide(Context(np.array(slow)))
     end, outcome = ReturnMap(P, "wp").step(np.array(slow), decision.controls)
     assert outcome is Outcome.SECTION
     np.testing.assert_allclose(end, decision.predicted, atol=1e-9)
-    assert planner.price(np.array(slow)) < 5.0
+    assert planner.cost(np.array(slow)) < 5.0
 
 
 def test_the_search_does_not_bend_legs_for_nothing(pushing):
     """Without a price of controls it found legs of half the stiffness here, which sink."""
-    decision = LqrPlanner(pushing).decide(pushing.vlo + [-0.042, 0.002, -0.113])
+    decision = LqrPlanner(pushing).decide(Context(pushing.vlo + [-0.042, 0.002, -0.113]))
     assert decision.feasible
     stiff = decision.controls[[Slot.K_SC, Slot.K_SD, Slot.K_PUSH]]
     assert np.all(np.abs(stiff / K0 - 1.0) < 0.3)
@@ -114,21 +115,21 @@ def test_the_search_does_not_bend_legs_for_nothing(pushing):
 def test_no_step_begins_in_flight(pushing):
     """There the template's leg would pull at the ground."""
     planner = LqrPlanner(pushing)
-    steps = [planner.decide(np.array([1.1, height, 0.4])) for height in (0.98, 1.007)]
+    steps = [planner.decide(Context(np.array([1.1, height, 0.4]))) for height in (0.98, 1.007)]
     assert [step.feasible for step in steps] == [True, False]
 
 
 def test_the_paper_s_planner_walks_without_it(pushing):
     planner = ModifiedPlanner(pushing)
     assert planner.gait.stride == "w"
-    assert planner.decide(planner.gait.vlo).controls[Slot.K_PUSH] == 0.0
+    assert planner.decide(Context(planner.gait.vlo)).controls[Slot.K_PUSH] == 0.0
     np.testing.assert_array_equal(without_push_off(pushing).controls, planner.gait.controls)
 
 
 @pytest.mark.parametrize("push", [-0.12, 0.12])
 def test_a_push_in_double_stance_is_answered_at_once(pushing, push):
     planner, simulator = LqrPlanner(pushing), StrideSimulator(P)
-    decision = planner.decide(pushing.vlo)
+    decision = planner.decide(Context(pushing.vlo))
     first = simulator.run("SS_av^wp", VLO.state(pushing.vlo), decision.controls)
     node, time = "DS_sc^wp", first.time_of(Event.TOUCHDOWN)
     state = first.sample(np.array([time]))[0, :4] + [0.0, 0.0, push, 0.0]
@@ -139,7 +140,7 @@ def test_a_push_in_double_stance_is_answered_at_once(pushing, push):
         return VLO.of(rest.state), rest.outcome
 
     free = free_controls(AUTOMATON, AUTOMATON.node(node))
-    again = planner.land(ahead, decision, pushing.vlo, free)
+    again = planner.decide_rest(RestContext(ahead, decision, pushing.vlo, free))
     left, better = (abs(ahead(d.controls)[0][0] - pushing.vlo[0]) for d in (decision, again))
     assert better < 0.8 * left
     np.testing.assert_array_equal(again.controls[Slot.TOUCHDOWN_ANGLE], decision.controls[0])
@@ -150,10 +151,12 @@ def test_a_push_in_double_stance_is_answered_at_once(pushing, push):
 
 def test_where_nothing_completes_the_step_that_is_told(pushing):
     planner = LqrPlanner(pushing)
-    decision = planner.decide(pushing.vlo)
-    lost = planner.land(
-        lambda u: (np.full(3, np.nan), Outcome.FALL), decision, pushing.vlo, [int(Slot.K_PUSH)]
-    )
+    decision = planner.decide(Context(pushing.vlo))
+
+    def fails(u):
+        return np.full(3, np.nan), Outcome.FALL
+
+    lost = planner.decide_rest(RestContext(fails, decision, pushing.vlo, [int(Slot.K_PUSH)]))
     assert not lost.feasible
     assert not lost.nominal
     np.testing.assert_array_equal(lost.controls, decision.controls)
@@ -161,5 +164,9 @@ def test_where_nothing_completes_the_step_that_is_told(pushing):
 
 def test_three_controls_leave_the_rest_of_a_step(gait):
     planner = LqrPlanner(gait)
-    decision = planner.decide(gait.vlo)
-    assert planner.land(lambda u: (gait.vlo, Outcome.SECTION), decision, gait.vlo, []) is decision
+    decision = planner.decide(Context(gait.vlo))
+    rest = RestContext(lambda u: (gait.vlo, Outcome.SECTION), decision, gait.vlo, [])
+    assert planner.decide_rest(rest) is decision
+    assert planner.decide_rest(rest._replace(cause=Cause.NO_FUTURE)) is None, (
+        "nothing breaks into it"
+    )

@@ -10,6 +10,7 @@ import pytest
 import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.planner import Context
 from template_control.errors import GaitError
 from template_control.robot.library import ROBOTS
 from template_control.slip.automaton.vocabulary import Outcome
@@ -108,7 +109,7 @@ def test_push_off_reaches_what_three_controls_do_not(gaits):
 
 def test_the_planner_follows_the_family(gaits):
     planner = LqrPlanner(gaits[10])
-    decision = planner.decide(gaits[10].vlo, gaits[11].vlo)
+    decision = planner.decide(Context(gaits[10].vlo, gaits[11].vlo))
     assert decision.nominal
     assert planner.gait.vlo[0] == pytest.approx(gaits[11].vlo[0])
     assert planner.gait.mean_speed == pytest.approx(SPEEDS[11], abs=1e-6)
