@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 class Plant(Protocol):
     """A robot in a world, driven by joint torques and a push on its trunk, nothing else.
 
-    ``simulate`` takes any object with these members, see docs/your_plant.md.
+    ``simulate`` takes any object with these members, see docs/guides/your_plant.md.
     """
 
     @property

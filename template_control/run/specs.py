@@ -208,8 +208,7 @@ class OwnPlanner(Checked):
         if not isinstance(made, Planner):
             lacking = [n for n in _PLANNER_MEMBERS if not hasattr(made, n)]
             raise ParameterError(
-                f"planner {self.path!r} lacks {', '.join(lacking)}: docs/your_planner.md tells"
-                " what a planner has"
+                f"planner {self.path!r} lacks {', '.join(lacking)}: see docs/guides/your_planner.md"
             )
         return made
 

@@ -1,4 +1,4 @@
-"""The messages that docs/your_robot.md explains are the ones a user gets."""
+"""The messages that docs/guides/your_robot.md explains are the ones a user gets."""
 
 import re
 
@@ -10,7 +10,7 @@ import template_control as tc
 from template_control.plant.bullet import BulletPlant, pybullet
 from template_control.robot.library import robot_path
 
-PAGE = (DOCS / "your_robot.md").read_text()
+PAGE = (DOCS / "guides" / "your_robot.md").read_text()
 BOLT_FEET = ("FL_FOOT", "FR_FOOT")
 BOLT_JOINTS = ("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE")
 

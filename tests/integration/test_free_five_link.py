@@ -165,9 +165,9 @@ def test_a_urdf_that_is_wrong_is_told(load, text, old, new, told):
         load(changed(text, old, new, 2 if "sphere" in old else 1))
 
 
-# -- the messages that docs/your_free_robot.md explains -----------------------------------------
+# -- the messages that docs/guides/your_floating_robot.md explains ---------------------------------
 
-PAGE = (DOCS / "your_free_robot.md").read_text()
+PAGE = (DOCS / "guides" / "your_floating_robot.md").read_text()
 HIP = 'name="left_hip" type="revolute"'
 ARM = """<link name="arm"><inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1"
   iyz="0" izz="0.1"/></inertial></link><joint name="elbow" type="revolute"><parent link="trunk"/>

@@ -312,9 +312,9 @@ def _table(page, heading):
 
 def test_the_pages_tables_have_every_field_and_number():
     members, context, decision = [
-        _table("your_planner.md", "| member | what it is |"),
-        _table("your_planner.md", "| in a context | what it is |"),
-        _table("your_planner.md", "| field | what it is |"),
+        _table("guides/your_planner.md", "| member | what it is |"),
+        _table("guides/your_planner.md", "| in a context | what it is |"),
+        _table("guides/your_planner.md", "| field | what it is |"),
     ]
     public = {name for name in (*vars(Planner), *Planner.__annotations__) if name[0] != "_"}
     assert {re.sub(r"\(.*", "", row[0].strip("`")) for row in members} == public

@@ -2,7 +2,7 @@
 
 Own nodes, an own task, an own entry for each phase and an own planner; the automaton's
 interpreter, the return map, the controller, the whole-body QP and PyBullet are the library's.
-docs/architecture.md leads through it.
+docs/guides/your_gait.md leads through it.
 """
 
 from dataclasses import dataclass, replace

@@ -29,7 +29,7 @@ from template_control.run.record import Record
 from template_control.run.specs import RobotSpec
 from template_control.view.trial_figures import campaign_figure
 
-PAGE = (DOCS / "campaign.md").read_text()
+PAGE = (DOCS / "guides" / "campaign.md").read_text()
 RANGES = [f.name for f in fields(DisturbanceDistribution) if f.name not in ("within", "after")]
 
 

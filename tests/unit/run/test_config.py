@@ -250,7 +250,7 @@ def test_a_second_run_says_that_it_replaces_the_first(tmp_path, capfd):
 
 
 def test_the_file_that_the_page_shows_is_understood(tmp_path):
-    page = (DOCS / "options.md").read_text()
+    page = (DOCS / "guides" / "options.md").read_text()
     (shown,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     path = tmp_path / "shown.toml"
     path.write_text(shown)

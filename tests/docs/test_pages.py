@@ -1,0 +1,115 @@
+"""The pages of docs/: their index, links, names of files, and programs."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from places import DOCS, ROOT
+
+PAGES = sorted(DOCS.rglob("*.md"))
+OTHERS = [
+    ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "robots/README.md")
+]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
+# Guides whose programs are run from top to bottom. Those of the others run for minutes.
+RUN = (
+    "architecture",
+    "engines",
+    "floating_base",
+    "options",
+    "running",
+    "your_floating_robot",
+    "your_gait",
+    "your_planner",
+    "your_plant",
+    "your_robot",
+)
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(DOCS).as_posix())
+
+
+def prose(text):
+    """A page without its programs."""
+    return re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+
+
+def anchor(heading):
+    """Of a heading, as it is made for links."""
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").strip().lower()
+    return re.sub(r"[^\w\- ]", "", plain).replace(" ", "-")
+
+
+def anchors(page):
+    return {anchor(h) for h in re.findall(r"^#+ (.*)", prose(page.read_text()), re.MULTILINE)}
+
+
+@pytest.mark.parametrize("page", [*PAGES, *OTHERS], ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose(page.read_text())):
+        if link.startswith("http"):
+            continue
+        path, _, place = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), link
+        if place:
+            assert place in anchors(target), link
+
+
+@each_page
+def test_named_sources_are_there(page):
+    """``room/file.py``, and with ``: `name``` a function or class of it."""
+    names = re.findall(r"`((?:[a-z_]+/)+[a-z_]+\.py)`(?::\s+`([\w.]+)`)?", page.read_text())
+    for name, function in names:
+        source = ROOT / "template_control" / name
+        if not source.is_file():
+            source = ROOT / name
+        assert source.is_file(), name
+        for part in function.split(".") if function else ():
+            assert re.search(rf"\b(def|class) {part}\b|^{part}\b", source.read_text(), re.M), part
+
+
+def test_the_index_names_every_page():
+    text = (DOCS / "README.md").read_text()
+    named = set(re.findall(r"\]\(([\w/]+\.md)\)", text))
+    assert named == {p.relative_to(DOCS).as_posix() for p in PAGES} - {"README.md"}
+
+
+def test_every_picture_is_shown():
+    shown = {
+        (page.parent / picture).resolve()
+        for page in (*PAGES, *OTHERS)
+        for picture in re.findall(r"!\[.*?\]\((.*?)\)", page.read_text())
+    }
+    assert set((DOCS / "images").iterdir()) == shown
+
+
+@pytest.fixture(scope="module")
+def on_path(tmp_path_factory):
+    """Environment of a shell that knows ``template-control`` and ``python`` by name."""
+    folder = tmp_path_factory.mktemp("bin")
+    for name, words in (("python", ""), ("template-control", " -m template_control.cli.main")):
+        script = folder / name
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}"{words} "$@"\n')
+        script.chmod(0o755)
+    return {**ENVIRONMENT, "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("guide", RUN)
+def test_a_guide_runs_as_printed_from_top_to_bottom(guide, tmp_path, on_path):
+    text = (DOCS / "guides" / f"{guide}.md").read_text()
+    found = re.findall(r"```(python|sh)\n(.*?)```", text, flags=re.DOTALL)
+    assert found
+    for language, block in found:
+        shell = ["bash", "-euo", "pipefail", "-c", block]
+        done = subprocess.run(
+            [sys.executable, "-c", block] if language == "python" else shell,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            env=on_path,
+        )
+        assert done.returncode == 0, f"{block}: {done.stdout}{done.stderr}"
+        assert "fell: True" not in done.stdout
