@@ -25,10 +25,11 @@ Array = NDArray[np.float64]
 # Footholds that the slope's estimate looks back to. More of them make it slower on a slope that
 # begins, and surer where each foothold is a little off.
 _FOOTHOLDS = 3
-# Change of the estimate up to which the one before is kept [rad]. Nothing is learnt from a step in
-# which it changes. With 0.5 mrad of noise level ground looks 0.001 steep; what a slope this gentle
-# does, a planner's offset learns.
-_SLOPE_CHANGE = 0.004
+LEVEL = 0.004
+"""Slope that is as good as none; a smaller change of the estimate is not taken over [rad].
+
+Nothing is learnt from a step in which it changes. With 0.5 mrad of noise level ground looks 0.001
+steep; what a slope this gentle does, a planner's offset learns."""
 STEEPEST = 0.12
 """Slope that is believed [rad]."""
 _SHORTEST = 0.1  # distance of two footholds that show a slope, over l0
@@ -71,7 +72,7 @@ class SlopeEstimate:
         """
         (x, height), (ahead, above) = rear, front
         slope = atan((above - height) / (ahead - x))
-        if abs(slope) <= _SLOPE_CHANGE:
+        if abs(slope) <= LEVEL:
             return
         self.slope = self.last = min(max(slope, -STEEPEST), STEEPEST)
         rise, last = tan(self.slope), self._places[-1]
@@ -99,7 +100,7 @@ class SlopeEstimate:
         ]
         found = atan(median(slopes)) if slopes else self.slope
         found = min(max(found, -STEEPEST), STEEPEST)
-        if abs(found - self.slope) > _SLOPE_CHANGE:
+        if abs(found - self.slope) > LEVEL:
             self.slope = found
 
 

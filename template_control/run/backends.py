@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from contextlib import AbstractContextManager, nullcontext
-from math import atan2, cos, degrees, radians, sin
+from math import atan2, cos, degrees, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,11 @@ from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.controller import FreeController
 from template_control.embedding.free.lateral import SIDES
 from template_control.embedding.free.options import FreeOptions
-from template_control.embedding.ground import STEEPEST
+from template_control.embedding.ground import LEVEL, STEEPEST
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.robot_template import startable_slopes
 from template_control.embedding.standing.curves import standing_pose
 from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
@@ -120,11 +121,6 @@ class RobotBackend(ABC):
         """
 
 
-# Of the ground that a walk starts on [rad]: steeper uphill the CoM does not come over the front
-# foot before the centre of pressure has left the rear one.
-_UPHILL = radians(4.1)
-
-
 class PlanarBackend(RobotBackend):
     """See :class:`RobotBackend`.
 
@@ -206,12 +202,12 @@ class PlanarBackend(RobotBackend):
         """
         pose = standing_pose(controller.supervisor.route.parameters, ground=o.plant.ground_height)
         (rear, low), (front, high) = pose.feet.tolist()
-        slope, believed = atan2(high - low, front - rear), STEEPEST
-        if not -believed <= slope <= min(believed, _UPHILL):
+        slope, (down, up) = atan2(high - low, front - rear), startable_slopes(self.robot)
+        down, up = min(max(down, -STEEPEST), -LEVEL), max(min(up, STEEPEST), LEVEL)
+        if not down <= slope <= up:
             raise ParameterError(
                 f"{self.robot.name} stands on ground of {degrees(slope):.1f} degrees: let the run"
-                f" begin where it is between {-degrees(believed):.1f} and {degrees(_UPHILL):.1f}"
-                " degrees"
+                f" begin where it is between {degrees(down):.1f} and {degrees(up):.1f} degrees"
             )
         return pose
 
