@@ -9,10 +9,12 @@ import template_control as tc
 from template_control.embedding.ground import SlopeEstimate
 from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.planner import Context
+from template_control.embedding.robot_template import startable_slopes
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
 from template_control.embedding.standing.planners import standing_planners
 from template_control.errors import ParameterError
 from template_control.run.config import RunConfig
+from template_control.run.specs import RobotSpec
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Outcome
 
@@ -20,18 +22,16 @@ P = tc.SlipParameters()
 TOES = (0.0, 0.3)
 
 
-def sloping(degrees, start=-50.0):
-    """A slope that goes on behind the robot; or begins at ``start`` before it."""
+def sloping(degrees):
+    """A slope that goes on behind the robot."""
     rise = np.tan(np.radians(degrees))
-    below = start * rise if start < 0.0 else 0.0
-    return tc.Terrain(((start, below), (100.0, below + (100.0 - start) * rise)))
+    return tc.Terrain(((-50.0, -50.0 * rise), (100.0, 100.0 * rise)))
 
 
-def walked(plant, degrees, steps=12, **more):
+def walked(plant, degrees, steps=12, robot="five-link"):
     """A record of a walk from a stand."""
-    world = plant(terrain=sloping(degrees, **more))
-    options = tc.SimulationOptions(steps=steps, plant=world)
-    return RunConfig().with_stands(True, False).prepare().run(options)
+    options = tc.SimulationOptions(steps=steps, plant=plant(terrain=sloping(degrees)))
+    return RunConfig(robot=RobotSpec(robot)).with_stands(True, False).prepare().run(options)
 
 
 @pytest.mark.parametrize("degrees", [-5.0, -2.0, 0.0, 1.0, 4.0])
@@ -100,14 +100,47 @@ def test_two_feet_that_stand_tell_the_slope(slope):
         assert estimate.slope == pytest.approx(believed)
 
 
-@pytest.mark.parametrize("degrees", [-10.0, 5.0, 8.0])
-def test_a_stand_where_no_slope_so_steep_is_believed_is_refused(degrees):
+# Whole degrees, of 30 steps each: what lies beyond fell, or is refused to be safe.
+STEEPEST = {
+    "five-link": (-6, 4),
+    "runner": (-6, 4),
+    "human": (-4, 3),
+    "bolt": (-4, 4),
+    "rabbit": (0, 0),
+}
+ENDS = [(robot, degrees) for robot, ends in STEEPEST.items() for degrees in sorted(set(ends))]
+
+
+@pytest.mark.parametrize(
+    ("robot", "degrees"),
+    [
+        *((robot, down - 1) for robot, (down, _) in STEEPEST.items()),
+        *((robot, up + 1) for robot, (_, up) in STEEPEST.items()),
+        ("five-link", -10),
+        ("five-link", 8),
+    ],
+)
+def test_a_stand_on_ground_too_steep_for_the_robot_is_refused(robot, degrees):
     with pytest.raises(ParameterError, match=f"stands on ground of {degrees:.1f} degrees"):
-        walked(tc.PlantOptions, degrees)
+        walked(tc.PlantOptions, degrees, robot=robot)
 
 
-@pytest.mark.slow(seconds=60)
-@pytest.mark.parametrize("degrees", [-4.0, -2.0, 2.0, 4.0])
+def test_a_urdf_of_ones_own_starts_where_its_like_does(tmp_path):
+    five = tc.load_robot("five-link")
+    own = tmp_path / "own.urdf"
+    own.write_text(five.urdf)
+    assert startable_slopes(tc.load_robot(own)) == startable_slopes(five)
+
+
+@pytest.mark.slow(seconds=40)
+@pytest.mark.parametrize(("robot", "degrees"), ENDS)
+def test_a_walk_starts_on_the_steepest_ground_of_its_robot(robot, degrees):
+    record = walked(tc.PlantOptions, degrees, steps=16, robot=robot)
+    assert not record.fell, record.metadata["fall_reason"]
+
+
+@pytest.mark.slow(seconds=30)
+@pytest.mark.parametrize("degrees", [-2.0, 3.0])
 @pytest.mark.parametrize("plant", [tc.PlantOptions, tc.MujocoOptions, tc.IdealOptions])
 def test_a_walk_starts_from_a_stand_on_a_slope(plant, degrees):
     record = walked(plant, degrees)

@@ -26,13 +26,12 @@ class PaceOptions(Checked):
     Attributes:
         stoppable: from which one step leads to rest.
         slowed: to which a faster walk is slowed down first, so that its last step can be short.
-        alike: difference from the wanted speed with which a walk begins after a start.
-        behind: difference that the walking planner is left to make good.
+        behind: difference from the wanted speed that the walking planner is left to make good: a
+            stride of its own throws a robot that has reached its speed off it.
     """
 
     stoppable: NotNegative = tuned(0.16)
     slowed: NotNegative = tuned(0.11)
-    alike: NotNegative = tuned(0.012)
     behind: NotNegative = tuned(0.03)
 
 
@@ -252,8 +251,7 @@ class ScenarioRoute:
             return replace(here, walking=False), kind if slow else StrideKind.CHANGE_SPEED
         if not self.scenario.stands:
             return here, kind
-        most = self.paces.behind if here.walking else self.paces.alike
-        if abs(speed - here.wanted(segment, now)) <= most * self._unit:
+        if abs(speed - here.wanted(segment, now)) <= self.paces.behind * self._unit:
             return replace(here, walking=True), kind
         return here, StrideKind.CHANGE_SPEED
 
