@@ -36,13 +36,11 @@ _WALKED = (0.0957, 0.463)  # over sqrt(g l0): 0.30 and 1.45 m/s; bolt fell with 
 _SWING_TORQUE = 0.5  # of a hip's limit: rabbit walked with 0.49, and 0.06 m/s too slow with 0.55
 _STANCE_TORQUE = 0.73  # of a knee's limit: human walked with 0.72, and fell with 0.79
 _UNEVEN = 0.42  # of the speed at VLO: rabbit walked with 0.41, and fell with 0.46
-# Slopes that a walk of 30 steps from a stand climbed and descended [rad]. Uphill by what the swing
-# of the legs makes of the speed at VLO, as a share of it (bolt, human, rabbit), and by the share of
-# its limit that a knee needs in stance on level ground (human at 0.93 and at 1.08 m/s; with 0.79 it
-# falls there). Downhill by the inertia about the CoM over m l0^2 (five-link, bolt, rabbit).
-# five-link fell at 5 degrees, human at 4 and -6, at 1.08 m/s at 2, bolt at -5, rabbit at 1 and -1.
+# Slopes that a walk of 30 steps from a stand climbed and descended [rad]: uphill by what the swing
+# of the legs makes of the speed at VLO, as a share of it (bolt, human, rabbit), downhill by the
+# inertia about the CoM over m l0^2 (five-link, bolt, rabbit). five-link fell at 5 degrees, human at
+# 4 and -6, bolt at -5, rabbit at 1 and -1.
 _CLIMBED = (0.105, 0.165, 0.39), (radians(4.1), radians(3.3), 0.0)
-_BORNE = (0.71, 0.743, 0.79), (radians(4.1), radians(1.2), 0.0)
 _DESCENDED = (0.12, 0.197, 0.43), (radians(6.9), radians(4.5), 0.0)
 _EVERY = 3  # link of the family's chains is looked at
 _ROUNDING = 1e-6  # of a centimetre per second
@@ -170,8 +168,8 @@ def robot_gait_for_speed(
 def startable_slopes(robot: Biped) -> tuple[float, float]:
     """Steepest ground, downhill and uphill, on which a robot sets off from a stand [rad].
 
-    The template's legs weigh nothing, and its body does not turn: the heavier a robot's legs, the
-    larger its inertia and the weaker its knees, the gentler the slope.
+    The template's legs weigh nothing, and its body does not turn: the heavier a robot's legs and
+    the larger its inertia, the gentler the slope.
 
     Args:
         robot: its last update is overwritten.
@@ -182,8 +180,7 @@ def startable_slopes(robot: Biped) -> tuple[float, float]:
     pitch = robot.base_dof - 1
     inertia = abs(float(robot.angular_momentum_jacobian[pitch]))
     descended = np.interp(inertia / (p.mass * p.rest_length**2), *_DESCENDED)
-    climbed = np.interp(uneven / gait.vlo[0], *_CLIMBED)
-    return -float(descended), float(min(climbed, np.interp(_stance(robot, gait), *_BORNE)))
+    return -float(descended), float(np.interp(uneven / gait.vlo[0], *_CLIMBED))
 
 
 def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
