@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from places import DOCS, ROOT
+from places import DOCS, EXAMPLES, ROOT
 
 PAGES = sorted(DOCS.rglob("*.md"))
 OTHERS = [
@@ -19,6 +19,7 @@ RUN = (
     "engines",
     "floating_base",
     "options",
+    "public_robots",
     "running",
     "your_floating_robot",
     "your_gait",
@@ -98,6 +99,7 @@ def on_path(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.parametrize("guide", RUN)
 def test_a_guide_runs_as_printed_from_top_to_bottom(guide, tmp_path, on_path):
+    (tmp_path / "examples").symlink_to(EXAMPLES)
     text = (DOCS / "guides" / f"{guide}.md").read_text()
     found = re.findall(r"```(python|sh)\n(.*?)```", text, flags=re.DOTALL)
     assert found
