@@ -79,7 +79,7 @@ def main() -> None:
         assert isinstance(record, FloatingRecord)  # of a free robot
         count += 1
         if record.fell:
-            print(f"{name}: {record.metadata['fall_reason']}", flush=True)
+            print(f"{name}: {record.fall_reason}", flush=True)
             continue
         speed, height = gait_errors(record, gait)
         stood += 1
@@ -87,7 +87,7 @@ def main() -> None:
         roll, pitch, yaw = np.abs(record.attitude).max(axis=0)
         print(
             f"{name}: speed {speed:+.1%}, height {height:+.1%}, roll {roll:.3f}, pitch {pitch:.3f},"
-            f" yaw {yaw:.2f} rad, {record.metadata['summary']['qp_failures']} failed QPs",
+            f" yaw {yaw:.2f} rad, {record.summary.qp_failures} failed QPs",
             flush=True,
         )
     print(f"{options.robot}, {count} trials: {stood} without a fall, {back} back on the gait")

@@ -37,11 +37,11 @@ def trial(about: dict[str, str], world: dict[str, float], seed: int) -> dict[str
     record = tc.simulate(model, tc.load_scenario(about["scenario"]), options)
     error = record.section_state[1:, 0] - record.section_target[:-1, 0]
     return {
-        "arrived": bool(record.metadata["arrived"]),
-        "why": record.metadata["fall_reason"],
+        "arrived": bool(record.arrived),
+        "why": record.fall_reason,
         "top_speed": float(record.section_state[:, 0].max()),
         "speed_error": float(np.sqrt(np.mean(error**2))),
-        "saturated": float(record.metadata["summary"]["saturated_share"]),
+        "saturated": float(record.summary.saturated_share),
         "torque": float(np.max(np.abs(record.torque))),
     }
 

@@ -17,4 +17,4 @@ record = tc.simulate(robot, tc.LqrPlanner(gait), options)
 print(f"gait: {gait.vlo[0]:.3f} m/s at VLO; push of {IMPULSE:g} N s in step 8")
 for step, (speed, height, vertical) in enumerate(record.section_state):
     print(f"step {step:2d}: {speed:.3f} m/s  {height:.4f} m  {vertical:+.3f} m/s")
-print("fell: " + record.metadata["fall_reason"] if record.fell else "recovered")
+print("fell: " + record.fall_reason if record.fell else "recovered")

@@ -130,18 +130,18 @@ def trial(robot: str, way: str, disturbance: dict[str, float]) -> dict[str, Any]
         push = (tc.Push(disturbance["impulse"], step, disturbance["phase"]),)
     options = tc.SimulationOptions(steps=last, plant=plant, pushes=push, record_every=5)
     record = tc.simulate(model, route, options)
-    kinds = [record.metadata["strides"][i] for i in record.stride]
+    kinds = record.kinds_of_stride
     speed, wanted = record.section_state[:, 0], record.section_target[:, 0]
     return {
-        "fell": record.fell or (last is None and not record.metadata["arrived"]),
-        "why": record.metadata["fall_reason"],
+        "fell": record.fell or (last is None and not record.arrived),
+        "why": record.fall_reason,
         "pushed_at": float(speed[min(step, len(speed) - 1)]),
         "back": back(speed, step) if way == "run" and "mass" not in disturbance else None,
         "end": float(speed[-1] / wanted[-1] - 1.0),
         "fastest": float(speed.max()),
         "runs": kinds.count("r"),
         "torque": float(np.abs(record.torque).max()),
-        "at_limit": record.metadata["summary"]["saturated_share"] * record.metadata["duration"],
+        "at_limit": record.summary.saturated_share * record.duration,
     }
 
 

@@ -78,7 +78,7 @@ def main() -> None:
             falls += record.fell
             slow += not record.fell and abs(speed) > 0.03
             if record.fell or trials < 10:
-                reason = record.metadata["fall_reason"] or "goes on"
+                reason = record.fall_reason or "goes on"
                 print(f"  {what} {number}: {reason}, {record.steps} steps, {100 * speed:+.1f} %")
         low, high = wilson_interval(falls, trials)
         print(

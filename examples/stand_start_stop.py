@@ -90,20 +90,20 @@ def pushes(robot: PlanarBiped) -> Iterator[tuple[str, tc.Record]]:
 
 def told(record: tc.Record) -> tuple[bool, str]:
     """Whether a run ended in a stand, and what is worth knowing of it."""
-    kinds = [record.metadata["strides"][i] for i in record.stride]
+    kinds = record.kinds_of_stride
     way = " ".join(kind for kind, _ in groupby(kinds))
     last = record.time > record.time[-1] - 1.0
     drift = 1e3 * float(np.ptp(record.com[last], axis=0).max())
     speed = 1e3 * float(np.abs(record.com_velocity[last]).max())
     torque = float(np.abs(record.torque).max())
-    limit = np.array(record.metadata["torque_limit"])
+    limit = record.torque_limit
     share = float(np.mean(np.any(np.abs(record.torque) > 0.999 * limit, axis=1)))
     apart = float(np.ptp(record.foot[-1, :, 0]))
     about = (
         f"{way}; feet {apart:.2f} m, drift {drift:.3f} mm, {speed:.3f} mm/s, torque {torque:.0f}"
         f" N m, at a limit {share:.2%}"
     )
-    return not record.fell, record.metadata["fall_reason"] or about
+    return not record.fell, record.fall_reason or about
 
 
 def main() -> None:

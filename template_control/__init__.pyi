@@ -37,6 +37,8 @@ from .run.options import Push as Push
 from .run.options import SimulationOptions as SimulationOptions
 from .run.record import Record as Record
 from .run.record import RunInterrupted as RunInterrupted
+from .run.record import load_record as load_record
+from .run.recorder import Recorder as Recorder
 from .run.sensing import SensorOptions as SensorOptions
 from .run.simulation import simulate as simulate
 from .slip.automaton.vocabulary import MapKind as MapKind

@@ -106,7 +106,7 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
     error = template.section_state[1:, 0] - template.wanted_speed
     return {
         **{name: run[name] for name in _FROM_THE_RUN},
-        "completed": bool(record.metadata["arrived"]),
+        "completed": bool(record.arrived),
         "top_speed": float(record.section_state[:, 0].max()),
         "strides": {
             **{name: run["strides"].get(name, 0) for name in STRIDES.values()},

@@ -49,7 +49,7 @@ class Kept:
             KeyboardInterrupt: if Ctrl-C came while files were written.
         """
         self.files.raise_pending()
-        if not self.record.metadata["interrupted"]:
+        if not self.record.interrupted:
             return False
         print(
             f"template-control: interrupted: the run up to here is in {self.path}", file=sys.stderr
@@ -93,7 +93,7 @@ def run_and_keep(
             _give_up(error, config, folder)
         path = files.write(lambda: record.save(folder / "run.npz"))
         files.write(lambda: config.save(folder / "run.toml"))
-        if not record.metadata["interrupted"]:
+        if not record.interrupted:
             if not options.no_figures:
                 files.write(lambda: view.save_figures(record, folder))
             if more is not None:
@@ -129,7 +129,7 @@ def _give_up(error: Exception, config: RunConfig, folder: Path) -> NoReturn:
         folder: for its files.
     """
     record, files = recorded(error), Files()
-    line = one_line(error) if record is None else record.metadata["error"]
+    line = one_line(error) if record is None else record.error
     if record is not None:
         path = files.write(lambda: record.save(folder / "run.npz"))
         files.write(lambda: config.save(folder / "run.toml"))

@@ -45,7 +45,9 @@ from .standing.planners import StandingGait as StandingGait
 from .standing.planners import StepPlanner as StepPlanner
 from .standing.planners import gaits_by_speed as gaits_by_speed
 from .standing.planners import standing_planners as standing_planners
+from .state import FloatingSnapshot as FloatingSnapshot
 from .state import SectionReport as SectionReport
+from .state import Snapshot as Snapshot
 from .swing import HIGH_SWING as HIGH_SWING
 from .swing import SwingOptions as SwingOptions
 from .swing import Swings as Swings

@@ -23,7 +23,7 @@ from template_control.embedding.modes import PLACED, Mode, PathClock, RobotGuard
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
-from template_control.embedding.state import SectionReport, StateObserver, rolled
+from template_control.embedding.state import SectionReport, Snapshot, StateObserver, rolled
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet
 from template_control.errors import ParameterError
@@ -125,11 +125,24 @@ class EmbeddingController:
         """One report a section, the start's included."""
         return self.supervisor.reports
 
-    @property
-    def template_com(self) -> tuple[float, float]:
-        """The template's CoM at the robot's phase, in the world [m]."""
-        x, y = self.path_clock.reference.tolist()[:2]
-        return self.frame.point(self._origin + x, self.observer.ground + y)
+    def snapshot(self) -> Snapshot:
+        """Node, phase, template and swing references of the last tick."""
+        clock, frame, feet = self.path_clock, self.frame, self.feet.foot_of_leg
+        x, y = clock.reference.tolist()[:2]
+        swing = np.full((2, 2), np.nan)
+        for leg in self.mode.swings:
+            swing[feet[leg]] = frame.world(self.references.foot[feet[leg], :, 0])
+        return Snapshot(
+            time=self.time,
+            node=self.mode.node.name,
+            phase=clock.time,
+            rear=feet[Leg.REAR],
+            stands=bool(self.mode.stance),
+            template_com=np.array(frame.point(self._origin + x, self.observer.ground + y)),
+            template_velocity=frame.outward(clock.reference[2:4]).copy(),
+            template_force=frame.outward(clock.forces).copy(),
+            swing_reference=swing,
+        )
 
     @property
     def _origin(self) -> float:

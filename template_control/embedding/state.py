@@ -199,6 +199,49 @@ class StateObserver:
 
 
 @dataclass(frozen=True)
+class Snapshot:
+    """Controller at its last tick: where on the automaton and on the path, and what it follows.
+
+    Positions, velocities and forces are in the world, of a floating-base robot in the heading
+    frame. The arrays are its own: a later tick leaves them.
+
+    Attributes:
+        time: at which the next tick begins [s].
+        node: name of the automaton's node.
+        phase: time along the path since the last plan [s].
+        rear: the foot that plays the rear leg.
+        stands: whether a leg carries in this node.
+        template_com, template_velocity: (2,) of the template at the robot's phase [m, m/s].
+        template_force: (2, 2) its leg forces, rear and front [N].
+        swing_reference: (2, 2) position of each foot's reference, NaN where it has none [m].
+    """
+
+    time: float
+    node: str
+    phase: float
+    rear: int
+    stands: bool
+    template_com: Array
+    template_velocity: Array
+    template_force: Array
+    swing_reference: Array
+
+
+@dataclass(frozen=True)
+class FloatingSnapshot(Snapshot):
+    """Snapshot of a floating-base robot's controller.
+
+    Attributes:
+        sway: (2,) y of the CoM from the rear foot and dy/dt, in the heading frame; dy/dt has the
+            angular momentum about the CoM where the phase's forward speed has it [m, m/s].
+        side_reference: (2,) y of each foot's reference, NaN where it has none [m].
+    """
+
+    sway: Array
+    side_reference: Array
+
+
+@dataclass(frozen=True)
 class EstimatorState:
     """Estimates of the controller's learners at a section.
 

@@ -125,12 +125,11 @@ def fig10_on(robot_name: str) -> Reproduction:
     with stdout_to_stderr():
         record = simulate(robot, route)
     template = simulate_scenario(route.scenario)
-    figures, m = summarise(record, None), record.metadata
-    names = [m["strides"][i] for i in record.stride]
+    figures, names = summarise(record, None), record.kinds_of_stride
     torque, speed = figures["joint_torque"], figures["joint_speed"]
     data = {
         "robot": robot.name,
-        "completed": m["arrived"],
+        "completed": record.arrived,
         "fall_reason": figures["fall_reason"],
         "top_speed": float(record.section_state[:, 0].max()),
         "speed_error_rms": figures["speed_error_rms"],

@@ -76,7 +76,7 @@ def beginning(record: Record, seconds: float) -> Record:
 
 def _entries(record: Record, node: str) -> NDArray[np.intp]:
     """Samples at which the run enters ``node`` of the automaton."""
-    inside = record.node == record.metadata["nodes"].index(node)
+    inside = record.node == record.nodes.index(node)
     return np.flatnonzero(inside[1:] & ~inside[:-1]) + 1
 
 
@@ -90,7 +90,7 @@ def _step(record: Record, first: int = 0) -> tuple[int, int, int]:
 def _joints(record: Record, lifted: int) -> list[int]:
     """Joints of the leg that lifts off, then those of the one that stands."""
     standing = int(record.rear[lifted])
-    legs = record.metadata["legs"]
+    legs = record.legs
     return [*legs[1 - standing], *legs[standing]]
 
 
@@ -279,7 +279,7 @@ def robot_walk(
         start=start_state(gait),
     )
     record = simulate(load_robot("five-link"), PLANNERS[planner](gait), options)
-    return Walk(sections(gait, record.section_state), record.metadata["fall_reason"]), record
+    return Walk(sections(gait, record.section_state), record.fall_reason), record
 
 
 def template_walk(planner: str, steps: int = STEPS) -> Walk:

@@ -350,7 +350,7 @@ def campaign_trial(conditions: dict[str, Any], number: int) -> dict[str, Any]:
     record = ready.run(config.simulation)
     return {
         "fell": record.fell,
-        "reason": record.metadata["fall_reason"],
+        "reason": record.fall_reason,
         "first": fall_cause(record) if record.fell else "",
         "speed_error": None if record.fell else gait_errors(record, ready.gait)[0],
     }

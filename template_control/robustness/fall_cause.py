@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.run.record import FloatingRecord, Record
-from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 
 _LOOKED_AT = 4  # strides before the fall
@@ -44,13 +43,9 @@ def fall_cause(record: Record) -> str:
     return min(found, key=lambda name: found[name]) if found else "none of these"
 
 
-def _template(record: Record) -> SlipParameters:
-    return SlipParameters(**record.metadata["template"])
-
-
 def _bears(record: Record) -> NDArray[np.bool_]:
     """(T, 2) which feet are loaded."""
-    weight = record.metadata["mass"] * _template(record).gravity
+    weight = record.weight
     return np.asarray(record.contact_force[:, :, 1] > _BEARS * weight)
 
 
@@ -59,8 +54,8 @@ def _failed(record: Record) -> NDArray[np.bool_]:
 
 
 def _limited(record: Record) -> NDArray[np.bool_]:
-    at_limit = np.abs(record.torque) >= _LIMIT * np.array(record.metadata["torque_limit"])
-    long = _AT_LIMIT * Scale.of(_template(record)).time
+    at_limit = np.abs(record.torque) >= _LIMIT * record.torque_limit
+    long = _AT_LIMIT * Scale.of(record.template).time
     wrong = np.zeros(len(record.time), dtype=bool)
     for joint in at_limit.T:
         wrong |= _lasts(joint, record.time) >= long
@@ -75,20 +70,20 @@ def _slipped(record: Record) -> NDArray[np.bool_]:
         else:
             place = record.foot[:, foot, :1]
         slid = np.linalg.norm([x - _at_begin(x, bears) for x in place.T], axis=0)
-        wrong |= bears & (slid > _SLIP * _template(record).rest_length)
+        wrong |= bears & (slid > _SLIP * record.template.rest_length)
     return wrong
 
 
 def _stumbled(record: Record) -> NDArray[np.bool_]:
-    friction = record.metadata["options"]["plant"].get("friction", np.inf)
-    weight = record.metadata["mass"] * _template(record).gravity
+    friction = record.options["plant"].get("friction", np.inf)
+    weight = record.weight
     force = record.contact_force
     pressed = -force[:, :, 0] > np.maximum(_WALL * friction * force[:, :, 1], _BEARS * weight)
     return np.asarray(pressed.any(axis=1))
 
 
 def _stretched(record: Record) -> NDArray[np.bool_]:
-    legs = record.metadata["legs"]
+    legs = record.legs
     wrong = np.zeros(len(record.time), dtype=bool)
     for foot, (leg, bears) in enumerate(zip(legs, _bears(record).T, strict=True)):
         hip, knee, tip = record.joint[:, leg[0]], record.joint[:, leg[1]], record.foot[:, foot]

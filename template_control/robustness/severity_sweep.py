@@ -133,7 +133,7 @@ def trial(
     errors = (None, None) if record.fell else gait_errors(record, where.gait)
     return {
         "fell": record.fell,
-        "reason": record.metadata["fall_reason"],
+        "reason": record.fall_reason,
         "steps": record.steps,
         "speed_error": errors[0],
         "height_error": errors[1],
@@ -237,7 +237,7 @@ def _undisturbed(robot: str, where: Situation) -> Record:
     record = simulate(where.robot, where.planner, options)
     if record.fell:
         raise RobotError(
-            f"{robot} falls without a disturbance ({record.metadata['fall_reason']}):"
+            f"{robot} falls without a disturbance ({record.fall_reason}):"
             " there is no robustness to measure; make it go first"
         )
     return record

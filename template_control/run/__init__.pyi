@@ -1,5 +1,5 @@
 from .config import RunConfig as RunConfig
-from .data_frame import columns as columns
+from .facts import Facts as Facts
 from .options import FallOptions as FallOptions
 from .options import HeadingCommand as HeadingCommand
 from .options import Push as Push
@@ -8,10 +8,13 @@ from .record import FloatingRecord as FloatingRecord
 from .record import Record as Record
 from .record import RunInterrupted as RunInterrupted
 from .record import load_record as load_record
+from .recorder import Recorder as Recorder
 from .sensing import SensorOptions as SensorOptions
 from .simulation import perturbed_start as perturbed_start
 from .simulation import simulate as simulate
 from .specs import GaitSpec as GaitSpec
 from .specs import OwnPlanner as OwnPlanner
 from .specs import RobotSpec as RobotSpec
+from .statistics import Statistics as Statistics
 from .summary import summarise as summarise
+from .tables import columns as columns

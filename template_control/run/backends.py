@@ -37,7 +37,6 @@ from template_control.robot.start import (
     state_in,
 )
 from template_control.run.options import HeadingCommand, SimulationOptions
-from template_control.run.recorder import FloatingRecorder, Recorder
 from template_control.run.sensing import (
     FilteredSensors,
     ForeseeingSensors,
@@ -109,15 +108,6 @@ class RobotBackend(ABC):
 
         Args:
             along, lateral: forward, and to the left [N].
-        """
-
-    @abstractmethod
-    def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
-        """What records the run.
-
-        Args:
-            controller: of the robot.
-            every: keeps every n-th tick.
         """
 
 
@@ -227,10 +217,6 @@ class PlanarBackend(RobotBackend):
     def force(self, along: float, lateral: float) -> tuple[float, ...]:
         """See :meth:`RobotBackend.force`: what holds the robot bears the rest."""
         return (along,)
-
-    def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
-        """See :meth:`RobotBackend.recorder`."""
-        return Recorder(controller, every)
 
 
 _REAR = 0  # the left foot stands where a run begins
@@ -343,7 +329,3 @@ class FloatingBackend(RobotBackend):
         """See :meth:`RobotBackend.force`: along the world's x and y; forward is the heading."""
         cosine, sine = cos(self.robot.heading), sin(self.robot.heading)
         return cosine * along - sine * lateral, sine * along + cosine * lateral
-
-    def recorder(self, controller: EmbeddingController, every: int) -> Recorder:
-        """See :meth:`RobotBackend.recorder`."""
-        return FloatingRecorder(controller, every)

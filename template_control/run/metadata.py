@@ -12,17 +12,16 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import plant_name
 from template_control.run.options import SimulationOptions
-from template_control.run.recorder import Recorder
+from template_control.run.statistics import Statistics
 from template_control.slip.gaits.gait import flight_share
 from template_control.storage import to_jsonable
 
 
-def about(controller: EmbeddingController, o: SimulationOptions) -> dict[str, Any]:
-    """What is known of a run before its first tick.
+def about(controller: EmbeddingController) -> dict[str, Any]:
+    """What is known of a robot and its controller before a run's first tick.
 
     Args:
         controller: which has started.
-        o: how the run goes.
     """
     robot = controller.robot
     nodes = controller.supervisor.automaton.nodes
@@ -40,37 +39,37 @@ def about(controller: EmbeddingController, o: SimulationOptions) -> dict[str, An
         "phases": [node.phase.name for node in nodes],
         "stiffness_slots": [[node.rear, node.front] for node in nodes],
         **_gait(controller),
-        "plant": plant_name(o.plant),
-        "options": _told(o),
+        "plant": "",
+        "options": {"plant": {}, "embedding": controller.options},
     }
     return {name: to_jsonable(value, _described) for name, value in found.items()}
 
 
-def outcome(recorder: Recorder, time_step: float, reason: str, seconds: float) -> dict[str, Any]:
-    """What is known only when a run has ended.
+def conditions(o: SimulationOptions) -> dict[str, Any]:
+    """How a simulation goes; a plant of one's own is not data.
 
     Args:
-        recorder: of the run.
-        time_step: of the plant [s].
-        reason: why the robot fell, "" if it did not.
-        seconds: of wall-clock time that the run took.
+        o: the options.
+    """
+    told: dict[str, Any] = to_jsonable(o, _described)
+    if not isinstance(o.plant, PlantOptions | IdealOptions):
+        told["plant"] = {}
+    return {"plant": plant_name(o.plant), "options": told}
+
+
+def outcome(controller: EmbeddingController, figures: Statistics) -> dict[str, Any]:
+    """What is known of a run so far.
+
+    Args:
+        controller: of the run.
+        figures: over its ticks.
     """
     found = {
-        **_gait(recorder.controller),
-        "fall_reason": reason,
-        "arrived": recorder.controller.supervisor.arrived,
-        "wall_seconds": seconds,
-        "duration": recorder.ticks * time_step,
-        "ticks": recorder.ticks,
-        "summary": recorder.summary(),
+        **_gait(controller),
+        "arrived": controller.supervisor.arrived,
+        "summary": figures,
     }
     return {name: to_jsonable(value, _described) for name, value in found.items()}
-
-
-def _told(o: SimulationOptions) -> dict[str, Any]:
-    """The options as data; a plant of one's own is not data."""
-    told: dict[str, Any] = to_jsonable(o, _described)
-    return told if isinstance(o.plant, PlantOptions | IdealOptions) else {**told, "plant": {}}
 
 
 def _gait(controller: EmbeddingController) -> dict[str, Any]:

@@ -17,7 +17,9 @@ from template_control import settings, storage
 from template_control.checks.checked import checked
 from template_control.errors import RecordError, TemplateControlError
 from template_control.plant.terrain import GroundStep, Terrain
-from template_control.run.data_frame import to_dataframe
+from template_control.run.facts import Facts
+from template_control.run.tables import to_dataframe, to_xarray
+from template_control.slip.automaton.vocabulary import Phase
 
 Array = NDArray[np.float64]
 
@@ -59,18 +61,25 @@ LAYOUT = storage.Layout(
         "plan_seconds": "S",
     },
     metadata={
-        **dict.fromkeys(("robot", "gait", "fall_reason"), (str,)),
-        **dict.fromkeys(("mass", "trunk_com", "duration", "wall_seconds"), (float, int)),
-        **dict.fromkeys(("joints", "torque_limit", "feet", "legs"), (list,)),
+        **dict.fromkeys(("robot", "urdf", "gait", "planner", "plant"), (str,)),
+        **dict.fromkeys(("fall_reason", "error"), (str,)),
+        **dict.fromkeys(("arrived", "interrupted"), (bool,)),
+        **dict.fromkeys(("mass", "trunk_com", "duration", "wall_seconds", "ticks"), (float, int)),
+        **dict.fromkeys(("gait_mean_speed", "gait_flight_share"), (float, int)),
+        **dict.fromkeys(("joints", "torque_limit", "velocity_limit", "feet", "legs"), (list,)),
         **dict.fromkeys(("nodes", "phases", "stiffness_slots", "sections", "strides"), (list,)),
+        **dict.fromkeys(("gait_state", "gait_controls"), (list,)),
         **dict.fromkeys(("template", "options", "summary"), (dict,)),
     },
 )
 
 
-@dataclass(frozen=True)
-class Record:
+@dataclass(frozen=True, repr=False)
+class Record(Facts):
     """A run of a robot; T samples, S sections, SI units, world frame with y up.
+
+    What holds for the run as a whole, such as ``fall_reason``, ``summary`` and ``joints``, are the
+    attributes of :class:`~template_control.run.facts.Facts`.
 
     Attributes:
         time: (T,) [s].
@@ -85,18 +94,17 @@ class Record:
         contact_force: (T, 2, 2) the ground's force on each foot during the step before the
             sample, averaged over the physics step [N].
         template_force: (T, 2, 2) the template's leg forces, rear and front [N].
-        node: (T,) index into ``metadata["nodes"]``.
+        node: (T,) index into ``nodes``.
         rear: (T,) index of the rear stance foot.
         solved: (T,) False where the QP was not solved.
         swing_reference: (T, 2, 2) position of each foot's reference, NaN where it has none.
         push: (T,) disturbance on the trunk, forward positive; of a free robot its size, negative
             where it acts backward [N].
-        section: (S,) index into ``metadata["sections"]`` of each section reached, the start's
-            included.
+        section: (S,) index into ``sections`` of each section reached, the start's included.
         section_time: (S,) of each.
         section_state: (S, 3) dx/dt (angular-momentum based where the phase before it is), y
             over the stance foot's ground, dy/dt, as measured.
-        stride: (S,) index into ``metadata["strides"]`` of the kind of stride that begins there.
+        stride: (S,) index into ``strides`` of the kind of stride that begins there.
         section_target: (S, 3) state that the stride is to end in.
         section_accepted: (S,) dx/dt that the planner took for the target's: another one where the
             wanted change could not be had [m/s].
@@ -110,7 +118,7 @@ class Record:
         tick_seconds, solve_seconds: (ticks,) wall-clock time of every control tick, and of ProxQP
             in it: 0 where no limit acts, and it was not needed.
         plan_seconds: (S,) wall-clock time of every plan.
-        metadata: robot, gait, options, joint names, limits, outcome and summary figures.
+        metadata: the facts as the file has them.
     """
 
     time: Array
@@ -149,7 +157,7 @@ class Record:
     plan_seconds: Array
     metadata: dict[str, Any]
 
-    file_format: ClassVar[str] = "template-control run 5"
+    file_format: ClassVar[str] = "template-control run 6"
     layout: ClassVar[storage.Layout] = LAYOUT
 
     def check_shown(self) -> None:
@@ -178,10 +186,18 @@ class Record:
         """Completed steps: strides from one section to the next."""
         return len(self.section_time) - 1
 
+    def in_phase(self, phase: Phase) -> NDArray[np.bool_]:
+        """(T,) whether the controller was in a phase.
+
+        Args:
+            phase: such as ``Phase.SS``.
+        """
+        return np.array([other is phase for other in self.phases])[self.node]
+
     @property
-    def fell(self) -> bool:
-        """True where the run ended in a fall."""
-        return bool(self.metadata["fall_reason"])
+    def kinds_of_stride(self) -> list[str]:
+        """(S,) kind of the stride that begins at each section."""
+        return [self.strides[i] for i in self.stride]
 
     @property
     def com_error(self) -> Array:
@@ -191,19 +207,18 @@ class Record:
     @property
     def ground(self) -> Terrain:
         """The ground the robot went on; level where the plant was one of the user's own."""
-        plant = self.metadata["options"]["plant"]
+        plant = self.options["plant"]
         if plant.get("ground_step"):
             return GroundStep(**plant["ground_step"]).terrain
         return settings.from_table(Terrain, plant.get("terrain") or {})
 
     def __repr__(self) -> str:
-        m = self.metadata
-        end = f"; fell: {m['fall_reason']}" if self.fell else ""
-        end += "; interrupted" if m.get("interrupted") else ""
-        end += f"; ended by an error: {m['error']}" if m.get("error") else ""
+        end = f"; fell: {self.fall_reason}" if self.fell else ""
+        end += "; interrupted" if self.interrupted else ""
+        end += f"; ended by an error: {self.error}" if self.error else ""
         return (
-            f"<Record of {m['robot']}, gait {m['gait']}: {self.steps} steps in"
-            f" {m['duration']:.2f} s, {len(self.time)} samples{end}>"
+            f"<Record of {self.robot_name}, gait {self.gait_name}: {self.steps} steps in"
+            f" {self.duration:.2f} s, {len(self.time)} samples{end}>"
         )
 
     def to_dataframe(self) -> Any:
@@ -217,6 +232,20 @@ class Record:
             MissingPackageError: if pandas is not installed.
         """
         return to_dataframe(self)
+
+    def to_xarray(self) -> Any:
+        """The run as an xarray ``Dataset``: every array with its dimensions, labels and units.
+
+        Dimensions are ``time``, ``section`` and ``tick``, and ``joint``, ``foot``, ``leg``,
+        ``axis`` and the like, whose coordinates hold the names. Each variable's
+        ``attrs["units"]`` is its SI unit; where entries differ, their names' coordinate has a
+        coordinate of units beside it. ``attrs`` of the set holds the facts of the run that are
+        numbers or texts.
+
+        Raises:
+            MissingPackageError: if xarray is not installed.
+        """
+        return to_xarray(self)
 
     def plot(self, figure: str = "stick_diagram") -> Any:
         """Draw one figure of the run, as :func:`template_control.plot` does.
@@ -241,19 +270,18 @@ class Record:
         Raises:
             RecordError: if the file cannot be written.
         """
-        return storage.save(
-            self, path, self.file_format, quick=bool(self.metadata.get("interrupted"))
-        )
+        return storage.save(self, path, self.file_format, quick=self.interrupted)
 
     @classmethod
     @checked
     def load(cls, path: str | Path) -> Self:
-        """Read a run that :meth:`save` wrote.
+        """Read a run that :meth:`save` wrote, of a floating-base robot too.
 
         Raises:
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
-        return storage.load(cls, path, cls.file_format, cls.layout)
+        kind = next((k for k in cls.__subclasses__() if _holds(path, k)), cls)
+        return storage.load(kind, path, kind.file_format, kind.layout)
 
 
 class RunInterrupted(KeyboardInterrupt):
@@ -339,7 +367,7 @@ class FloatingRecord(Record):
             none [m].
     """
 
-    file_format: ClassVar[str] = "template-control free run 1"
+    file_format: ClassVar[str] = "template-control free run 2"
     layout: ClassVar[storage.Layout] = _FLOATING_LAYOUT
 
     space_com: Array
@@ -351,9 +379,18 @@ class FloatingRecord(Record):
     side_reference: Array
 
 
+def _holds(path: str | Path, kind: type[Record]) -> bool:
+    """Whether a file has all fields of a kind of run; False where it cannot be read."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return set(data.files) >= set(kind.layout.fields)
+    except Exception:  # a damaged file has any of a dozen; its reader tells
+        return False
+
+
 @checked
 def load_record(path: str | Path) -> Record:
-    """Read a run, of a planar robot or of a free one.
+    """Read a run, of a planar robot or of a floating-base one.
 
     Args:
         path: of the file.
@@ -361,13 +398,4 @@ def load_record(path: str | Path) -> Record:
     Raises:
         RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
     """
-    return FloatingRecord.load(path) if _in_space(path) else Record.load(path)
-
-
-def _in_space(path: str | Path) -> bool:
-    """Whether the file has what only a run in space has; False where it cannot be read."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return "space_com" in data.files
-    except Exception:  # a damaged file has any of a dozen; its reader tells
-        return False
+    return Record.load(path)

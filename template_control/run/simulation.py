@@ -28,10 +28,10 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.backends import FloatingBackend, PlanarBackend, RobotBackend
 from template_control.run.failures import QpFailures
-from template_control.run.metadata import about, outcome
+from template_control.run.metadata import conditions
 from template_control.run.options import Push, SimulationOptions, check_pushes
 from template_control.run.record import Record, RunInterrupted, keep, one_line
-from template_control.run.recorder import Recorder, Truth
+from template_control.run.recorder import Recorder
 from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
@@ -142,7 +142,6 @@ def simulate(
     if isinstance(route, Scenario):
         route = robot_route(robot, route)
     controller = _controller(backend, route, planners, o.tuning(free), automaton)
-    recorder = backend.recorder(controller, o.record_every)
     last = _last_step(controller, o)
     parts = (route, controller.supervisor.route, *controller.supervisor.planners.values())
     with exclusive(robot, *parts):
@@ -150,19 +149,15 @@ def simulate(
         q, v = backend.start(controller, o)
         senses = backend.senses(controller, o)
         _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
-        # Before the run, which would be lost if this failed after it.
-        metadata = about(controller, o)
-        begin = time.perf_counter()
+        recorder = Recorder(controller, o.record_every, conditions(o))
 
         def ended(reason: str = "", stop: BaseException | None = None) -> Record:
-            seconds = time.perf_counter() - begin
             if reason:
                 _LOG.warning("%s fell: %s", robot.name, reason)
-            end = metadata | outcome(recorder, o.plant.time_step, reason, seconds)
-            end["interrupted"] = isinstance(stop, KeyboardInterrupt)
-            end["error"] = "" if stop is None or end["interrupted"] else one_line(stop)
-            record = recorder.record(end)
-            _LOG.info("%r in %.2f s of wall-clock time", record, seconds)
+            interrupted = isinstance(stop, KeyboardInterrupt)
+            error = "" if stop is None or interrupted else one_line(stop)
+            record = recorder.record(reason, interrupted=interrupted, error=error)
+            _LOG.info("%r in %.2f s of wall-clock time", record, record.wall_seconds)
             return record
 
         with backend.plant(o.plant) as plant:
@@ -295,14 +290,12 @@ def _loop(
         seconds = time.perf_counter() - start
         failures.tick(solution.solved, now)
         senses.expect(solution.acceleration)
-        if not senses.exact or controller.frame.angle != 0.0:
-            robot.update(q, v)  # what is recorded is true, and in the world's axes
         if len(begun) < len(controller.reports):
             # A step that changes into another stride keeps its pushes where they were.
             begun.append((controller.reports[-1].time, controller.planner.gait.step_duration))
         along, lateral = _push(o.pushes, begun, now)
         size = copysign(hypot(along, lateral), along)
-        recorder.tick(Truth(now, q, v, forces, size), solution, seconds)
+        recorder.tick(q, v, forces, solution, time=now, push=size, seconds=seconds)
         reason = _fallen(plant, controller, q, o, now)
         if reason:
             return f"{reason} at {now:.3f} s, in step {done + 1}"

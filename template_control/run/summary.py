@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from template_control.slip.maps.section import section_of
 
 Array = NDArray[np.float64]
 
-STRIDES = {
+STRIDES: dict[str, str] = {
     StrideKind.WALK: "walking",
     StrideKind.WALK_TO_RUN: "walk to run",
     StrideKind.RUN: "running",
@@ -23,7 +24,7 @@ STRIDES = {
 }
 """The kinds of stride in words."""
 
-STANDING = {
+STANDING: dict[str, str] = {
     StrideKind.STAND: "standing",
     StrideKind.STAND_TO_WALK: "stand to walk",
     StrideKind.WALK_TO_STAND: "walk to stand",
@@ -33,7 +34,7 @@ STANDING = {
 }
 """The kinds of stride of a scenario that stands."""
 
-OTHERS = {StrideKind.WALK_PUSH_OFF: "walking with push-off", **STANDING}
+OTHERS: dict[str, str] = {StrideKind.WALK_PUSH_OFF: "walking with push-off", **STANDING}
 """The kinds of stride that only some runs have."""
 
 _STATE = ("speed", "height", "vertical_speed")
@@ -44,7 +45,7 @@ _NEAR = 0.02  # of sqrt(g l0): a plan that ends so near the wanted speed aims at
 
 def _sections(record: Record) -> dict[str, Any]:
     """Target of the last section's kind, and the mean of the last strides that ended there."""
-    names = record.metadata["sections"]
+    names = record.sections
     last = record.section[-1]
     kind = section_of(Event[names[last]])
     here = record.section_state[1:][record.section[1:] == last][-_LAST:]
@@ -67,7 +68,7 @@ def completed_strides(record: Record) -> dict[str, int]:
     Args:
         record: the run.
     """
-    kinds = Counter(record.metadata["strides"][i] for i in record.stride[:-1])
+    kinds = Counter(record.kinds_of_stride[:-1])
     names = STRIDES | OTHERS
     return {names.get(kind, kind): count for kind, count in kinds.items()}
 
@@ -77,7 +78,7 @@ def _flight_share(record: Record) -> dict[str, float | None]:
     touching = record.contact_force[:, :, 1] > 0.0
     return {
         "robot": float(np.mean(~touching.any(axis=1))),
-        "template": record.metadata.get("gait_flight_share"),  # earlier versions did not keep it
+        "template": record.gait_flight_share,
     }
 
 
@@ -88,10 +89,7 @@ def _duty_factor(record: Record) -> float:
 
 def _cost_of_transport(record: Record, walked: float) -> float | None:
     """Work of the joints, positive and negative alike, over m g and distance."""
-    m = record.metadata
-    work = m["summary"].get("joint_work")  # earlier versions did not keep it
-    weight = m["mass"] * m["template"]["gravity"]
-    return work / (weight * walked) if work is not None and walked > 0.0 else None
+    return record.summary.joint_work / (record.weight * walked) if walked > 0.0 else None
 
 
 def _speed_error(record: Record) -> float | None:
@@ -117,9 +115,8 @@ def _nearest(record: Record) -> dict[str, float]:
 
     That is where the wanted speed is further away than a stride can lead.
     """
-    template = record.metadata["template"]
     short = np.abs(record.section_target[:-1, 0] - record.section_predicted[:-1, 0])
-    near = _NEAR * float(np.sqrt(template["gravity"] * template["rest_length"]))
+    near = _NEAR * record.template.speed_unit
     return {"strides": int(np.sum(short > near)), "most": float(short.max(initial=0.0))}
 
 
@@ -159,34 +156,35 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         (the same over the ticks in which a limit acts, so that ProxQP works, and their share),
         plan_seconds (median, p99), real_time_factor, steps_not_nominal (plans that left the
         planner's own law),
-        record; of a run in space also joint_angle (per joint least and most, and the range's lower
-        and upper [rad]) and what :func:`~floating_summary` tells.
+        joint_angle (per joint least and most, and the range's lower and upper [rad]), record; of a
+        floating-base run also what :func:`~floating_summary` tells.
     """
-    m = record.metadata
-    duration = m["duration"]
+    duration = record.duration
+    counted: dict[str, Any] = asdict(record.summary)
+    del counted["joint_work"]
     walked = float(record.com[-1, 0] - record.com[0, 0])
     return {
-        "robot": m["robot"],
-        "gait": m["gait"],
+        "robot": record.robot_name,
+        "gait": record.gait_name,
         "steps": record.steps,
         "strides": completed_strides(record),
         "fell": record.fell,
-        "fall_reason": m["fall_reason"] or None,
+        "fall_reason": record.fall_reason or None,
         "duration": duration,
         "mean_speed": walked / max(float(record.time[-1]), 1e-9),
         **_sections(record),
         "speed_error_rms": _speed_error(record),
         "accepted_speed": _accepted(record),
         "nearest_speed_taken": _nearest(record),
-        **{name: value for name, value in m["summary"].items() if name != "joint_work"},
-        "qp_failed_share": m["summary"]["qp_failures"] / max(len(record.tick_seconds), 1),
+        **counted,
+        "qp_failed_share": record.summary.qp_failures / max(len(record.tick_seconds), 1),
         "cost_of_transport": _cost_of_transport(record, walked),
         "flight_share": _flight_share(record),
         "duty_factor": _duty_factor(record),
         "control_tick_seconds": _quantiles(record.tick_seconds),
         "qp_solve_seconds": _solving(record.solve_seconds),
         "plan_seconds": _quantiles(record.plan_seconds),
-        "real_time_factor": duration / m["wall_seconds"],
+        "real_time_factor": duration / record.wall_seconds,
         "steps_not_nominal": int(np.sum(~record.section_nominal)),
         **(floating_summary(record) if isinstance(record, FloatingRecord) else {}),
         "record": path,
@@ -234,8 +232,7 @@ def step_widths(record: FloatingRecord) -> Array:
     Args:
         record: the run.
     """
-    double = np.array([phase == Phase.DS.name for phase in record.metadata["phases"]])[record.node]
-    begun = np.flatnonzero(np.diff(double.astype(np.int8)) == 1) + 1
+    begun = np.flatnonzero(np.diff(record.in_phase(Phase.DS).astype(np.int8)) == 1) + 1
     apart = record.space_foot[begun, 0, :2] - record.space_foot[begun, 1, :2]
     angle = record.heading[begun]
     return np.asarray(np.cos(angle) * apart[:, 1] - np.sin(angle) * apart[:, 0])

@@ -48,20 +48,20 @@ def joint_speeds(record: Record, seconds: float = WINDOW) -> Figure:
         seconds: how much of its end is shown [s].
     """
     w = window(record, seconds)
-    names = record.metadata["joints"]
-    limits = record.metadata.get("velocity_limit", ())  # earlier versions did not keep it
+    names = record.joints
+    limits = record.velocity_limit
     speed = record.v[:, -len(names) :]
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
-    panels = figure.subplots(len(record.metadata["legs"]), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, leg in zip(panels, record.metadata["legs"], strict=True):
+    panels = figure.subplots(len(record.legs), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, leg in zip(panels, record.legs, strict=True):
         for joint, color in zip(leg, (LEFT, RIGHT, COM, TRUNK), strict=False):
             axes.plot(record.time[w], speed[w, joint], color=color, label=names[joint])
-            for sign in (-1.0, 1.0) if limits else ():
+            for sign in (-1.0, 1.0):
                 axes.axhline(sign * limits[joint], color=color, linestyle=":", linewidth=0.9)
         shade(axes, record, w)
         axes.set_ylabel("speed [rad/s]")
         axes.legend(loc="upper right")
-    panels[0].set_title(f"{as_text(record.metadata['robot'])}: joint speeds, limits dotted")
+    panels[0].set_title(f"{as_text(record.robot_name)}: joint speeds, limits dotted")
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -72,7 +72,7 @@ def apex_return(record: Record) -> Figure:
     A gait that holds ends on the diagonal, at the target. A pair of points on either side of it
     is a limp: the state alternates from step to step.
     """
-    apex = record.section == record.metadata["sections"].index(Event.APEX.name)
+    apex = record.section == record.sections.index(Event.APEX.name)
     follows = apex[:-1] & apex[1:]
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     shown = zip(figure.subplots(1, 2), (0, 1), ("dx/dt", "y"), ("m/s", "m"), strict=True)
@@ -89,7 +89,7 @@ def apex_return(record: Record) -> Figure:
         axes.set(xlabel=f"{name} at an apex [{unit}]", ylabel=f"{name} at the next [{unit}]")
         axes.legend(loc="upper left")
     figure.colorbar(points, label="step")
-    figure.suptitle(f"{as_text(record.metadata['robot'])}: from apex to apex")
+    figure.suptitle(f"{as_text(record.robot_name)}: from apex to apex")
     return figure
 
 
@@ -112,9 +112,7 @@ def turning(record: Record, seconds: float = WINDOW) -> Figure:
     lower.set_xlabel("time [s]")
     for axes in (upper, lower):
         shade(axes, record, w)
-    upper.set_title(
-        f"{as_text(record.metadata['robot'])}: trunk and angular momentum (forward positive)"
-    )
+    upper.set_title(f"{as_text(record.robot_name)}: trunk and angular momentum (forward positive)")
     return figure
 
 
@@ -131,7 +129,7 @@ def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
     Returns:
         (n, 2) x and y in the world in the middle of each stance [m]; (n,) times [s].
     """
-    weight = record.metadata["mass"] * record.metadata["template"]["gravity"]
+    weight = record.weight
     stands = record.space_force[:, foot, 2] > 0.02 * weight
     edges = np.flatnonzero(np.diff(np.concatenate(([0], stands.astype(np.int8), [0]))))
     spans = [(a, b) for a, b in edges.reshape(-1, 2) if record.time[b - 1] - record.time[a] > 0.05]
@@ -157,7 +155,7 @@ def from_above(record: FloatingRecord, seconds: float = 4.0) -> Figure:
             axes.plot(shown[:, 0], shown[:, 1], ".", color=color, markersize=4.0, label=name)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_ylabel("y, to the left [m]")
-    whole.set_title(f"{as_text(record.metadata['robot'])}: path from above")
+    whole.set_title(f"{as_text(record.robot_name)}: path from above")
     whole.legend(loc="best")
     end.set_xlabel("x [m]")
     return figure
@@ -181,7 +179,7 @@ def lateral_portrait(record: FloatingRecord, seconds: float = 10.0) -> Figure:
     axes.axvline(0.0, color="0.8", linewidth=0.6, zorder=0)
     axes.set_xlabel("y of the CoM from the stance foot [mm]")
     axes.set_ylabel("dy/dt [m/s]")
-    axes.set_title(f"{as_text(record.metadata['robot'])}: sway in single stance")
+    axes.set_title(f"{as_text(record.robot_name)}: sway in single stance")
     axes.legend(loc="best")
     return figure
 
@@ -201,7 +199,7 @@ def attitude(record: FloatingRecord, seconds: float = 4.0) -> Figure:
         _line(panels[row, 0], record.time, angle, f"{name} [rad]")
         _line(panels[row, 1], record.time[w], angle[w], "")
         shade(panels[row, 1], record, w)
-    panels[0, 0].set_title(f"{as_text(record.metadata['robot'])}: trunk in the heading frame")
+    panels[0, 0].set_title(f"{as_text(record.robot_name)}: trunk in the heading frame")
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     return figure
@@ -244,13 +242,13 @@ def stick_diagram(record: Record, seconds: float = WINDOW, interval: float = 0.0
     axes = figure.subplots()
     time = record.time[w]
     rows = np.searchsorted(time, np.arange(time[0], time[-1], interval)) + (w.start or 0)
-    height = 2.0 * record.metadata["trunk_com"]
+    height = 2.0 * record.trunk_com
     for row in rows:
         q = record.q[row]
         hip = q[:2]
         top = hip + height * np.array([np.sin(q[2]), np.cos(q[2])])
         axes.plot(*np.stack((hip, top)).T, color=TRUNK, linewidth=1.2, alpha=0.55)
-        for foot, leg in enumerate(record.metadata["legs"]):
+        for foot, leg in enumerate(record.legs):
             points = np.vstack((record.joint[row, leg], record.foot[row, foot]))
             axes.plot(*points.T, color=_LEGS[foot], linewidth=1.0, alpha=0.65)
     template = record.template_com[w]
@@ -260,7 +258,7 @@ def stick_diagram(record: Record, seconds: float = WINDOW, interval: float = 0.0
         axes.plot([], [], color=_LEGS[foot], label=name)
     _ground(axes, record)
     axes.set(xlabel="x [m]", ylabel="y [m]")
-    axes.set_title(f"{as_text(record.metadata['robot'])}: stick diagram")
+    axes.set_title(f"{as_text(record.robot_name)}: stick diagram")
     axes.set_aspect("equal")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4, frameon=False)
     return figure
@@ -294,7 +292,7 @@ def com_tracking(record: Record, seconds: float = WINDOW) -> Figure:
     for axes in (upper, middle, lower):
         shade(axes, record, w)
         axes.legend(loc="upper right")
-    upper.set_title(f"{as_text(record.metadata['robot'])}: centre of mass (single stance shaded)")
+    upper.set_title(f"{as_text(record.robot_name)}: centre of mass (single stance shaded)")
     return figure
 
 
@@ -306,10 +304,10 @@ def joint_torques(record: Record, seconds: float = WINDOW) -> Figure:
         seconds: how much of its end is shown [s].
     """
     w = window(record, seconds)
-    names, limits = record.metadata["joints"], record.metadata["torque_limit"]
+    names, limits = record.joints, record.torque_limit
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
-    panels = figure.subplots(len(record.metadata["legs"]), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, leg in zip(panels, record.metadata["legs"], strict=True):
+    panels = figure.subplots(len(record.legs), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, leg in zip(panels, record.legs, strict=True):
         for joint, color in zip(leg, (LEFT, RIGHT, COM, TRUNK), strict=False):
             axes.plot(record.time[w], record.torque[w, joint], color=color, label=names[joint])
             for sign in (-1.0, 1.0):
@@ -317,7 +315,7 @@ def joint_torques(record: Record, seconds: float = WINDOW) -> Figure:
         shade(axes, record, w)
         axes.set_ylabel("torque [N m]")
         axes.legend(loc="upper right")
-    panels[0].set_title(f"{as_text(record.metadata['robot'])}: joint torques, limits dotted")
+    panels[0].set_title(f"{as_text(record.robot_name)}: joint torques, limits dotted")
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -353,7 +351,7 @@ def ground_forces(record: Record, seconds: float = WINDOW) -> Figure:
         shade(axes, record, w)
         axes.set_ylabel(f"{name} force [N]")
         axes.legend(loc="upper right")
-    panels[0].set_title(f"{as_text(record.metadata['robot'])}: ground reaction forces")
+    panels[0].set_title(f"{as_text(record.robot_name)}: ground reaction forces")
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -384,7 +382,7 @@ def figures_of(record: Record) -> dict[str, Callable[..., Figure]]:
     """
     if isinstance(record, FloatingRecord):
         return {**{name: FIGURES[name] for name in _OF_ANY}, **FREE_FIGURES}
-    names = [record.metadata["sections"][i] for i in record.section]
+    names = [record.sections[i] for i in record.section]
     if (Event.APEX.name, Event.APEX.name) in pairwise(names):
         return FIGURES
     return {name: draw for name, draw in FIGURES.items() if draw is not apex_return}

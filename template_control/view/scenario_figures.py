@@ -161,7 +161,10 @@ def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Pa
 
 
 _WHOLE = slice(None)
-_TRANSITIONS = {StrideKind.WALK_TO_RUN: "walk to run", StrideKind.RUN_TO_WALK: "run to walk"}
+_TRANSITIONS: dict[str, str] = {
+    StrideKind.WALK_TO_RUN: "walk to run",
+    StrideKind.RUN_TO_WALK: "run to walk",
+}
 
 
 def _footholds(record: Record) -> Array:
@@ -182,7 +185,7 @@ def _stiffnesses(record: Record) -> Array:
     out = np.full((len(record.time), 2), np.nan)
     for index in np.unique(record.node):
         on = record.node == index
-        for leg, slot in enumerate(record.metadata["stiffness_slots"][index]):
+        for leg, slot in enumerate(record.stiffness_slots[index]):
             if slot is not None:
                 out[on, leg] = record.section_controls[stride[on], slot]
     return out
@@ -190,7 +193,7 @@ def _stiffnesses(record: Record) -> Array:
 
 def _template_begins(record: Record) -> tuple[float, float]:
     """When [s] and where [m] the robot comes to the first stride that the template makes, too."""
-    kinds = [record.metadata["strides"][i] for i in record.stride]
+    kinds = record.kinds_of_stride
     first = next((i for i, kind in enumerate(kinds) if kind not in STANDING), 0)
     if first == 0:
         return 0.0, 0.0
@@ -238,10 +241,10 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
         values = 1e-3 * _stiffnesses(record)[:, leg]
         stiffness.plot(record.time, values, color=color, linewidth=1.0, label=f"{name} leg")
     stiffness.set_ylabel("template's leg\nstiffness [kN/m]")
-    for joint, name in enumerate(record.metadata["joints"]):
+    for joint, name in enumerate(record.joints):
         color = (LEFT, RIGHT, COM, TRUNK)[joint % 4]
         torque.plot(record.time, record.torque[:, joint], color=color, linewidth=0.6, label=name)
-    for limit in set(record.metadata["torque_limit"]):
+    for limit in set(record.torque_limit):
         for sign in (-1.0, 1.0):
             torque.axhline(sign * limit, color="0.4", linestyle=":", linewidth=0.9)
     torque.set(xlabel="time [s]", ylabel="torque [N m]")
@@ -252,7 +255,7 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
     path.legend(loc="center right", fontsize=7, ncols=3)
     for axes in (speed, stiffness, torque):
         axes.legend(loc="upper right", fontsize=7, ncols=2)
-    name = as_text(record.metadata["robot"])
+    name = as_text(record.robot_name)
     speed.set_title(f"{name} through its scenario (single stance shaded)")
     return figure
 
@@ -264,7 +267,7 @@ def _mark_transitions(axes: Axes, record: Record) -> None:
 
 def _transitions(record: Record) -> list[tuple[float, float, str]]:
     """Begin and end of each transition that was completed [s], and its name."""
-    kinds = [record.metadata["strides"][i] for i in record.stride[:-1]]
+    kinds = record.kinds_of_stride[:-1]
     times = record.section_time
     return [
         (float(times[i]), float(times[i + 1]), _TRANSITIONS[kind])
@@ -280,9 +283,9 @@ def transition_energies(record: Record) -> Figure:
         record: the run; it has one transition at least.
     """
     transitions = _transitions(record)
-    p = record.metadata["template"]
-    forward = 0.5 * p["mass"] * record.com_velocity[:, 0] ** 2
-    gravity = p["mass"] * p["gravity"] * record.com[:, 1]
+    p = record.template
+    forward = 0.5 * p.mass * record.com_velocity[:, 0] ** 2
+    gravity = p.mass * p.gravity * record.com[:, 1]
     total = template_energies(record)["total"]
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
     panels = figure.subplots(1, len(transitions), squeeze=False)[0]

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.maps.section import PADDED, VLO, Section, section_of
-from template_control.slip.parameters import SlipParameters
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text, shade, window
 
 Array = NDArray[np.float64]
@@ -20,24 +19,20 @@ Array = NDArray[np.float64]
 _MOST_POINTS = 20_000  # of a line that shows a whole run
 
 
-def _parameters(record: Record) -> SlipParameters:
-    return SlipParameters(**record.metadata["template"])
-
-
 def _sections(record: Record) -> list[Section]:
     """The kind of each section of the run."""
-    kinds = [section_of(Event[name]) for name in record.metadata["sections"]]
+    kinds = [section_of(Event[name]) for name in record.sections]
     return [kinds[i] for i in record.section]
 
 
 def _where(record: Record) -> str:
     """The sections of the run in words, such as "VLO"."""
-    return " and ".join(record.metadata["sections"])
+    return " and ".join(record.sections)
 
 
 def _energies_at(record: Record, sections: list[Section], states: Array) -> Array:
     """Energy of states (n, 3) at ``sections`` (n) [J]."""
-    p = _parameters(record)
+    p = record.template
     return np.array([s.energy(p, z[: s.dimension]) for s, z in zip(sections, states, strict=True)])
 
 
@@ -96,7 +91,7 @@ def phase_portrait(record: Record) -> Figure:
         axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=f"{where} of the gait")
     upright.set(xlabel="y [m]", ylabel="dy/dt [m/s]")
     forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
-    upright.set_title(f"{as_text(record.metadata['robot'])}: phase portrait", loc="left")
+    upright.set_title(f"{as_text(record.robot_name)}: phase portrait", loc="left")
     handles, labels = upright.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
     return figure
@@ -109,7 +104,7 @@ def tracking_errors(record: Record) -> Figure:
     w = _whole(record)
     error = 1e3 * record.com_error
     pitch = np.degrees(record.q[:, 2])
-    wanted = np.degrees(record.metadata["options"]["embedding"]["trunk_pitch"])
+    wanted = np.degrees(record.options["embedding"]["trunk_pitch"])
     for axes, values, reference, name, unit, color in (
         (panels[0], error[:, 0], 0.0, "x error", "mm", LEFT),
         (panels[1], error[:, 1], 0.0, "y error", "mm", RIGHT),
@@ -126,7 +121,7 @@ def tracking_errors(record: Record) -> Figure:
                 record.time, 0.0, 1.0, where=(record.push != 0.0).tolist(),
                 transform=axes.get_xaxis_transform(), color=RIGHT, alpha=0.25, linewidth=0,
             )  # fmt: skip
-    title = f"{as_text(record.metadata['robot'])}: template less robot, and trunk"
+    title = f"{as_text(record.robot_name)}: template less robot, and trunk"
     if np.any(record.push):
         title += " (pushes shaded)"
     panels[0].set_title(title)
@@ -143,11 +138,11 @@ def template_energies(record: Record) -> dict[str, Array]:
     Returns:
         kinetic, gravity, spring, total.
     """
-    p = _parameters(record)
+    p = record.template
     step = np.maximum(np.searchsorted(record.section_time, record.time, side="right") - 1, 0)
     stiffness = np.zeros((len(record.time), 2))
     for index in np.unique(record.node):
-        slots = record.metadata["stiffness_slots"][index]
+        slots = record.stiffness_slots[index]
         on = record.node == index
         for leg, slot in enumerate(slots):
             # A template that touches down before the robot's foot does has both legs loaded
@@ -173,7 +168,7 @@ def template_energies(record: Record) -> dict[str, Array]:
 def energies(record: Record) -> Figure:
     """Energies of the robot's CoM and of the template, single stance shaded."""
     w = window(record)
-    p = _parameters(record)
+    p = record.template
     template = template_energies(record)
     kinetic = 0.5 * p.mass * np.sum(record.com_velocity**2, axis=1)
     gravity = p.mass * p.gravity * record.com[:, 1]
@@ -202,7 +197,7 @@ def energies(record: Record) -> Figure:
         shade(axes, record, w)
     handles, labels = lower.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    panels[0].set_title(f"{as_text(record.metadata['robot'])}: energies (single stance shaded)")
+    panels[0].set_title(f"{as_text(record.robot_name)}: energies (single stance shaded)")
     return figure
 
 
@@ -258,7 +253,7 @@ def section_states(record: Record) -> Figure:
         )  # fmt: skip
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    title = f"{as_text(record.metadata['robot'])}: at {_where(record)}"
+    title = f"{as_text(record.robot_name)}: at {_where(record)}"
     panels[0].set_title(f"{title} (dx/dt from the angular momentum where a foot stands)")
     panels[-1].set(xlabel="step", xlim=(-0.5, len(state) - 0.5))
     panels[-1].xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)

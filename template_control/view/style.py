@@ -37,8 +37,7 @@ def as_text(name: str) -> str:
 
 def single_stance(record: Record) -> NDArray[np.bool_]:
     """(T,) whether the robot's controller was in single stance."""
-    single = np.array([phase == Phase.SS.name for phase in record.metadata["phases"]])
-    return np.asarray(single[record.node])
+    return record.in_phase(Phase.SS)
 
 
 def shade(axes: Axes, record: Record, w: slice) -> None:

@@ -205,7 +205,7 @@ def test_a_push_within_a_step_is_answered_by_a_walk_or_by_a_run():
 
 
 def kinds(record):
-    return [record.metadata["strides"][i] for i in record.stride[:-1]]
+    return record.kinds_of_stride[:-1]
 
 
 @pytest.mark.slow(seconds=15)
@@ -215,14 +215,14 @@ def test_a_robot_that_is_pushed_too_hard_runs_and_walks_on(name, phase):
     planner = tc.LqrPlanner(tc.default_gait(robot))
     options = tc.SimulationOptions(steps=18, pushes=(tc.Push(80.0, step=3, phase=phase),))
     record = tc.simulate(robot, planner, options)
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     found = kinds(record)
     runs = found.count("r")
     walks = len(found) - runs - 2
     assert found == ["wp"] * 3 + ["wr"] + ["r"] * runs + ["rw"] + ["wp"] * (walks - 3)
     assert runs >= 4
     assert walks > 5
-    assert np.all(np.abs(record.torque) <= record.metadata["torque_limit"])
+    assert np.all(np.abs(record.torque) <= record.torque_limit)
     assert record.push.sum() * 1e-3 == pytest.approx(80.0, rel=1e-6), "it stays where it was"
     speed = record.section_state[:, 0]
     assert speed.max() > 1.9
@@ -237,7 +237,7 @@ def test_a_walk_of_a_scenario_runs_and_walks_on():
     route = robot_route(robot, scenario, push_off=False)  # steps with push-off know no run
     pushes = (tc.Push(60.0, step=2, phase=0.3),)
     record = tc.simulate(robot, route, tc.SimulationOptions(pushes=pushes))
-    assert record.metadata["arrived"]
+    assert record.arrived
     found = kinds(record)
     runs = found.count("r")
     assert runs >= 3

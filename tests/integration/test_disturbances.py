@@ -107,7 +107,7 @@ def test_a_wall_pushes_sideways(robot):
 def test_the_hip_is_measured_from_the_ground_below_it(robot, gait, monkeypatch):
     monkeypatch.setattr(PlantOptions, "ground_height", lambda _, x: 0.6 if x > 1.0 else 0.0)
     record = walk(robot, gait, steps=9)
-    assert "the hip was 0." in record.metadata["fall_reason"]
+    assert "the hip was 0." in record.fall_reason
     assert record.q[-2, 0] <= 1.0 < record.q[-1, 0]
 
 

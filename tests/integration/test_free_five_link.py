@@ -236,7 +236,7 @@ def test_it_walks_within_all_its_limits():
     gait = tc.robot_gait_for_speed(robot, 1.0)
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
     record = tc.simulate(robot, planner, tc.SimulationOptions(steps=20))
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
     assert record.steps == 20
     figures = summarise(record, None)
     assert figures["qp_failures"] == 0
@@ -280,11 +280,11 @@ def test_legs_of_four_hinges_walk(load, text, above, plant):
     assert [len(leg) for leg in robot.legs] == [4, 4]
     options = SimulationOptions(steps=8, embedding=FreeOptions(), plant=plant)
     record = tc.simulate(robot, tc.LqrPlanner(tc.default_gait(robot), FREE_PLANNER), options)
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
     yaw = [i for i, name in enumerate(robot.joint_names) if name.endswith("yaw")]
     assert [joint for joint, _ in robot.spare] == yaw
     assert np.abs(record.q[:, [7 + i for i in yaw]]).max() < 0.01
-    assert record.metadata["summary"]["qp_failures"] == 0
+    assert record.summary.qp_failures == 0
 
 
 def test_the_start_of_a_leg_of_four_hinges_moves_its_feet_as_wanted(load, text):

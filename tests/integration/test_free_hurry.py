@@ -80,9 +80,9 @@ def test_a_push_towards_the_foot_that_lands_is_taken():
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 1.0), tc.embedding.FREE_PLANNER)
     push = tc.Push(10.0, 4, 0.3, direction=radians(-90.0))
     record = tc.simulate(robot, planner, tc.SimulationOptions(steps=10, pushes=(push,)))
-    assert not record.fell, record.metadata["fall_reason"]
-    figures = record.metadata["summary"]
+    assert not record.fell, record.fall_reason
+    figures = record.summary
     assert figures["qp_failures"] == 0
-    for angle in figures["joint_angle"].values():
-        assert angle["lower"] < angle["least"] < angle["most"] < angle["upper"]
+    for angle in figures.joint_angle.values():
+        assert angle.lower < angle.least < angle.most < angle.upper
     assert abs(np.diff(record.section_time)[-1] - np.diff(record.section_time)[2]) < 0.05

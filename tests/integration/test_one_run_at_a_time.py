@@ -66,7 +66,7 @@ def test_a_second_run_of_one_route_is_as_the_first(robot):
     walk = Scenario((Segment("walk", 1.1, steps=2),), start=(1.1, 0.978, 0.0))
     route = robot_route(robot, walk, push_off=False)
     first, again = (tc.simulate(robot, route, OPTIONS) for _ in range(2))
-    assert first.metadata["arrived"]
+    assert first.arrived
     np.testing.assert_array_equal(again.q, first.q)
 
 

@@ -109,9 +109,9 @@ def test_a_planner_that_fails_ends_the_run_and_is_no_fall(
     record = recorded(caught.value)
     assert record.steps >= 1
     assert not record.fell
-    assert not record.metadata["interrupted"]
-    assert "Mine." in record.metadata["error"]
-    assert "\n" not in record.metadata["error"]
+    assert not record.interrupted
+    assert "Mine." in record.error
+    assert "\n" not in record.error
     assert len(record.time) > 50
 
 
@@ -212,7 +212,7 @@ def test_a_state_that_is_not_finite_is_a_fall(robot, default_gait, error):
     plant = Nowhere(IdealPlant(tc.load_robot("five-link"), IdealOptions()), 40, error)
     record = tc.simulate(robot, tc.LqrPlanner(default_gait), replace(OPTIONS, plant=plant))
     assert record.fell
-    assert re.match("the simulation diverged at 0.0", record.metadata["fall_reason"])
+    assert re.match("the simulation diverged at 0.0", record.fall_reason)
 
 
 def test_another_error_of_a_plant_is_no_fall(robot, default_gait):
@@ -221,7 +221,7 @@ def test_another_error_of_a_plant_is_no_fall(robot, default_gait):
     )
     with pytest.raises(ParameterError, match="no licence") as caught:
         tc.simulate(robot, tc.LqrPlanner(default_gait), replace(OPTIONS, plant=plant))
-    assert recorded(caught.value).metadata["error"] == "no licence"
+    assert recorded(caught.value).error == "no licence"
 
 
 def test_what_a_planner_lacks_is_named(robot):
@@ -290,7 +290,7 @@ def test_the_command_line_tells_one_line_and_keeps_the_run(
     assert ("Traceback" in told) is traced
     assert (f'{name}.py", line' in told) is traced, "leads into the user's own code"
     record = Record.load(tmp_path / "out" / "run.npz")
-    assert record.metadata["error"] == line
+    assert record.error == line
     assert record.steps >= 1
     assert (tmp_path / "out" / "run.toml").exists()
 

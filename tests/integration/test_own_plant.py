@@ -55,7 +55,7 @@ def test_a_plant_of_ones_own_is_the_same_world(robot, default_gait, tmp_path):
     assert mine.steps == len(record.time)
     assert not mine.closed
     back = tc.Record.load(record.save(tmp_path / "run.npz"))
-    assert back.metadata["plant"] == "Wrapped"
+    assert back.plant == "Wrapped"
     assert tc.save_figures(back, tmp_path)
 
 

@@ -140,7 +140,7 @@ def test_a_double_stance_that_falls_back_comes_to_a_stand():
 
 
 def strides(record):
-    return [record.metadata["strides"][i] for i in record.stride[:-1]]
+    return record.kinds_of_stride[:-1]
 
 
 @pytest.mark.slow(seconds=12)
@@ -150,9 +150,9 @@ def test_a_robot_that_is_pushed_back_hard_walks_on(phase, caught):
     planner = tc.LqrPlanner(tc.default_gait(robot))
     pushes = (tc.Push(-65.0, step=4, phase=phase),)
     record = tc.simulate(robot, planner, tc.SimulationOptions(steps=18, pushes=pushes))
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert strides(record) == ["wp"] * 4 + caught + ["wp"] * (14 - len(caught))
-    assert np.all(np.abs(record.torque) <= record.metadata["torque_limit"])
+    assert np.all(np.abs(record.torque) <= record.torque_limit)
     assert record.push.sum() * 1e-3 == pytest.approx(-65.0, rel=1e-6)
     assert record.section_state[-1, 0] == pytest.approx(1.1, abs=0.011)
     left = tc.simulate(

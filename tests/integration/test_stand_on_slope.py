@@ -136,7 +136,7 @@ def test_a_urdf_of_ones_own_starts_where_its_like_does(tmp_path):
 @pytest.mark.parametrize(("robot", "degrees"), ENDS)
 def test_a_walk_starts_on_the_steepest_ground_of_its_robot(robot, degrees):
     record = walked(tc.PlantOptions, degrees, steps=16, robot=robot)
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
 
 
 @pytest.mark.slow(seconds=30)
@@ -144,7 +144,7 @@ def test_a_walk_starts_on_the_steepest_ground_of_its_robot(robot, degrees):
 @pytest.mark.parametrize("plant", [tc.PlantOptions, tc.MujocoOptions, tc.IdealOptions])
 def test_a_walk_starts_from_a_stand_on_a_slope(plant, degrees):
     record = walked(plant, degrees)
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
     assert abs(record.section_state[-1, 0] - record.section_target[-1, 0]) < 0.1
     on_ground = record.foot[0, :, 1] - [sloping(degrees).height_at(x) for x in record.foot[0, :, 0]]
     np.testing.assert_allclose(on_ground, 0.0, atol=1e-4)

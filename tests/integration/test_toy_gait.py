@@ -177,7 +177,7 @@ def record():
 
 
 def test_robot_hops_on_the_spot(record):
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.steps == HOPS
     speed, height, _ = record.section_state[3:].T
     assert np.max(np.abs(height - HEIGHT)) < 0.02
@@ -189,7 +189,7 @@ def test_robot_hops_on_the_spot(record):
 def test_it_flies_and_lands_on_the_same_foot(record):
     force = record.contact_force[:, :, 1]
     assert not force[:, 1].any(), "the tucked foot never touches"
-    nodes = [record.metadata["nodes"][i] for i in record.node]
+    nodes = [record.nodes[i] for i in record.node]
     flying = np.array([name.startswith("F") for name in nodes])
     assert 0.2 < flying.mean() < 0.8
     assert (record.rear == 0).all()
@@ -201,9 +201,9 @@ def test_it_flies_and_lands_on_the_same_foot(record):
 
 
 def test_record_names_the_toy_s_nodes_section_and_stride(record, tmp_path):
-    assert record.metadata["sections"] == ["APEX"]
-    assert record.metadata["strides"] == ["hop"]
-    assert record.metadata["nodes"] == [node.name for node in HOPPING.nodes]
+    assert record.sections == ("APEX",)
+    assert record.strides == ("hop",)
+    assert record.nodes == tuple(node.name for node in HOPPING.nodes)
     swings = record.swing_reference
     assert np.isnan(swings[:, 1]).all(), "only the leg that lands has a foothold"
     assert np.isfinite(swings[:, 0]).any()

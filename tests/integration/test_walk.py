@@ -34,7 +34,7 @@ def record(long_walk):
 def test_walks_without_a_fall(record):
     assert record.steps == 12
     assert not record.fell
-    assert record.metadata["summary"]["qp_failures"] == 0
+    assert record.summary.qp_failures == 0
     assert np.all(record.solved)
     speed = (record.com[-1, 0] - record.com[0, 0]) / record.time[-1]
     assert 1.1 < speed < 1.3
@@ -44,12 +44,12 @@ def test_follows_the_template(record):
     rms = np.sqrt(np.mean(record.com_error**2, axis=0))
     assert rms[0] <= 0.01
     assert rms[1] <= 0.005
-    np.testing.assert_allclose(rms, list(record.metadata["summary"]["com_error_rms"].values()))
+    np.testing.assert_allclose(rms, list(vars(record.summary.com_error_rms).values()))
 
 
 def test_torques_stay_within_the_urdf(record):
     assert np.abs(record.torque).max() <= 350.0
-    peaks = [j["peak"] for j in record.metadata["summary"]["joint_torque"].values()]
+    peaks = [j.peak for j in record.summary.joint_torque.values()]
     np.testing.assert_allclose(np.abs(record.torque).max(axis=0), peaks)
 
 
@@ -71,7 +71,7 @@ def test_contact_forces_lie_in_the_cone(record):
 
 
 def test_stance_feet_do_not_slide(record):
-    nodes = np.array(record.metadata["nodes"])[record.node]
+    nodes = np.array(record.nodes)[record.node]
     single = nodes == "SS_bv^wp"
     rear = record.foot[np.arange(len(record.time)), record.rear]
     step = np.abs(np.diff(rear[:, 0]))
@@ -80,7 +80,7 @@ def test_stance_feet_do_not_slide(record):
 
 
 def test_the_node_sequence_is_the_automatons(record):
-    names = np.array(record.metadata["nodes"])[record.node]
+    names = np.array(record.nodes)[record.node]
     changes = names[np.concatenate(([True], names[1:] != names[:-1]))]
     cycle = ["SS_av^wp", "DS_sc^wp", "DS_sd^wp", "SS_bv^wp"]
     assert list(changes) == [cycle[i % 4] for i in range(len(changes))]
@@ -121,7 +121,7 @@ def test_a_fall_is_recorded_whole(gait, tmp_path):
     record = walk(gait, steps=30, pushes=(Push(-200.0, step=3),))
     assert record.fell
     assert 3 <= record.steps < 30
-    assert "step" in record.metadata["fall_reason"]
+    assert "step" in record.fall_reason
     again = Record.load(record.save(tmp_path / "run.npz"))
     np.testing.assert_array_equal(again.q, record.q)
     assert again.metadata == record.metadata
@@ -136,8 +136,8 @@ def test_weak_legs_report_failed_qps_or_a_fall(gait):
     )
     assert record.fell
     assert np.abs(record.torque).max() <= 70.0
-    assert record.metadata["summary"]["qp_failures"] == np.sum(~record.solved)
-    assert record.metadata["summary"]["saturated_share"] > 0.0
+    assert record.summary.qp_failures == np.sum(~record.solved)
+    assert record.summary.saturated_share > 0.0
 
 
 @pytest.mark.parametrize("steps", [4, pytest.param(15, marks=pytest.mark.slow)])

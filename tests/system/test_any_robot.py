@@ -60,11 +60,11 @@ def walk(robot, steps):
 
 def check(record, gait, steps):
     """Walked as long as wanted and within its limits; after twenty steps it is on its gait."""
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
     assert record.steps == steps
-    for torque in record.metadata["summary"]["joint_torque"].values():
-        assert torque["peak"] <= torque["limit"] * (1 + 1e-9)
-    assert record.metadata["summary"]["qp_failures"] == 0
+    for torque in record.summary.joint_torque.values():
+        assert torque.peak <= torque.limit * (1 + 1e-9)
+    assert record.summary.qp_failures == 0
     if steps >= 20:
         scale = Scale.of(gait.parameters)
         error = np.abs(record.section_state[-5:].mean(axis=0) - gait.vlo)
@@ -86,9 +86,9 @@ def test_shipped_robots_walk_thirty_steps(name):
     record, gait = walk(load_robot(name), 30)
     check(record, gait, 30)
     if name == "bolt":
-        torques = record.metadata["summary"]["joint_torque"].values()
+        torques = record.summary.joint_torque.values()
         # [N m], of the real robot's motors; the URDF's limits are placeholders.
-        assert max(torque["peak"] for torque in torques) < 2.7
+        assert max(torque.peak for torque in torques) < 2.7
 
 
 CORNERS = [(1, 5.0, 0.3), (2, 120.0, 0.3), (3, 5.0, 1.1), (4, 120.0, 1.1)]
@@ -110,9 +110,9 @@ def test_a_robot_never_seen_runs_a_hundred_steps(tmp_path):
     template = template_for(robot)
     gait = running_gait(template, 2.0 * np.sqrt(template.rest_length * template.gravity / 9.81))
     record = simulate(robot, RunningPlanner(gait), SimulationOptions(steps=100, record_every=5))
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(gait.apex[0], rel=0.01)
-    assert record.metadata["summary"]["qp_failures"] == 0
+    assert record.summary.qp_failures == 0
 
 
 def test_a_robot_never_seen_walks(tmp_path):

@@ -12,6 +12,7 @@ from template_control.cli import report as kept
 from template_control.cli.go import _print, summarise_route
 from template_control.cli.main import main
 from template_control.run.record import Record
+from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.scenario_figures import (
     route_figure,
@@ -84,12 +85,12 @@ def test_the_run_repeats_and_json_has_what_it_promises(gone, record, tmp_path, c
 
 def test_the_robot_does_what_its_template_does(record, template):
     assert template.completed
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.solved.all()
-    limit = np.array(record.metadata["torque_limit"])
+    limit = record.torque_limit
     assert np.all(np.abs(record.torque) <= limit)
-    assert [record.metadata["strides"][i] for i in record.stride[:-1]] == list(template.strides)
-    names = [record.metadata["sections"][i] for i in record.section]
+    assert record.kinds_of_stride[:-1] == list(template.strides)
+    names = [record.sections[i] for i in record.section]
     assert names == ["VLO", "VLO", "APEX", "APEX", "APEX", "VLO", "VLO"]
 
 
@@ -208,7 +209,7 @@ def test_the_figure_shows_what_was_recorded(record, template):
         carried = line.get_ydata()[np.isfinite(line.get_ydata())]
         assert len(carried) > 100
         assert np.all((carried > 1.0) & (carried < 80.0)), "kN/m"
-    flies = np.array(record.metadata["phases"])[record.node] == "F"
+    flies = record.in_phase(Phase.F)
     rear = stiffness.lines[0].get_ydata()
     assert np.isnan(rear[flies]).all(), "no leg carries in flight"
     np.testing.assert_array_equal(torque.lines[0].get_ydata(), record.torque[:, 0])

@@ -155,12 +155,12 @@ def test_ctrl_c_keeps_what_was_run(tmp_path, capfd, monkeypatch):
 
 def test_what_is_told_of_a_run_is_in_its_record(record):
     figures = summarise(record, None)
-    joints = record.metadata["joints"]
+    joints = record.joints
     speed = record.v[:, -len(joints) :]
     for i, name in enumerate(joints):
         told = figures["joint_speed"][name]
         assert told["peak"] == pytest.approx(np.abs(speed[:, i]).max())
-        assert told["limit"] == record.metadata["velocity_limit"][i] == 20.0
+        assert told["limit"] == record.velocity_limit[i] == 20.0
         assert figures["joint_torque"][name]["peak"] == pytest.approx(
             np.abs(record.torque[:, i]).max()
         )
@@ -187,14 +187,6 @@ def test_what_is_told_of_a_walk(short_walk):
     assert figures["flight_share"] == {"robot": pytest.approx(0.0, abs=5e-3), "template": 0.0}
     assert 0.5 < figures["duty_factor"] < 0.7
     assert 0.05 < figures["cost_of_transport"] < 0.6
-
-
-def test_a_record_of_an_earlier_version_is_told_without_what_it_lacks(record):
-    metadata = {k: v for k, v in record.metadata.items() if k != "gait_flight_share"}
-    metadata["summary"] = {k: v for k, v in metadata["summary"].items() if k != "joint_work"}
-    figures = summarise(replace(record, metadata=metadata), None)
-    assert figures["cost_of_transport"] is None
-    assert figures["flight_share"]["template"] is None
 
 
 def test_a_run_has_a_figure_of_its_apexes_and_a_walk_has_none(record, short_walk):

@@ -144,7 +144,7 @@ def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
     assert f"interrupted: the run up to here is in {tmp_path / 'run.npz'}" in told.err
     record = Record.load(tmp_path / "run.npz")
     assert record.steps == 2
-    assert record.metadata["interrupted"]
+    assert record.interrupted
 
 
 @pytest.mark.parametrize(

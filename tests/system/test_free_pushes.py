@@ -77,7 +77,7 @@ def test_a_push_aside_is_taken_and_recorded(bolt):
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(bolt, 0.55), tc.embedding.FREE_PLANNER)
     push = tc.Push(0.094, 2, 0.25, 0.06, direction=radians(90.0))
     record = tc.simulate(bolt, planner, tc.SimulationOptions(steps=10, pushes=(push,)))
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
     pushed = record.push != 0.0
     assert record.push[pushed] == pytest.approx(0.094 / 0.06)
     gained = np.diff(record.sway[pushed][[0, -1], 1])

@@ -12,9 +12,9 @@ from template_control.cli.report import floating_rows
 from template_control.cli.world_options import simulation_choice
 from template_control.errors import ParameterError
 from template_control.robot.library import load_floating_robot
-from template_control.run.data_frame import columns
 from template_control.run.record import load_record
 from template_control.run.summary import summarise
+from template_control.run.tables import columns
 
 STEPS = 12
 
@@ -34,7 +34,7 @@ def straight():
 @pytest.mark.slow(seconds=10)
 def test_bolt_walks_free(straight):
     record, gait = straight
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
     assert record.steps == STEPS
     figures = summarise(record, None)
     assert figures["qp_failures"] == 0
@@ -62,7 +62,7 @@ def test_bolt_walks_slowly_too():
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
     record = tc.simulate(robot, planner, tc.SimulationOptions(steps=40, course=tc.HeadingCommand()))
     assert (record.steps, record.fell) == (40, False)
-    assert record.metadata["summary"]["qp_failures"] == 0
+    assert record.summary.qp_failures == 0
     last = record.section_state[-10:].mean(axis=0) - gait.vlo
     assert np.all(np.abs(last) < [0.008, 0.003, 0.02])
 
@@ -93,7 +93,7 @@ def test_a_record_is_read_as_it_was_written(straight, tmp_path):
 def test_bolt_turns():
     """The heading turns at each section, and the path with it."""
     record, gait = walked(tc.HeadingCommand(turning_rate=0.25))
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
     per_step = 0.25 * gait.step_duration
     assert record.heading[-1] == pytest.approx(STEPS * per_step, abs=1.01 * per_step)
     a, b = record.space_com[-400, :2], record.space_com[-1, :2]
@@ -122,7 +122,7 @@ def test_bolt_changes_its_speed_on_command():
     command = tc.SpeedProfile(times=(0.0, 1.0, 4.0), speeds=(0.5, 0.5, 0.65))
     route = tc.SpeedRoute(tc.template_for(robot), command)
     record = tc.simulate(robot, route, tc.SimulationOptions(steps=20))
-    assert not record.fell, record.metadata["fall_reason"]
+    assert not record.fell, record.fall_reason
     gait = tc.gait_for_speed(tc.template_for(robot), 0.65)
     assert record.section_state[-3:, 0].mean() == pytest.approx(gait.vlo[0], rel=0.05)
     assert np.abs(record.attitude[:, :2]).max() < 0.02

@@ -103,8 +103,8 @@ def test_it_walks(name):
     robot = load(name)
     gait = tc.robot_gait_for_speed(robot, WALK[name])
     record = tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=20))
-    assert not record.fell, record.metadata["fall_reason"]
-    assert record.metadata["summary"]["qp_failures"] == 0
+    assert not record.fell, record.fall_reason
+    assert record.summary.qp_failures == 0
 
 
 @pytest.mark.slow(seconds=3)

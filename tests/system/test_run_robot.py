@@ -49,12 +49,11 @@ def record():
 
 def stance(record):
     """(T,) whether a foot carries, by the controller."""
-    phases = np.array(record.metadata["phases"])
-    return phases[record.node] != "F"
+    return ~record.in_phase(Phase.F)
 
 
 def test_robot_runs_at_three_metres_a_second(record, gait):
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.steps == 20
     speed, height, _ = record.section_state[-8:].T
     assert speed.mean() == pytest.approx(3.0, rel=0.01)
@@ -173,7 +172,7 @@ def test_stiffnesses_follow_from_where_the_foot_has_landed(supervisor, gait, ear
 @pytest.mark.parametrize("speed", [1.3, 2.0, 2.5, 3.5, 4.0])
 def test_robot_runs_at_other_speeds(speed):
     record = run(speed, 60)
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(speed, rel=0.01)
     assert record.solved.all()
 
@@ -181,7 +180,7 @@ def test_robot_runs_at_other_speeds(speed):
 @pytest.mark.slow(seconds=7)
 def test_robot_runs_at_five_metres_a_second_with_stronger_motors():
     record = run(5.0, 60, embedding=EmbeddingOptions(torque_scale=1.3))
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(5.0, rel=0.01)
 
 
@@ -190,7 +189,7 @@ def test_robot_runs_at_five_metres_a_second_with_stronger_motors():
 @pytest.mark.parametrize("phase", [0.1, 0.6])
 def test_robot_runs_on_after_a_push(impulse, phase):
     record = run(3.0, 20, pushes=(tc.Push(impulse, 8, phase),))
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     speed = record.section_state[:, 0]
     assert abs(speed[9] - 3.0) > 0.15
     assert np.max(np.abs(speed[18:] / 3.0 - 1.0)) < 0.02
@@ -200,9 +199,9 @@ def test_robot_runs_on_after_a_push(impulse, phase):
 def test_runner_is_back_ten_steps_after_a_hard_push():
     pushes = (tc.Push(40.0, 6, 0.9), tc.Push(-40.0, 18, 0.0))
     record = run(3.0, 30, "runner", pushes=pushes)
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.solved.all()
-    error = np.abs(record.section_state[:, 0] / record.metadata["gait_state"][0] - 1.0)
+    error = np.abs(record.section_state[:, 0] / record.gait_state[0] - 1.0)
     for push in pushes:
         assert np.max(error[push.step : push.step + 10]) > 0.15
         assert error[push.step + 10] < 0.02
@@ -212,7 +211,7 @@ def test_runner_is_back_ten_steps_after_a_hard_push():
 @pytest.mark.parametrize("mass_scale", [0.9, 1.1])
 def test_robot_runs_with_another_mass_than_its_model_has(mass_scale):
     record = run(3.0, 30, plant=tc.PlantOptions(mass_scale=mass_scale))
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.section_state[-10:, 0].mean() == pytest.approx(3.0, rel=0.01)
 
 
@@ -223,7 +222,7 @@ def test_robot_runs_on_over_a_step_that_it_does_not_see(robot, gait, height):
     before, beyond = where.footholds((*gait.apex, 0.0), 5)[-2:]
     step = tc.GroundStep(height, 0.5 * (before + beyond))
     record = run(3.0, 17, plant=tc.PlantOptions(ground_step=step))
-    assert record.metadata["fall_reason"] == ""
+    assert record.fall_reason == ""
     assert record.foot[-1, :, 1].min() > height - 0.01
     assert np.max(np.abs(record.section_state[14:, 0] / 3.0 - 1.0)) < 0.02
 
@@ -232,6 +231,6 @@ def test_robot_runs_on_over_a_step_that_it_does_not_see(robot, gait, height):
 @pytest.mark.parametrize(("name", "steps"), [("human", 30), ("bolt", 100)])
 def test_other_robots_run_by_similarity(name, steps):
     record = run(2.0, steps, name)
-    assert record.metadata["fall_reason"] == ""
-    wanted = record.metadata["gait_state"][0]
+    assert record.fall_reason == ""
+    wanted = record.gait_state[0]
     assert record.section_state[-10:, 0].mean() == pytest.approx(wanted, rel=0.01)

@@ -31,9 +31,8 @@ def test_runner_stands_runs_and_stands_again_as_the_readme_prints_it(tmp_path, m
 
 def check(record, top):
     """Stood, ran at ``top`` [m/s] and stood again, within its limits."""
-    m = record.metadata
-    assert (m["fall_reason"], m["arrived"]) == ("", True)
-    kinds = [m["strides"][i] for i in record.stride[:-1]]
+    assert (record.fall_reason, record.arrived) == ("", True)
+    kinds = record.kinds_of_stride[:-1]
     order = [kind for i, kind in enumerate(kinds) if i == 0 or kind != kinds[i - 1]]
     assert order[:8] == ["s", "sw", "ww", "w", "wr", "r", "rw", "w"]
     assert order[-2:] == ["sf", "s"]
@@ -44,8 +43,8 @@ def check(record, top):
     assert speed.max() == pytest.approx(top, abs=0.05)
     error = speed[1:] - record.section_target[:-1, 0]
     assert np.sqrt(np.mean(error**2)) < 0.15
-    assert np.all(np.abs(record.torque) <= m["torque_limit"])
-    assert np.all(np.abs(record.v[:, 3:]) <= 1.01 * np.array(m["velocity_limit"]))
+    assert np.all(np.abs(record.torque) <= record.torque_limit)
+    assert np.all(np.abs(record.v[:, 3:]) <= 1.01 * record.velocity_limit)
     assert record.solved.all()
     still = record.time > record.time[-1] - 2.0
     assert np.ptp(record.com[still, 0]) < 0.01, "it stands; MuJoCo's feet creep by 2 mm/s"

@@ -55,7 +55,7 @@ def test_ctrl_c_ends_a_loop_of_runs(robot, default_gait):
         _ = [run(i) for i in range(3)]
     assert isinstance(stop.value, KeyboardInterrupt)
     assert stop.value.record.steps == 1
-    assert stop.value.record.metadata["interrupted"]
+    assert stop.value.record.interrupted
 
 
 def test_ctrl_c_while_figures_are_drawn_keeps_the_run_and_its_table(tmp_path, capfd, monkeypatch):

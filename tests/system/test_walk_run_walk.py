@@ -22,15 +22,15 @@ def go(example, name, **options):
 
 
 def strides(record):
-    return [record.metadata["strides"][i] for i in record.stride[:-1]]
+    return record.kinds_of_stride[:-1]
 
 
 def check(record):
     """Went to the end within its torques."""
-    assert record.metadata["fall_reason"] == ""
-    assert record.metadata["arrived"]
+    assert record.fall_reason == ""
+    assert record.arrived
     assert record.solved.all()
-    assert np.all(np.abs(record.torque) <= record.metadata["torque_limit"])
+    assert np.all(np.abs(record.torque) <= record.torque_limit)
 
 
 def settled(record):
@@ -56,7 +56,7 @@ def test_five_link_walks_runs_at_three_metres_a_second_and_walks(friction):
     error = speed[1:] - record.section_target[:-1, 0]
     assert np.sqrt(np.mean(error**2)) < 0.06, "it keeps up with +-0.35 m/s^2"
     assert speed[9] == pytest.approx(1.3, abs=0.05), "the transition hits its first apex"
-    share = record.metadata["summary"]["saturated_share"]
+    share = record.summary.saturated_share
     assert share < 0.025
     assert record.section_trim[8] != 0.0
     assert record.section_trim[9] == 0.0, "the walk after the run stands up: it learns anew"

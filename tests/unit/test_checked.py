@@ -161,7 +161,7 @@ def test_a_push_after_the_last_of_the_steps_that_nobody_gave(robot, default_gait
 def test_an_array_is_a_start_and_the_run_is_kept(robot, default_gait, tmp_path):
     options = tc.SimulationOptions(steps=1, start=default_gait.vlo)
     record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
-    assert record.metadata["options"]["start"] == default_gait.vlo.tolist()
+    assert record.options["start"] == default_gait.vlo.tolist()
     assert tc.Record.load(record.save(tmp_path / "run.npz")).steps == 1
 
 
@@ -180,4 +180,4 @@ def test_nothing_that_cannot_be_written_down_loses_a_run(robot, default_gait):
     record = tc.simulate(
         robot, tc.LqrPlanner(default_gait), tc.SimulationOptions(steps=1, embedding=options)
     )
-    assert record.metadata["options"]["embedding"]["swing"]["clearance"] == 0.05
+    assert record.options["embedding"]["swing"]["clearance"] == 0.05

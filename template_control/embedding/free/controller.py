@@ -31,6 +31,7 @@ from template_control.embedding.planners.planner import (
     Planners,
     decided,
 )
+from template_control.embedding.state import FloatingSnapshot
 from template_control.embedding.swing import quintic_step
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -194,6 +195,15 @@ class FreeController(EmbeddingController):
 
     def _foot_side(self, foot: int) -> float:
         return float(self.robot.space.foot[foot, _SIDE])
+
+    def snapshot(self) -> FloatingSnapshot:
+        """As :meth:`~template_control.embedding.controller.EmbeddingController.snapshot`."""
+        planar, feet = super().snapshot(), self.feet.foot_of_leg
+        side = np.full(2, np.nan)
+        for leg in self.mode.swings:
+            side[feet[leg]] = self.references.side[feet[leg], 0]
+        sway = self.lateral_state() - (self._foot_side(planar.rear), 0.0)
+        return FloatingSnapshot(**vars(planar), sway=sway, side_reference=side)
 
     def lateral_state(self) -> Array:
         """(2,) y of the CoM, and dy/dt with the angular momentum as the forward speed has it."""

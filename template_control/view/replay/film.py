@@ -126,9 +126,8 @@ class SpaceStage:
     def __init__(self, playback: Playback) -> None:
         record = playback.record
         self.playback, self._space = playback, in_space(record, np.zeros(2))
-        m = record.metadata
         self.body = _Body(record)
-        length = m["template"]["rest_length"]
+        length = record.template.rest_length
         _, self._loaded = template_legs(record)
         self._spring = spring(0.03 * length)
         self.figure, axes = empty_picture()
@@ -152,7 +151,7 @@ class SpaceStage:
             [], [], "o", color=TEMPLATE, markersize=3, label="template", zorder=7
         )[0]
         self._forces = force_artist(axes, 8)
-        self._title = named(axes, m["robot"])
+        self._title = named(axes, record.robot_name)
         self.show(0)
         keep_layout(self.figure)
 
@@ -209,13 +208,12 @@ class _Body:
     """Where joints and trunk are in a configuration, by Pinocchio."""
 
     def __init__(self, record: Record) -> None:
-        m = record.metadata
         self._model = model_of(record)
         self._data = self._model.createData()
-        names = [[m["joints"][i] for i in leg] for leg in m["legs"]]
+        names = [[record.joints[i] for i in leg] for leg in record.legs]
         self._joints = [[self._model.getJointId(name) for name in leg] for leg in names]
         self._trunk = self._model.parents[self._joints[0][0]]
-        self._top = np.array([0.0, 0.0, 2.0 * m["trunk_com"]])
+        self._top = np.array([0.0, 0.0, 2.0 * record.trunk_com])
 
     def place(self, q: Array) -> None:
         pin.forwardKinematics(self._model, self._data, q)
@@ -240,8 +238,8 @@ class _Stage:
     def __init__(self, playback: Playback) -> None:
         record, rows = playback.record, playback.rows
         self.playback = playback
-        length = record.metadata["template"]["rest_length"]
-        self.top = 2.0 * record.metadata["trunk_com"]
+        length = record.template.rest_length
+        self.top = 2.0 * record.trunk_com
         self.toes, self.loaded = template_legs(record)
         self.arrows, self.on = force_arrows(record), carrying(record)
         self.spring = spring(0.03 * length)
@@ -270,7 +268,7 @@ class _Stage:
         self.springs = [axes.plot([], [], color=TEMPLATE, linewidth=1.1)[0] for _ in (0, 1)]
         self.template = axes.plot([], [], "o", color=TEMPLATE, markersize=3, label="template")[0]
         self.forces = force_artist(axes, 5)
-        self.title = named(axes, record.metadata["robot"])
+        self.title = named(axes, record.robot_name)
         self.show(0)
         keep_layout(self.figure)
 
@@ -281,15 +279,15 @@ class _Stage:
         hip = record.q[row, :2]
         top = hip + self.top * np.array([np.sin(pitch), np.cos(pitch)])
         self.trunk.set_data(*np.stack((hip, top)).T)
-        for foot, leg in enumerate(record.metadata["legs"]):
+        for foot, leg in enumerate(record.legs):
             self.legs[foot].set_data(*np.vstack((record.joint[row, leg], record.foot[row, foot])).T)
             seen = self.foothold_time[foot] <= record.time[row]
             places = self.foothold_x[foot][seen]
             heights = [self.ground.height_at(x) for x in places.tolist()]
             self.marks[foot].set_data(places, heights)
-        for leg, line in enumerate(self.springs):
-            if self.loaded[row, leg]:
-                ends = (record.template_com[row], self.toes[row, leg])
+        for number, line in enumerate(self.springs):
+            if self.loaded[row, number]:
+                ends = (record.template_com[row], self.toes[row, number])
                 line.set_data(*coil(self.spring, *ends))
             else:
                 line.set_data([], [])

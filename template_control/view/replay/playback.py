@@ -112,7 +112,7 @@ def _moment(value: float | None, default: float, last: float) -> float:
 
 def weight(record: Record) -> float:
     """The controlled robot's weight [N]."""
-    return float(record.metadata["mass"] * record.metadata["template"]["gravity"])
+    return record.weight
 
 
 def carrying(record: Record) -> NDArray[np.bool_]:
@@ -176,7 +176,7 @@ def arrows_of(force: Array, record: Record) -> Array:
     arrow = force / weight(record)
     size = np.linalg.norm(arrow, axis=-1, keepdims=True)
     arrow = arrow * np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))
-    return np.asarray(0.4 * record.metadata["template"]["rest_length"] * arrow)
+    return np.asarray(0.4 * record.template.rest_length * arrow)
 
 
 def footholds(record: Record) -> list[Foothold]:

@@ -80,8 +80,7 @@ def save_html(
     from template_control.view.replay.viewer import write_page
 
     frames = playback(record, fps=fps, speed=speed, start=start, end=end)
-    m = record.metadata
-    title = f"{m['robot']}, gait {m['gait']}, {record.steps} steps"
+    title = f"{record.robot_name}, gait {record.gait_name}, {record.steps} steps"
     if record.fell:
         title += ", fell"
     return write_page(Path(path), title, scene_commands(frames))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,7 +59,7 @@ def load_visuals(record: Record) -> Robot:
     Raises:
         RecordError: if the run carries no URDF.
     """
-    text = record.metadata.get("urdf")
+    text = record.urdf
     if not text:
         raise RecordError(
             "the run carries no URDF, so its robot cannot be shown in space: draw it with plots"
@@ -99,11 +100,10 @@ def sticks(record: Record, model: pin.Model) -> list[pin.GeometryObject]:
         record: the run.
         model: of its robot.
     """
-    m = record.metadata
-    radius = _STICK * float(m["template"]["rest_length"])
-    joints = [[model.getJointId(m["joints"][i]) for i in leg] for leg in m["legs"]]
+    radius = _STICK * float(record.template.rest_length)
+    joints = [[model.getJointId(record.joints[i]) for i in leg] for leg in record.legs]
     made = []
-    for leg, foot, color in zip(joints, m["feet"], (LEFT, RIGHT), strict=True):
+    for leg, foot, color in zip(joints, record.feet, (LEFT, RIGHT), strict=True):
         ends = [model.jointPlacements[joint].translation for joint in leg[1:]]
         frame = model.getFrameId(foot, pin.FrameType.BODY)
         ends.append(model.frames[frame].placement.translation)
@@ -113,7 +113,7 @@ def sticks(record: Record, model: pin.Model) -> list[pin.GeometryObject]:
         ]
     hips = [model.jointPlacements[leg[0]].translation for leg in joints]
     middle = 0.5 * (hips[0] + hips[1])
-    top = middle + np.array([0.0, 0.0, 2.0 * float(m["trunk_com"])])
+    top = middle + np.array([0.0, 0.0, 2.0 * float(record.trunk_com)])
     made.append(_stick(model, model.parents[joints[0][0]], middle, top, 2.0 * radius, TRUNK))
     return [stick for stick in made if stick is not None]
 
@@ -140,7 +140,7 @@ def model_of(record: Record) -> pin.Model:
     Args:
         record: the run, which carries a URDF.
     """
-    text = record.metadata["urdf"]
+    text = record.urdf
     if isinstance(record, FloatingRecord):
         return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
     return pin.buildModelFromXML(text)
@@ -169,7 +169,7 @@ def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[A
     return positions, quaternions
 
 
-def foot_sides(model: pin.Model, feet: list[str]) -> Array:
+def foot_sides(model: pin.Model, feet: Sequence[str]) -> Array:
     """How far the feet are to the left of the sagittal plane.
 
     Args:

@@ -290,9 +290,9 @@ def scene_commands(playback: Playback) -> list[Any]:
         RecordError: if the robot's visuals cannot be loaded.
     """
     scene, record = _Scene(playback.clock), playback.record
-    length = float(record.metadata["template"]["rest_length"])
+    length = float(record.template.rest_length)
     robot = load_visuals(record)
-    space = in_space(record, foot_sides(robot[0], record.metadata["feet"]))
+    space = in_space(record, foot_sides(robot[0], record.feet))
     _surroundings(scene, playback, space, length)
     _robot(scene, playback, robot)
     _trail(scene, playback, space, length)

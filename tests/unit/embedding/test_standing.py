@@ -334,10 +334,10 @@ def walked(spacing, speed):
 @pytest.mark.parametrize(("spacing", "speed"), [(0.1, 0.8), (0.3, 1.1)])
 def test_the_robot_stands_walks_and_stands(spacing, speed):
     record = walked(spacing, speed)
-    assert record.metadata["fall_reason"] == ""
-    assert record.metadata["arrived"]
+    assert record.fall_reason == ""
+    assert record.arrived
     assert record.solved.all()
-    strides = [record.metadata["strides"][i] for i in record.stride]
+    strides = record.kinds_of_stride
     walks = [z[0] for z, stride in zip(record.section_state, strides, strict=True) if stride == "w"]
     assert np.abs(np.array(walks) - speed).max() < 0.05
     last = record.time > record.time[-1] - 0.8

@@ -121,7 +121,7 @@ def test_a_robot_that_is_pushed_steps_and_stands(impulse):
     route = SteadyRoute(p, "s", [0.0, 0.97, 0.0])
     record = tc.simulate(robot, route, options, planners=standing_planners(p))
     assert not record.fell
-    kinds = {record.metadata["strides"][i] for i in record.stride}
+    kinds = set(record.kinds_of_stride)
     assert kinds == {"s", "sf" if impulse > 0.0 else "sb"}
     rear = int(record.rear[-1])
     assert record.foot[-1, rear, 0] < record.foot[-1, 1 - rear, 0]
@@ -141,8 +141,8 @@ def test_a_robot_walks_slowly_with_the_family_by_speed_and_closes_its_feet():
     planners = standing_planners(p, family=gaits_by_speed(p)) | {"wp": tc.LqrPlanner(gait)}
     options = tc.SimulationOptions(pose=standing_pose(p, 0.1), record_every=5)
     record = tc.simulate(robot, route, options, planners=planners)
-    assert (record.metadata["fall_reason"], record.metadata["arrived"]) == ("", True)
-    kinds = [record.metadata["strides"][i] for i in record.stride]
+    assert (record.fall_reason, record.arrived) == ("", True)
+    kinds = record.kinds_of_stride
     assert kinds[-5:-2] == ["ws", "sf", "s"]
     walks = record.section_state[[kind == "wp" for kind in kinds], 0]
     assert np.abs(walks - gait.vlo[0]).max() < 0.05

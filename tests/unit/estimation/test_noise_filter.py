@@ -111,6 +111,6 @@ def test_bolt_walks_with_noise_and_delay(bolt):
     noise = tc.SensorOptions.of_size(1e-3, Scale.of(gait.parameters), seed=1)
     options = tc.SimulationOptions(steps=15, sensors=noise, delay=1e-3)
     record = tc.simulate(bolt, tc.LqrPlanner(gait, FREE_PLANNER), options)
-    assert not record.fell, record.metadata["fall_reason"]
-    assert record.metadata["summary"]["qp_failures"] == 0
+    assert not record.fell, record.fall_reason
+    assert record.summary.qp_failures == 0
     assert abs(gait_errors(record, gait)[0]) < 0.03

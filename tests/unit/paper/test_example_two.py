@@ -96,7 +96,7 @@ def test_an_earlier_liftoff_is_rougher_with_smaller_amplitudes(first_steps):
 def test_each_foot_has_its_own_template_force_about_liftoff(first_steps):
     """The template's and the robot's liftoff differ by some ticks; forces go to the feet."""
     record = first_steps()
-    nodes = np.array(record.metadata["nodes"])[record.node]
+    nodes = np.array(record.nodes)[record.node]
     lifted = np.flatnonzero((nodes[1:] == "SS_bv^w") & (nodes[:-1] == "DS_sd^w"))[0] + 1
     near = slice(lifted - 5, lifted + 5)
     lifting = 1 - record.rear[lifted]

@@ -232,10 +232,10 @@ def record(gait):
 
 
 def test_the_robot_walks_on_it(record):
-    assert record.metadata["plant"] == "ideal"
+    assert record.plant == "ideal"
     assert record.steps == 4
     assert not record.fell
-    assert record.metadata["summary"]["qp_failures"] == 0
+    assert record.summary.qp_failures == 0
 
 
 def test_forces_and_momentum_balance_at_every_tick(record):
@@ -250,7 +250,7 @@ def test_forces_and_momentum_balance_at_every_tick(record):
 
 def test_stance_feet_stick_and_none_is_in_the_ground(record):
     assert record.foot[..., 1].min() > -1e-8
-    single = np.char.startswith(np.array(record.metadata["nodes"])[record.node], "SS")
+    single = np.char.startswith(np.array(record.nodes)[record.node], "SS")
     rear = record.foot[np.arange(len(record.time)), record.rear]
     moved = np.abs(np.diff(rear[:, 0]))[single[1:] & single[:-1] & (np.diff(record.rear) == 0)]
     assert moved.max() < 1e-4  # rolling of a 1 cm sphere
@@ -281,7 +281,7 @@ def test_a_state_that_is_not_finite_is_named(robot):
 
 
 def test_a_saved_run_names_its_plant(record, tmp_path):
-    assert Record.load(record.save(tmp_path / "run.npz")).metadata["plant"] == "ideal"
+    assert Record.load(record.save(tmp_path / "run.npz")).plant == "ideal"
     assert plant_name(PlantOptions()) == "pybullet"
 
 

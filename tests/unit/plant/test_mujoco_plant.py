@@ -97,7 +97,7 @@ def walk(default_gait):
 
 def test_the_robot_walks_as_it_does_in_pybullet(walk, short_walk):
     assert not walk.fell
-    assert walk.metadata["plant"] == "mujoco"
+    assert walk.plant == "mujoco"
     assert walk.solved.all()
     there = short_walk.section_state
     here = walk.section_state[: len(there)]
@@ -189,8 +189,8 @@ def test_scenarios_of_walking_and_running_go_through(name, example):
     options = tc.SimulationOptions(plant=tc.MujocoOptions(), record_every=4)
     record = tc.simulate(tc.load_robot(name), scenario, options)
     assert not record.fell
-    assert record.metadata["arrived"]
+    assert record.arrived
     error = record.section_state[1:, 0] - record.section_target[:-1, 0]
     assert np.sqrt(np.mean(error**2)) < 0.2, "0.03 and 0.15 m/s were measured"
-    limit = record.metadata["torque_limit"]
+    limit = record.torque_limit
     assert np.all(np.abs(record.torque) <= limit)

@@ -184,7 +184,7 @@ def test_what_went_wrong_first(long_walk):
     solved = np.array(long_walk.solved, dtype=bool)
     solved[late + 300] = False
     torque = long_walk.torque.copy()
-    torque[late + 100 : late + 150, 0] = long_walk.metadata["torque_limit"][0]
+    torque[late + 100 : late + 150, 0] = long_walk.torque_limit[0]
     force = long_walk.contact_force.copy()
     force[late, 0] = (-200.0, 10.0)
     wrong = replace(long_walk, solved=solved)

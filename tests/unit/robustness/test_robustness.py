@@ -420,7 +420,7 @@ def test_a_base_that_no_leg_threw_so_fast_is_a_simulation_that_diverged(robot, g
     falls = FallOptions(thrown=0.3)  # slower than this robot walks
     record = simulate(robot, LqrPlanner(gait), tc.SimulationOptions(steps=2, falls=falls))
     assert record.fell
-    assert "diverged" in record.metadata["fall_reason"]
+    assert "diverged" in record.fall_reason
 
 
 @pytest.mark.slow

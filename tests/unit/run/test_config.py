@@ -32,7 +32,7 @@ def assert_same_run(one, other):
         if f.name == "metadata" or f.name.endswith("_seconds"):
             continue
         np.testing.assert_array_equal(getattr(one, f.name), getattr(other, f.name), err_msg=f.name)
-    assert one.metadata["options"] == other.metadata["options"]
+    assert one.options == other.options
 
 
 DISTURBED = (
@@ -227,7 +227,7 @@ def test_a_planner_of_ones_own_walks_and_is_written_down(own_planner, tmp_path):
     planner = f"{own_planner}:Mine"
     status, record = walk(tmp_path / "own", "--planner", planner, "--steps", "1")
     assert status == 0
-    assert record.metadata["planner"] == "Mine"
+    assert record.planner == "Mine"
     config = RunConfig.load(tmp_path / "own" / "run.toml")
     assert config.planner == OwnPlanner(planner)
 

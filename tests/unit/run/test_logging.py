@@ -36,7 +36,7 @@ def test_start_end_and_fall_are_told(weak_walk):
     told = [(m.levelname, m.getMessage()) for m in messages if m.name.endswith("run.simulation")]
     assert told[0][0] == "INFO"
     assert "pybullet" in told[0][1]
-    assert ("WARNING", f"{record.metadata['robot']} fell: {record.metadata['fall_reason']}") in told
+    assert ("WARNING", f"{record.robot_name} fell: {record.fall_reason}") in told
     assert repr(record) in told[-1][1]
 
 

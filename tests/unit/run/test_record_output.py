@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 import template_control as tc
 from template_control.errors import MissingPackageError
-from template_control.run.data_frame import columns
+from template_control.run.tables import columns
 from template_control.view.figures import figures_of
 
 
@@ -33,7 +33,7 @@ def test_every_quantity_of_a_sample_has_named_columns_with_units(short_walk):
 
 def test_a_column_is_the_quantity_that_its_name_says(short_walk):
     table, r = columns(short_walk), short_walk
-    knee, foot = r.metadata["joints"].index("left_knee"), r.metadata["feet"].index("right_foot")
+    knee, foot = r.joints.index("left_knee"), r.feet.index("right_foot")
     for name, values, unit in (
         ("q_pitch", r.q[:, 2], "rad"),
         ("v_x", r.v[:, 0], "m/s"),
@@ -47,7 +47,7 @@ def test_a_column_is_the_quantity_that_its_name_says(short_walk):
         np.testing.assert_array_equal(table[name].values, values, err_msg=name)
         assert table[name].unit == unit
     names = table["node"].values
-    assert all(r.metadata["nodes"][i] == name for i, name in zip(r.node, names, strict=True))
+    assert all(r.nodes[i] == name for i, name in zip(r.node, names, strict=True))
 
 
 def test_a_data_frame_has_a_row_a_sample(short_walk):
@@ -66,6 +66,28 @@ def test_without_pandas_one_line_says_what_to_install(short_walk, monkeypatch):
     with pytest.raises(MissingPackageError, match="pip install pandas") as caught:
         short_walk.to_dataframe()
     assert isinstance(caught.value, ImportError)
+
+
+def test_an_xarray_set_names_dimensions_labels_and_units(short_walk):
+    pytest.importorskip("xarray")
+    found, r = short_walk.to_xarray(), short_walk
+    knee = r.torque[:, r.joints.index("left_knee")]
+    np.testing.assert_array_equal(found.torque.sel(joint="left_knee"), knee)
+    np.testing.assert_array_equal(found.com.sel(axis="y"), r.com[:, 1])
+    assert found.torque.attrs["units"] == "N m"
+    assert str(found.coordinate_unit.sel(coordinate="pitch").item()) == "rad"
+    np.testing.assert_array_equal(found.section_state.sel(state="dx"), r.section_state[:, 0])
+    assert found.attrs["robot"] == "five-link"
+    arrays = {name for name, value in vars(r).items() if isinstance(value, np.ndarray)}
+    renamed = {"joint_position": "joint", "foot_position": "foot", "section_kind": "section"}
+    kept = {renamed.get(str(name), str(name)) for name in found.variables}
+    assert arrays <= kept
+
+
+def test_without_xarray_one_line_says_what_to_install(short_walk, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(MissingPackageError, match="pip install xarray"):
+        short_walk.to_xarray()
 
 
 def test_a_record_draws_each_of_its_figures(short_walk):

@@ -124,15 +124,15 @@ def test_the_command_replays_a_free_run(record, tmp_path, capfd):
 
 @pytest.mark.slow(seconds=1)
 def test_a_robot_without_shapes_is_shown_with_sticks_down_to_its_feet(record):
-    text = re.sub(r"<visual.*?</visual>", "", record.metadata["urdf"], flags=re.DOTALL)
+    text = re.sub(r"<visual.*?</visual>", "", record.urdf, flags=re.DOTALL)
     bare = replace(record, metadata={**record.metadata, "urdf": text})
     model, shapes, visuals = load_visuals(bare)
     rows = np.arange(0, len(record.time), 97)
     position, quaternion = placements(model, shapes, record.q[rows])
     names = [visual.name for visual in visuals]
     assert all(name.startswith("stick_") for name in names)
-    for foot, leg in enumerate(record.metadata["legs"]):
-        i = names.index(f"stick_{record.metadata['joints'][leg[-1]]}")
+    for foot, leg in enumerate(record.legs):
+        i = names.index(f"stick_{record.joints[leg[-1]]}")
         half = 0.5 * visuals[i].geometry.height
         turned = Rotation.from_quat(quaternion[:, i]).apply([0.0, 0.0, half])
         away = np.minimum(

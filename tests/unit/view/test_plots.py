@@ -97,7 +97,7 @@ def test_template_conserves_its_energy_within_a_phase(record, gait):
     first = record.time < 0.1
     assert np.allclose(total[first], target, atol=0.01)
     # After the rear liftoff until VLO nothing changes the template.
-    last = record.metadata["nodes"].index("SS_bv^wp")
+    last = record.nodes.index("SS_bv^wp")
     for begin, end in zip(record.section_time, record.section_time[1:], strict=False):
         on = (record.node == last) & (record.time > begin) & (record.time < end)
         # The template's own VLO may come some milliseconds before the robot's.

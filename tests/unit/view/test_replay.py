@@ -27,7 +27,7 @@ def record(short_walk):
 
 
 def with_urdf(record, old, new):
-    text = record.metadata["urdf"].replace(" />", "/>")  # as it stands in the file
+    text = record.urdf.replace(" />", "/>")  # as it stands in the file
     assert old in text
     return replace(record, metadata={**record.metadata, "urdf": text.replace(old, new)})
 
@@ -84,7 +84,7 @@ def test_visuals_are_where_the_run_recorded_joints_and_feet(record):
     assert np.allclose(np.linalg.norm(quaternion, axis=2), 1.0)
     names = [visual.name for visual in visuals]
     for foot, side in enumerate(("left", "right")):
-        hip, knee = record.joint[rows][:, record.metadata["legs"][foot]].transpose(1, 0, 2)
+        hip, knee = record.joint[rows][:, record.legs[foot]].transpose(1, 0, 2)
         sole = record.foot[rows, foot] + [0.0, FOOT_RADIUS]
         for link, middle in (("thigh", (hip + knee) / 2), ("shank", (knee + sole) / 2)):
             found = position[:, names.index(f"{side}_{link}_0")]
@@ -222,7 +222,7 @@ def shown(record):
 
 
 def without_visuals(record):
-    text = re.sub(r"<visual.*?</visual>", "", record.metadata["urdf"], flags=re.DOTALL)
+    text = re.sub(r"<visual.*?</visual>", "", record.urdf, flags=re.DOTALL)
     return replace(record, metadata={**record.metadata, "urdf": text})
 
 
@@ -230,12 +230,12 @@ def test_a_robot_without_shapes_is_shown_with_sticks(record, tmp_path):
     bare = without_visuals(record)
     row, places = shown(bare)
     assert len(places) == 5
-    for foot, leg in enumerate(record.metadata["legs"]):
+    for foot, leg in enumerate(record.legs):
         ends = [*record.joint[row, leg], record.foot[row, foot] + [0.0, FOOT_RADIUS]]
         for joint, (begin, end) in zip(leg, pairwise(ends), strict=True):
-            name = f"stick_{record.metadata['joints'][joint]}"
+            name = f"stick_{record.joints[joint]}"
             assert np.allclose(places[name][[0, 2]], 0.5 * (begin + end), atol=1e-9)
-    pitch, height = record.q[row, 2], record.metadata["trunk_com"]
+    pitch, height = record.q[row, 2], record.trunk_com
     middle = record.q[row, :2] + height * np.array([np.sin(pitch), np.cos(pitch)])
     assert np.allclose(places["stick_base_pitch"][[0, 2]], middle, atol=1e-9)
     assert tc.save_html(bare, tmp_path / "bare.html", end=0.2).is_file()
@@ -257,6 +257,6 @@ def test_a_mesh_that_is_missing_or_cannot_be_read_leaves_its_link_a_stick(
 
 
 def test_a_run_without_urdf_is_refused(record, tmp_path):
-    old = replace(record, metadata={k: v for k, v in record.metadata.items() if k != "urdf"})
+    old = replace(record, metadata={**record.metadata, "urdf": ""})
     with pytest.raises(tc.errors.RecordError, match="no URDF"):
         tc.save_html(old, tmp_path / "a.html")

@@ -1,0 +1,127 @@
+"""Facts of a run as a whole, with their types: what the metadata of its file hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Generic, Self, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.run.statistics import Statistics
+from template_control.slip.automaton.vocabulary import Phase
+from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+
+class Fact(Generic[T]):
+    """Attribute that reads an entry of ``metadata``.
+
+    Args:
+        make: the attribute's value of the entry.
+        name: of the entry; "": the attribute's own.
+    """
+
+    def __init__(self, make: Callable[[Any], T], name: str = "") -> None:
+        self._make, self._name = make, name
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = self._name or name
+
+    @overload
+    def __get__(self, facts: None, owner: type) -> Self: ...
+
+    @overload
+    def __get__(self, facts: Facts, owner: type) -> T: ...
+
+    def __get__(self, facts: Facts | None, owner: type) -> Self | T:
+        return self if facts is None else self._make(facts.metadata[self._name])
+
+
+def _joints_of_legs(entry: Any) -> tuple[tuple[int, ...], ...]:
+    return tuple(tuple(leg) for leg in entry)
+
+
+def _phases(entry: Any) -> tuple[Phase, ...]:
+    return tuple(Phase[name] for name in entry)
+
+
+def _template(entry: Mapping[str, Any]) -> SlipParameters:
+    return SlipParameters(**entry)
+
+
+class Facts:
+    """Facts of a run.
+
+    Attributes:
+        robot_name, urdf: of the URDF.
+        mass: [kg].
+        trunk_com: height of the trunk's own CoM above the hips [m].
+        joints, feet: names.
+        legs: for each foot, the indices into ``joints`` of its joints, hip first.
+        torque_limit, velocity_limit: (nu,) of the joints [N m, rad/s].
+        nodes, phases: of the automaton.
+        stiffness_slots: for each node, the Slot of its rear and of its front leg; None without.
+        template: the SLIP model.
+        gait_name, gait_mean_speed: of the gait that the planner leads to [m/s].
+        gait_state, gait_controls: (n,) at its section, (NUM_SLOTS,) by Slot.
+        gait_flight_share: share of its time without a foot on the ground.
+        planner: its class.
+        plant: the world's name; "" where nothing was said of it.
+        options: how the run went, as plain data.
+        fall_reason: why the robot fell; "" where it did not.
+        arrived: whether the route is at its end.
+        interrupted: whether Ctrl-C ended the run.
+        error: that ended it; "" where none did.
+        duration, wall_seconds: of the run, and of the clock on the wall [s].
+        ticks: of the controller.
+        summary: statistics over all of them.
+        sections, strides: names that ``section`` and ``stride`` are indices into.
+        metadata: all of these as plain data, as the file has them.
+    """
+
+    metadata: dict[str, Any]
+
+    robot_name = Fact(str, "robot")
+    urdf = Fact(str)
+    mass = Fact(float)
+    trunk_com = Fact(float)
+    joints: Fact[tuple[str, ...]] = Fact(tuple)
+    feet: Fact[tuple[str, ...]] = Fact(tuple)
+    legs = Fact(_joints_of_legs)
+    torque_limit: Fact[Array] = Fact(np.array)
+    velocity_limit: Fact[Array] = Fact(np.array)
+    nodes: Fact[tuple[str, ...]] = Fact(tuple)
+    phases = Fact(_phases)
+    stiffness_slots: Fact[list[list[int | None]]] = Fact(list)
+    template = Fact(_template)
+    gait_name = Fact(str, "gait")
+    gait_mean_speed = Fact(float)
+    gait_state: Fact[Array] = Fact(np.array)
+    gait_controls: Fact[Array] = Fact(np.array)
+    gait_flight_share = Fact(float)
+    planner = Fact(str)
+    plant = Fact(str)
+    options: Fact[dict[str, Any]] = Fact(dict)
+    fall_reason = Fact(str)
+    arrived = Fact(bool)
+    interrupted = Fact(bool)
+    error = Fact(str)
+    duration = Fact(float)
+    wall_seconds = Fact(float)
+    ticks = Fact(int)
+    summary = Fact(Statistics.read)
+    sections: Fact[tuple[str, ...]] = Fact(tuple)
+    strides: Fact[tuple[str, ...]] = Fact(tuple)
+
+    @property
+    def weight(self) -> float:
+        """Of the robot [N]."""
+        return self.mass * self.template.gravity
+
+    @property
+    def fell(self) -> bool:
+        """True where the run ended in a fall."""
+        return bool(self.fall_reason)

@@ -1,0 +1,210 @@
+"""Statistics over all ticks of a run, whichever of them a record keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.robot.biped import Biped
+
+Array = NDArray[np.float64]
+
+_AT_LIMIT = 0.999  # of a torque's limit: the solver comes no nearer
+
+
+@dataclass(frozen=True)
+class JointTorque:
+    """Torque of a joint [N m].
+
+    Attributes:
+        peak: largest size.
+        rms: root mean square.
+        limit: of the URDF.
+    """
+
+    peak: float
+    rms: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class JointSpeed:
+    """Speed of a joint [rad/s].
+
+    Attributes:
+        peak: largest size.
+        limit: of the URDF.
+    """
+
+    peak: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class JointAngle:
+    """Angle of a joint [rad].
+
+    Attributes:
+        least, most: of the run.
+        lower, upper: of the URDF.
+    """
+
+    least: float
+    most: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class PlanarError:
+    """Template less robot [m].
+
+    Attributes:
+        x, y: of the CoM.
+    """
+
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Statistics over all ticks of a run.
+
+    Attributes:
+        joint_torque, joint_speed, joint_angle: by the joint's name.
+        joint_work: of all joints, positive and negative counted alike [J].
+        saturated_share: of the ticks, with a torque at its limit.
+        qp_failures: ticks without a solved QP.
+        com_error_rms, com_error_max: while a foot is to stand.
+        com_error_flight_rms: in flight; None where there was none.
+    """
+
+    joint_torque: Mapping[str, JointTorque]
+    joint_speed: Mapping[str, JointSpeed]
+    joint_angle: Mapping[str, JointAngle]
+    joint_work: float
+    saturated_share: float
+    qp_failures: int
+    com_error_rms: PlanarError
+    com_error_max: PlanarError
+    com_error_flight_rms: PlanarError | None
+
+    @classmethod
+    def read(cls, table: Mapping[str, Any]) -> Self:
+        """Statistics as a run's metadata have them.
+
+        Args:
+            table: of plain data.
+        """
+        kinds = (("joint_torque", JointTorque), ("joint_speed", JointSpeed))
+        joints = {
+            key: {name: kind(**row) for name, row in table[key].items()}
+            for key, kind in (*kinds, ("joint_angle", JointAngle))
+        }
+        errors = {
+            key: value and PlanarError(**value)
+            for key, value in table.items()
+            if key.startswith("com_error")
+        }
+        return cls(**{**table, **joints, **errors})
+
+
+class Counts(NamedTuple):
+    """Sums and extremes over some ticks.
+
+    Attributes:
+        torque, speed: (nu,) largest size of each joint's torque and speed [N m, rad/s].
+        torque_square: (nu,) sum of squares.
+        least, most: (nu,) of each joint's angle [rad].
+        work: of all joints, taken without its sign [J].
+        saturated, failures: ticks with a torque at its limit, and without a solved QP.
+        ticks: (2,) in stance, in flight.
+        error: (2, 2) template less robot, in stance and in flight, x and y: largest [m].
+        error_square: (2, 2) sum of squares.
+    """
+
+    torque: Array
+    speed: Array
+    torque_square: Array
+    least: Array
+    most: Array
+    work: float
+    saturated: int
+    failures: int
+    ticks: NDArray[np.int64]
+    error: Array
+    error_square: Array
+
+
+def count(block: Mapping[str, Array], torque_limit: Array) -> Counts:
+    """Counts over the rows of a block.
+
+    Args:
+        block: columns of the record by name.
+        torque_limit: (nu,) [N m].
+    """
+    torque, nu = block["torque"], len(torque_limit)
+    angle, speed = block["q"][:, -nu:], block["v"][:, -nu:]
+    size = np.abs(torque)
+    errors, stands = block["template_com"] - block["com"], block["stands"][:, 0] > 0.0
+    sorts = errors[stands], errors[~stands]
+    return Counts(
+        torque=size.max(axis=0, initial=0.0),
+        speed=np.abs(speed).max(axis=0, initial=0.0),
+        torque_square=(torque * torque).sum(axis=0),
+        least=angle.min(axis=0, initial=np.inf),
+        most=angle.max(axis=0, initial=-np.inf),
+        work=float(np.abs(torque * speed).sum(axis=1) @ block["interval"][:, 0]),
+        saturated=int((size >= _AT_LIMIT * torque_limit).any(axis=1).sum()),
+        failures=int((block["solved"] == 0.0).sum()),
+        ticks=np.array([len(some) for some in sorts]),
+        error=np.array([np.abs(some).max(axis=0, initial=0.0) for some in sorts]),
+        error_square=np.array([(some * some).sum(axis=0) for some in sorts]),
+    )
+
+
+def _together(counted: list[Counts]) -> Counts:
+    """Counts over all ticks of several blocks."""
+    fields = dict(zip(Counts._fields, map(np.array, zip(*counted, strict=True)), strict=True))
+    largest = {name: fields.pop(name).max(axis=0) for name in ("torque", "speed", "error", "most")}
+    return Counts(
+        **largest,
+        least=fields.pop("least").min(axis=0),
+        **{name: values.sum(axis=0) for name, values in fields.items()},
+    )
+
+
+def statistics(counted: list[Counts], robot: Biped, torque_limit: Array) -> Statistics:
+    """Statistics of a run.
+
+    Args:
+        counted: of its blocks, one at least.
+        robot: that ran.
+        torque_limit: (nu,) that its controller had [N m].
+    """
+    found = _together(counted)
+    ticks = max(int(found.ticks.sum()), 1)
+    squares = found.error_square / np.maximum(found.ticks, 1)[:, None]
+    (stance, flight), most = np.sqrt(squares).tolist(), found.error[0].tolist()
+    rms = np.sqrt(found.torque_square / ticks)
+
+    def joints(kind: Any, *columns: Array) -> dict[str, Any]:
+        rows = np.column_stack(columns).tolist()
+        return {name: kind(*row) for name, row in zip(robot.joint_names, rows, strict=True)}
+
+    return Statistics(
+        joint_torque=joints(JointTorque, found.torque, rms, torque_limit),
+        joint_speed=joints(JointSpeed, found.speed, robot.velocity_limit),
+        joint_angle=joints(JointAngle, found.least, found.most, robot.joint_range),
+        joint_work=float(found.work),
+        saturated_share=float(found.saturated / ticks),
+        qp_failures=int(found.failures),
+        com_error_rms=PlanarError(*stance),
+        com_error_max=PlanarError(*most),
+        com_error_flight_rms=PlanarError(*flight) if found.ticks[1] else None,
+    )
