@@ -36,7 +36,6 @@ from .run.options import HeadingCommand as HeadingCommand
 from .run.options import Push as Push
 from .run.options import SimulationOptions as SimulationOptions
 from .run.record import Record as Record
-from .run.record import RunInterrupted as RunInterrupted
 from .run.record import load_record as load_record
 from .run.recorder import Recorder as Recorder
 from .run.sensing import SensorOptions as SensorOptions
@@ -50,7 +49,6 @@ from .slip.gaits.running_gait import running_gait as running_gait
 from .slip.gaits.walking_by_speed import gait_for_speed as gait_for_speed
 from .slip.maps.return_map import ReturnMap as ReturnMap
 from .slip.parameters import SlipParameters as SlipParameters
-from .slip.scenario.route import SpeedCommand as SpeedCommand
 from .slip.scenario.route import SpeedProfile as SpeedProfile
 from .slip.scenario.route import SpeedRoute as SpeedRoute
 from .slip.scenario.run import simulate_scenario as simulate_scenario
