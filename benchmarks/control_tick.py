@@ -31,7 +31,7 @@ from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import state_at_vlo, state_in
 from template_control.run.backends import FloatingBackend
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.gaits.gait import gait_at
 from template_control.slip.gaits.running_gait import running_gait
@@ -92,7 +92,7 @@ def _free() -> tuple[EmbeddingController, Any, Any]:
     gait = gait_at(template_for(kind.robot), np.radians(68.0), 0.6)
     route = SteadyRoute.of(gait)
     controller = kind.controller(LqrPlanner(gait), FreeOptions(), route, AUTOMATON)
-    q, v = kind.start(controller, SimulationOptions())
+    q, v = kind.start(controller, Experiment())
     return controller, q, v
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 import template_control as tc
 from template_control.robustness import wilson_interval
-from template_control.run.simulation import perturbed_start
+from template_control.run.experiment import perturbed_start
 from template_control.run.summary import summarise
 from template_control.slip import Scale, WalkingGait
 
@@ -50,7 +50,7 @@ def walk(name: str, robot: str, profile: tc.SpeedProfile, duration: float) -> tc
     """Walk a profile, and say how it went."""
     model = tc.load_robot(robot)
     route = tc.SpeedRoute(tc.template_for(model), profile, duration)
-    record = tc.simulate(model, route, tc.SimulationOptions(record_every=10))
+    record = tc.simulate(tc.Experiment(model, route, record_every=10))
     told, speed = summarise(record, None), record.section_state[:, 0]
     ended = f"FELL: {told['fall_reason']}" if record.fell else "no fall"
     accepted, torques = told["accepted_speed"], told["joint_torque"].values()
@@ -78,8 +78,11 @@ def keep(name: str, count: int, starts: int) -> tc.Record:
         gait = tc.robot_gait_for_speed(robot, float(speed))
         for seed in (None, *range(starts)):
             start = None if seed is None else perturbed_start(gait, seed)
-            options = tc.SimulationOptions(steps=_STEPS, start=start, record_every=10)
-            record = tc.simulate(robot, tc.LqrPlanner(gait), options)
+            record = tc.simulate(
+                tc.Experiment(
+                    robot, planner=tc.LqrPlanner(gait), steps=_STEPS, start=start, record_every=10
+                )
+            )
             print(row(record, gait, float(speed), seed), flush=True)
     return record
 

@@ -27,8 +27,15 @@ def main() -> None:
     around = 2.0 * np.pi / chosen.rate
     course = tc.HeadingCommand(turning_rate=chosen.rate, turns=((around, -chosen.rate),))
     steps = chosen.steps or int(2.0 * around / gait.step_duration)
-    options = tc.SimulationOptions(steps=steps, course=course, record_every=5)
-    record = tc.simulate(bolt, tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER), options)
+    record = tc.simulate(
+        tc.Experiment(
+            bolt,
+            planner=tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER),
+            steps=steps,
+            course=course,
+            record_every=5,
+        )
+    )
     assert isinstance(record, FloatingRecord)
     roll, pitch, yaw = np.abs(record.attitude).max(axis=0)
     print(f"{record.steps} of {steps} steps in {record.time[-1]:.1f} s, fell: {record.fell}")

@@ -11,6 +11,7 @@ last five steps are within 2 % of it in speed and height.
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -28,7 +29,7 @@ DIRECTIONS = range(0, 360, 45)
 
 def trials(
     gait: WalkingGait, phases: list[float], places: int
-) -> Iterator[tuple[str, tc.SimulationOptions]]:
+) -> Iterator[tuple[str, tc.Experiment]]:
     """Name and options of each trial."""
     scale = Scale.of(gait.parameters)
     steps = BEFORE + AFTER
@@ -38,17 +39,17 @@ def trials(
             seconds, direction = PUSH_SECONDS * scale.time, radians(degrees)
             push = tc.Push(impulse, BEFORE, phase, seconds, direction)
             name = f"push to {degrees} deg, phase {phase}"
-            yield name, tc.SimulationOptions(steps=steps, pushes=(push,))
+            yield name, tc.Experiment(steps=steps, pushes=(push,))
     for share in (-0.1, 0.1):
         plant = tc.PlantOptions(mass_scale=1.0 + share)
-        yield f"mass {share:+.0%}", tc.SimulationOptions(steps=steps, plant=plant)
-    yield "friction 0.5", tc.SimulationOptions(steps=steps, plant=tc.PlantOptions(friction=0.5))
-    sensors = tc.SensorOptions.of_size(NOISE, scale, seed=1)
-    yield f"noise {1e3 * NOISE:g} mrad", tc.SimulationOptions(steps=steps, sensors=sensors)
+        yield f"mass {share:+.0%}", tc.Experiment(steps=steps, world=plant)
+    yield "friction 0.5", tc.Experiment(steps=steps, world=tc.PlantOptions(friction=0.5))
+    sensors = tc.SensorOptions(noise=NOISE, seed=1)
+    yield f"noise {1e3 * NOISE:g} mrad", tc.Experiment(steps=steps, sensors=sensors)
     grain = tc.PlantOptions().time_step
     delay = grain * max(1, round(DELAY * scale.time / grain))
-    yield f"delay {1e3 * delay:.3g} ms", tc.SimulationOptions(steps=steps, delay=delay)
-    both = tc.SimulationOptions(steps=steps, sensors=sensors, delay=delay)
+    yield f"delay {1e3 * delay:.3g} ms", tc.Experiment(steps=steps, delay=delay)
+    both = tc.Experiment(steps=steps, sensors=sensors, delay=delay)
     yield f"noise {1e3 * NOISE:g} mrad and delay {1e3 * delay:.3g} ms", both
     lot = np.random.default_rng(7)
     for sign in (1.0, -1.0):
@@ -56,7 +57,7 @@ def trials(
             ground = tc.GroundStep(sign * HEIGHT * scale.length, float(x))
             plant = tc.PlantOptions(ground_step=ground)
             name = f"step of {1e3 * ground.height:+.1f} mm at {x:.2f} m"
-            yield name, tc.SimulationOptions(steps=steps, plant=plant)
+            yield name, tc.Experiment(steps=steps, world=plant)
 
 
 def main() -> None:
@@ -75,7 +76,7 @@ def main() -> None:
     for name, run in trials(gait, options.phases, options.places):
         if not name.startswith(options.only):
             continue
-        record = tc.simulate(robot, planner, run)
+        record = tc.simulate(replace(run, robot=robot, planner=planner))
         assert isinstance(record, FloatingRecord)  # of a free robot
         count += 1
         if record.fell:

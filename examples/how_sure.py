@@ -16,7 +16,6 @@ import numpy as np
 import template_control as tc
 from template_control.embedding import standing_pose
 from template_control.robustness import wilson_interval
-from template_control.slip import Scale
 from template_control.sweep import SweepOptions, sample, sweep
 
 PLANTS = {"pybullet": tc.PlantOptions, "mujoco": tc.MujocoOptions}
@@ -27,14 +26,17 @@ def trial(about: dict[str, str], world: dict[str, float], seed: int) -> dict[str
     model = tc.load_robot(about["robot"])
     template = tc.template_for(model)
     plant = PLANTS[about["plant"]](friction=world["friction"], mass_scale=world["mass"])
-    options = tc.SimulationOptions(
-        plant=plant,
-        pose=standing_pose(template, world["spacing"] * template.rest_length),
-        sensors=tc.SensorOptions.of_size(2e-4, Scale.of(template), seed % 2**32),
-        delay=round(world["delay"]) * plant.time_step,
-        record_every=10,
+    record = tc.simulate(
+        tc.Experiment(
+            model,
+            tc.load_scenario(about["scenario"]),
+            world=plant,
+            pose=standing_pose(template, world["spacing"] * template.rest_length),
+            sensors=tc.SensorOptions(noise=2e-4, seed=seed % 2**32),
+            delay=round(world["delay"]) * plant.time_step,
+            record_every=10,
+        )
     )
-    record = tc.simulate(model, tc.load_scenario(about["scenario"]), options)
     error = record.section_state[1:, 0] - record.section_target[:-1, 0]
     return {
         "arrived": bool(record.arrived),

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 import template_control as tc
+from template_control import robustness
 from template_control.embedding import Planner
-from template_control.robustness import Situation
 from template_control.slip import Scenario, Segment
 from template_control.sweep import SweepOptions, sweep
 
@@ -105,20 +105,22 @@ def trial(robot: str, way: str, disturbance: dict[str, float]) -> dict[str, Any]
     """One run, and how it went."""
     model = tc.load_robot(robot)
     run = tc.RunningPlanner(tc.running_gait(tc.template_for(model), SPEED))
-    route: Planner | Scenario = run
+    planner: Planner | None = run
+    scenario = None
     if way == "walk":
-        route = tc.LqrPlanner(tc.default_gait(model))
+        planner = tc.LqrPlanner(tc.default_gait(model))
         step, last = WALKED, CATCH
     elif way.startswith("at "):
         gait = tc.gait_for_speed(tc.template_for(model), float(way.removeprefix("at ")))
-        route = tc.LqrPlanner(gait)
+        planner = tc.LqrPlanner(gait)
         step, last = WALKED, WALKED + 1 + AFTER
     elif way == "run":
         step, last = BEFORE, BEFORE + 1 + AFTER
     else:
         segments, step = WAYS[way]
         start = (1.1, 0.978, 0.0)
-        route, last = Scenario(segments, map_kind=tc.MapKind.EXACT, start=start), None
+        planner, last = None, None
+        scenario = Scenario(segments, map_kind=tc.MapKind.EXACT, start=start)
     plant, push = tc.PlantOptions(), tuple[tc.Push, ...]()
     if "mass" in disturbance:
         plant, last = tc.PlantOptions(mass_scale=disturbance["mass"]), 2 * AFTER
@@ -128,8 +130,11 @@ def trial(robot: str, way: str, disturbance: dict[str, float]) -> dict[str, Any]
         plant = tc.PlantOptions(ground_step=tc.GroundStep(disturbance["height"], edge))
     else:
         push = (tc.Push(disturbance["impulse"], step, disturbance["phase"]),)
-    options = tc.SimulationOptions(steps=last, plant=plant, pushes=push, record_every=5)
-    record = tc.simulate(model, route, options)
+    record = tc.simulate(
+        tc.Experiment(
+            model, scenario, planner, steps=last, world=plant, pushes=push, record_every=5
+        )
+    )
     kinds = record.kinds_of_stride
     speed, wanted = record.section_state[:, 0], record.section_target[:, 0]
     return {
@@ -148,8 +153,8 @@ def trial(robot: str, way: str, disturbance: dict[str, float]) -> dict[str, Any]
 def footholds(model: Any, planner: tc.RunningPlanner, step: int) -> tuple[float, float]:
     """The last two x of an undisturbed run's ``step`` strides [m]."""
     gait = planner.gait
-    where = Situation(model, gait, planner)
-    before, beyond = where.footholds((*gait.apex, 0.0), step)[-2:]
+    where = tc.Experiment(model, planner=planner).prepare()
+    before, beyond = robustness.footholds(where, (*gait.apex, 0.0), step)[-2:]
     return float(before), float(beyond)
 
 

@@ -72,8 +72,11 @@ def main() -> None:
         falls, slow = 0, 0
         for number, ground in enumerate(grounds(what, trials, gait)):
             plant = tc.PlantOptions(terrain=ground)
-            run = tc.SimulationOptions(steps=row.steps, plant=plant, record_every=5)
-            record = tc.simulate(robot, tc.LqrPlanner(gait), run)
+            record = tc.simulate(
+                tc.Experiment(
+                    robot, planner=tc.LqrPlanner(gait), steps=row.steps, world=plant, record_every=5
+                )
+            )
             speed = record.section_state[-5:, 0].mean() / gait.state[0] - 1.0
             falls += record.fell
             slow += not record.fell and abs(speed) > 0.03

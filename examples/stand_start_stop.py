@@ -41,10 +41,9 @@ def walk(robot: PlanarBiped, speed: float, segments: list[Segment], spacing: flo
     stands = segments[0].gait == "stand"
     pose = standing_pose(p, spacing * p.rest_length) if stands else None
     return tc.simulate(
-        robot,
-        ScenarioRoute(scenario, walks="wp"),
-        tc.SimulationOptions(pose=pose, record_every=5),
-        planners=planners,
+        tc.Experiment(
+            robot, ScenarioRoute(scenario, walks="wp"), planner=planners, pose=pose, record_every=5
+        )
     )
 
 
@@ -77,14 +76,18 @@ def pushes(robot: PlanarBiped) -> Iterator[tuple[str, tc.Record]]:
     scale = robot.mass * np.sqrt(p.rest_length) / 80.0
     for spacing, side in SIDES:
         for size in PUSHES:
-            options = tc.SimulationOptions(
-                steps=BEATS,
-                pose=standing_pose(p, spacing * p.rest_length),
-                pushes=(tc.Push(side * size * scale, step=1),),
-                record_every=5,
-            )
             route = SteadyRoute(p, "s", [0.0, 0.97 * p.rest_length, 0.0])
-            record = tc.simulate(robot, route, options, planners=standing_planners(p))
+            record = tc.simulate(
+                tc.Experiment(
+                    robot,
+                    route,
+                    planner=standing_planners(p),
+                    steps=BEATS,
+                    pose=standing_pose(p, spacing * p.rest_length),
+                    pushes=(tc.Push(side * size * scale, step=1),),
+                    record_every=5,
+                )
+            )
             yield f"{spacing} m apart, {side * size:+g} N s", record
 
 

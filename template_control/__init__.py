@@ -3,7 +3,7 @@
 >>> import template_control as tc
 >>> robot = tc.load_robot("five-link")
 >>> gait = tc.gait_for_speed(tc.template_for(robot), mean_speed=1.2)
->>> record = tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=4))
+>>> record = tc.simulate(tc.Experiment(robot, planner=tc.LqrPlanner(gait), steps=4))
 >>> record.steps, record.fell
 (4, False)
 

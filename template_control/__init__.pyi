@@ -31,10 +31,9 @@ from .robot.five_link import Link as Link
 from .robot.library import load_floating_robot as load_floating_robot
 from .robot.library import load_robot as load_robot
 from .robot.planar_biped import PlanarBiped as PlanarBiped
-from .run.config import RunConfig as RunConfig
+from .run.experiment import Experiment as Experiment
 from .run.options import HeadingCommand as HeadingCommand
 from .run.options import Push as Push
-from .run.options import SimulationOptions as SimulationOptions
 from .run.record import Record as Record
 from .run.record import load_record as load_record
 from .run.recorder import Recorder as Recorder

@@ -41,10 +41,22 @@ DEPRECATED = {
     "template_control.run.Course": "template_control.run:HeadingCommand",
     "template_control.run.FreeRecord": "template_control.run:FloatingRecord",
     "template_control.run.GaitChoice": "template_control.run:GaitSpec",
-    "template_control.run.RobotChoice": "template_control.run:RobotSpec",
+    "template_control.run.RobotChoice": "template_control.robot:RobotSpec",
+    "template_control.run.RobotSpec": "template_control.robot:RobotSpec",
     "template_control.whole_body.Wanted": "template_control.whole_body:References",
 }
 """Old name -> new one, as "package:name" of a public package."""
+
+_OLD = "template_control.run.old"
+ADAPTED = {
+    "template_control.RunConfig": _OLD,
+    "template_control.SimulationOptions": _OLD,
+    "template_control.run.RunConfig": _OLD,
+    "template_control.run.SimulationOptions": _OLD,
+    "template_control.robustness.Situation": _OLD,
+    "template_control.robustness.Subject": _OLD,
+}
+"""Old name -> module of what makes an :class:`~.Experiment` of its arguments."""
 
 
 def attach_stub(
@@ -63,10 +75,15 @@ def attach_stub(
 
     def attribute_or_deprecated(name: str) -> object:
         old = f"{package}.{name}"
-        if old not in DEPRECATED:
+        if old in ADAPTED:
+            home, new = "template_control", "Experiment"
+        elif old in DEPRECATED:
+            home, _, new = DEPRECATED[old].partition(":")
+        else:
             return attribute(name)
-        home, _, new = DEPRECATED[old].partition(":")
         warnings.warn(f"{old} is deprecated: use {home}.{new}", DeprecationWarning, stacklevel=2)
+        if old in ADAPTED:
+            return getattr(importlib.import_module(ADAPTED[old]), name)
         return getattr(importlib.import_module(home), new)
 
     return attribute_or_deprecated, directory, names

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import tomli_w
@@ -26,6 +26,9 @@ from template_control.errors import ParameterError, TemplateControlError
 T = TypeVar("T")
 
 _KIND = "kind"
+PYTHON_ONLY = {"python_only": True}
+"""Metadata of a field that a file leaves out."""
+
 _NUMBERS = re.compile(r"""\[\n((?:\ +[^\s"'\[\]{},]+,\n)+)\ *\]""")
 """A list of numbers, one a line, as ``tomli_w`` writes it: texts have quotes, and no line break."""
 _SCALARS = {
@@ -36,12 +39,17 @@ _SCALARS = {
 }
 
 
-def read(kind: type[T], path: str | Path) -> T:
+def read(
+    kind: type[T],
+    path: str | Path,
+    translated: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
+) -> T:
     """A dataclass from a TOML file.
 
     Args:
         kind: the dataclass.
         path: of the file. Keys that it leaves out keep their defaults.
+        translated: makes a table of today of one of an earlier version.
 
     Raises:
         ParameterError: naming the file and the key, if it cannot be read, has an unknown key or a
@@ -54,7 +62,7 @@ def read(kind: type[T], path: str | Path) -> T:
     except (ValueError, RecursionError) as error:  # of the parser, of UTF-8, of dates, of numbers
         raise ParameterError(f"{path} is no TOML: {error}") from None
     try:
-        return from_table(kind, table)
+        return from_table(kind, table if translated is None else translated(table))
     except ValueError as error:
         raise ParameterError(f"{path}: {error}") from None
 
@@ -89,11 +97,93 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
     for name, f in known.items():
         if name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise ParameterError(f"{where or 'the table'} has no {name}: give one")
+    return _made(lambda: kind(**values), kind, where)
+
+
+def _made(make: Callable[[], T], kind: type, where: str) -> T:
+    """What ``make`` makes of a dataclass; its errors name the key, and not the class."""
     try:
-        return kind(**values)
-    except TemplateControlError as error:  # which names the class, and not the key
+        return make()
+    except TemplateControlError as error:
         text = str(error).replace(f"{kind.__name__}.", f"{where}." if where else "")
         raise type(error)(text) from None
+
+
+def changed(options: T, keys: Mapping[str, Any]) -> T:
+    """A dataclass with some of its keys set.
+
+    Args:
+        options: the dataclass instance.
+        keys: values by dotted key, such as ``{"world.friction": 0.5}``; as TOML says them, or as
+            the fields hold them. Another ``kind`` keeps what was set and
+            both kinds have.
+
+    Raises:
+        ParameterError: naming the key, if it is unknown or its value does not fit.
+    """
+    return _changed(options, [(tuple(key.split(".")), value) for key, value in keys.items()], "")
+
+
+_Entries = list[tuple[tuple[str, ...], Any]]
+"""Values by path."""
+
+
+def _changed(options: T, entries: _Entries, where: str) -> T:
+    kind = type(options)
+    known = {f.name for f in fields(kind) if f.init}  # type: ignore[arg-type]
+    hints = get_type_hints(kind)
+    values: dict[str, Any] = {}
+    for (name, *path), value in sorted(entries, key=lambda entry: len(entry[0])):
+        if name == _KIND and hasattr(kind, _KIND):
+            continue  # its owner has looked at it
+        place = f"{where}.{name}" if where else name
+        if name not in known:
+            raise ParameterError(f"unknown key {place}: known are {', '.join(sorted(known))}")
+        if not path:
+            values[name] = _value(hints[name], value, place)
+    for name in known & {path[0] for path, _ in entries if len(path) > 1}:
+        deeper = [(path[1:], value) for path, value in entries if path[0] == name and path[1:]]
+        current = values.get(name, getattr(options, name))
+        place = f"{where}.{name}" if where else name
+        values[name] = _deeper(hints[name], current, deeper, place)
+    return _made(lambda: replace(options, **values), kind, where)  # type: ignore[type-var]
+
+
+def _value(hint: Any, value: Any, where: str) -> Any:
+    """A value as TOML says it, read; any other one as it is."""
+    said = isinstance(value, bool | int | float | str | dict)
+    said |= isinstance(value, list) and not any(is_dataclass(entry) for entry in value)
+    return _read(hint, value, where) if said else value
+
+
+def _deeper(hint: Any, current: Any, entries: _Entries, where: str) -> Any:
+    """A field's value with keys of its own set."""
+    if isinstance(current, Mapping) or current is None:
+        table: dict[str, Any] = dict(current or {})
+        for path, value in entries:
+            inner = table
+            for name in path[:-1]:
+                inner = inner.setdefault(name, {})
+            inner[path[-1]] = value
+        return _read(hint, table, where)
+    if not is_dataclass(current):
+        raise ParameterError(f"{where} is a {type(current).__name__}: it has no keys to set")
+    kinds = _kinds(get_args(hint))
+    wanted = next((value for path, value in entries if path == (_KIND,)), None)
+    if wanted is None or not kinds or wanted == getattr(current, _KIND, None):
+        return _changed(current, entries, where)
+    if wanted not in kinds:
+        raise ParameterError(f"{where}.{_KIND} is {wanted!r}: give one of {', '.join(kinds)}")
+    made = kinds[wanted]
+    own = {f.name for f in fields(current) if not _is_default(f, getattr(current, f.name))}
+    shared = own & {f.name for f in fields(made)}
+    hints = get_type_hints(made)
+    values = {name: getattr(current, name) for name in shared} | {
+        path[0]: _value(hints[path[0]], value, f"{where}.{path[0]}")
+        for path, value in entries
+        if len(path) == 1 and path[0] in hints and path[0] != _KIND
+    }
+    return _changed(_made(lambda: made(**values), made, where), entries, where)
 
 
 def _read(hint: Any, value: Any, where: str) -> Any:
@@ -131,9 +221,16 @@ def _read(hint: Any, value: Any, where: str) -> Any:
     raise ParameterError(f"{where} can be given in Python only: leave it out")
 
 
+def _kinds(hints: Sequence[Any]) -> dict[str, Any]:
+    """The dataclasses of a union that have a ``kind``, by it."""
+    return {getattr(h, _KIND): h for h in hints if is_dataclass(h) and hasattr(h, _KIND)}
+
+
 def _read_one_of(hints: list[Any], value: Any, where: str) -> Any:
     """A value of the first type, or of the dataclass whose ``kind`` the table names."""
-    kinds: dict[str, Any] = {hint.kind: hint for hint in hints if hasattr(hint, _KIND)}
+    kinds = _kinds(hints)
+    if isinstance(value, str) and str in hints:
+        return value
     if not kinds:
         return _read(hints[0], value, where)
     if not isinstance(value, dict):
@@ -155,6 +252,72 @@ def _read_tuple(hints: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ..
     return tuple(_read(hint, entry, f"{where}[{i}]") for i, (hint, entry) in enumerate(pairs))
 
 
+class Leaf(NamedTuple):
+    """A key of a file that holds no table.
+
+    Attributes:
+        path: dotted.
+        hint: what its value may be.
+        default: in the first kind of table that has the key; None where there is none.
+    """
+
+    path: str
+    hint: Any
+    default: Any
+
+
+def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
+    """The keys that a dataclass's file can have, of all kinds of its tables.
+
+    Args:
+        kind: the dataclass.
+        where: its own key; "" for the whole file.
+    """
+    found: dict[str, Leaf] = {}
+    hints = get_type_hints(kind)
+    for f in fields(kind):
+        if f.metadata.keys() >= PYTHON_ONLY.keys():
+            continue
+        place = f"{where}.{f.name}" if where else f.name
+        hint = hints[f.name]
+        union = [h for h in get_args(hint) if h is not NoneType] if _is_union(hint) else [hint]
+        tables = [h for h in union if is_dataclass(h) and _said(h)]
+        if tables:
+            if kinds := _kinds(tables):
+                found.setdefault(
+                    f"{place}.{_KIND}", Leaf(f"{place}.{_KIND}", str, next(iter(kinds)))
+                )
+            for table in tables:
+                for leaf in leaves(table, place):
+                    found.setdefault(leaf.path, leaf)
+        elif _said(hint):
+            default = f.default if f.default_factory is MISSING else f.default_factory()
+            found.setdefault(place, Leaf(place, hint, None if default is MISSING else default))
+    return iter(found.values())
+
+
+def _is_union(hint: Any) -> bool:
+    return get_origin(hint) in (Union, UnionType)
+
+
+def _said(hint: Any) -> bool:
+    """Whether TOML can say values of a type."""
+    arguments = get_args(hint)
+    if _is_union(hint):
+        return any(_said(h) for h in arguments if h is not NoneType)
+    origin = get_origin(hint)
+    if origin is tuple:
+        return all(_said(h) for h in arguments if h is not Ellipsis)
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return arguments[0] is str and _said(arguments[1])
+    if is_dataclass(hint):
+        required = [f for f in fields(hint) if f.default is MISSING is f.default_factory]
+        hints = get_type_hints(hint)
+        return all(_said(hints[f.name]) for f in required)
+    known = hint in _SCALARS or origin in (Literal, np.ndarray)
+    return known or (isinstance(hint, type) and issubclass(hint, Enum))
+
+
 def to_table(options: Any, where: str = "") -> dict[str, Any]:
     """A dataclass as a table, with every value that TOML can say.
 
@@ -167,17 +330,27 @@ def to_table(options: Any, where: str = "") -> dict[str, Any]:
             Python only.
     """
     table: dict[str, Any] = {_KIND: options.kind} if hasattr(options, _KIND) else {}
+    hints = get_type_hints(type(options))
     for f in fields(options):
         value = getattr(options, f.name)
         place = f"{where}.{f.name}" if where else f.name
         if value is None:
             continue
         try:
+            if not _fits(hints[f.name], value) or f.metadata.keys() >= PYTHON_ONLY.keys():
+                raise ParameterError(f"{place} is {type(value).__name__}, which TOML cannot say")
             table[f.name] = _toml_value(value, place)
         except ParameterError:
             if not _is_default(f, value):
                 raise
     return table
+
+
+def _fits(hint: Any, value: Any) -> bool:
+    """Whether a field's dataclass is one that its table can be read as."""
+    if not is_dataclass(value) or isinstance(value, type):
+        return True
+    return type(value) in (get_args(hint) if _is_union(hint) else (hint,))
 
 
 def _is_default(f: Field[Any], value: Any) -> bool:
@@ -197,9 +370,23 @@ def _toml_value(value: Any, where: str) -> Any:
         return value
     if isinstance(value, tuple | list):
         return [_toml_value(entry, where) for entry in value]
-    if isinstance(value, Mapping) and all(type(key) is str for key in value):
-        return {key: _toml_value(entry, f"{where}.{key}") for key, entry in value.items()}
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {str(key): _toml_value(entry, f"{where}.{key}") for key, entry in value.items()}
     raise ParameterError(f"{where} is {type(value).__name__}, which TOML cannot say")
+
+
+def literal(value: Any) -> str:
+    """A field's value as TOML text on one line.
+
+    Raises:
+        ParameterError: if TOML cannot say it.
+    """
+    said = _toml_value(value, "the value")
+    if isinstance(said, Mapping):
+        return "{" + ", ".join(f"{key} = {literal(entry)}" for key, entry in said.items()) + "}"
+    if isinstance(said, list):
+        return "[" + ", ".join(map(literal, said)) + "]"
+    return tomli_w.dumps({"x": said}).removeprefix("x = ").strip()
 
 
 def text(table: Mapping[str, Any]) -> str:

@@ -62,7 +62,7 @@ def paper_gait():
 def long_walk(default_gait):
     """Twelve steps of the five-link robot on its default gait, recorded."""
     robot = tc.load_robot("five-link")
-    return tc.simulate(robot, tc.LqrPlanner(default_gait), tc.SimulationOptions(steps=12))
+    return tc.simulate(tc.Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=12))
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def random_states():
 def short_walk(default_gait):
     """Four steps of the five-link robot on its default gait, recorded."""
     robot = tc.load_robot("five-link")
-    return tc.simulate(robot, tc.LqrPlanner(default_gait), tc.SimulationOptions(steps=4))
+    return tc.simulate(tc.Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=4))
 
 
 @pytest.fixture

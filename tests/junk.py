@@ -34,7 +34,7 @@ MAP = tc.ReturnMap(P)
 PLANNER = tc.LqrPlanner(GAIT)
 RUN = slip.running_gait(P, 3.0)
 ROUTE = slip.SteadyRoute.of(GAIT)
-RECORD = tc.simulate(ROBOT, PLANNER, tc.SimulationOptions(steps=1, record_every=20))
+RECORD = tc.simulate(tc.Experiment(ROBOT, planner=PLANNER, steps=1, record_every=20))
 NAMES = ("", "[/nope]", "$x^{", ":bus:", "walk", "w", "r", "a\nb", "nul\0", "five-link", "ü" * 80)
 
 
@@ -97,7 +97,7 @@ things = st.sampled_from(
         U,
         tc.Push(1.0),
         tc.PlantOptions(),
-        tc.SimulationOptions(steps=1),
+        tc.Experiment(steps=1),
     ]
 )
 junk = st.one_of(
@@ -117,7 +117,7 @@ def targets(folder):
     options = (
         tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.MujocoOptions, tc.PlantOptions,
         tc.SensorOptions, tc.Terrain,
-        tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
+        tc.Experiment, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
         embedding.FrictionOptions,
         embedding.AheadOptions,
         embedding.ModifiedOptions, embedding.ReplanOptions,
@@ -207,13 +207,12 @@ def targets(folder):
         embedding.robot_route: {"robot": ROBOT, "scenario": SCENARIO},
         run.perturbed_start: {"gait": GAIT, "seed": 1},
         run.summarise: {"record": RECORD, "path": "x"},
-        tc.simulate: {"robot": ROBOT, "route": PLANNER,
-                      "options": tc.SimulationOptions(steps=1, record_every=20)},
+        tc.simulate: {"experiment": tc.Experiment(ROBOT, planner=PLANNER, steps=1)},
         sweep.grid: {"a": [1, 2]},
         sweep.sample: {"count": 2, "seed": 1, "a": (0.0, 1.0)},
         sweep.item_seed: {"seed": 1, "index": 1},
-        measure: {"robot": "no robot"},
-        trial: {"robot": "no robot", "disturbance": "noise", "level": 1.0, "number": 1},
+        measure: {"experiment": "no robot"},
+        trial: {"experiment": {"robot": {}}, "disturbance": "noise", "level": 1.0, "number": 1},
         tc.Record.load: {"path": "nowhere"},
         tc.save_figures: {"record": "no record", "folder": folder},
         tc.save_html: {"record": "no record", "path": folder / "a.html"},

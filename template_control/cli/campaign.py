@@ -12,16 +12,17 @@ from rich.table import Table
 from template_control import settings
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
-from template_control.cli.run_options import add_robot_options, robot_choice
+from template_control.cli.experiment_options import add_flags, experiment_from
+from template_control.cli.flags import SUBJECT
 from template_control.cli.trial_options import (
-    add_engine,
-    add_gait,
     add_printed,
     add_workers,
     draw,
+    folder_of,
     kept,
 )
 from template_control.plant.c_library import stdout_to_stderr
+from template_control.plant.plant import plant_name
 from template_control.robustness.campaign import (
     FLOATING_MIX,
     OFF_GAIT,
@@ -32,7 +33,8 @@ from template_control.robustness.campaign import (
     run_campaign,
     save_falls,
 )
-from template_control.run.specs import GaitSpec, RobotSpec
+from template_control.run.experiment import Experiment
+from template_control.run.specs import GaitSpec
 from template_control.storage import Files, write_text, writing
 from template_control.sweep.executor import workers
 from template_control.terminal import plain_console
@@ -51,12 +53,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " and writes a file that repeats it. Ctrl-C and the same command again go on where it was."
         " Exit status: 0, 2 for bad input, 130 after Ctrl-C."
     )
-    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
-    add_robot_options(parser)
-    add_gait(parser, "of the gait, as walk or run take it")
-    add_engine(parser)
+    add_flags(parser, SUBJECT)
     parser.add_argument(
-        "--trials", type=values.whole(values.MANY), default=100, metavar="N", help="how many"
+        "--trials",
+        type=values.whole(values.MANY),
+        default=100,
+        metavar="N",
+        help="how many, 100 if not given",
     )
     parser.add_argument(
         "--mix",
@@ -72,7 +75,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FACTOR",
         help="all ranges so many times as wide about where nothing disturbs",
     )
-    parser.add_argument("--seed", type=values.whole(values.SEED), default=0, help="of all draws")
+    parser.add_argument(
+        "--seed", dest="draws", type=values.whole(values.SEED), default=0, help="of all draws"
+    )
     add_workers(parser)
     parser.add_argument(
         "--output",
@@ -90,18 +95,12 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         TemplateControlError: naming the option that is wrong.
     """
-    chosen = robot_choice(options, RobotSpec())
-    default = FLOATING_MIX if chosen.free else DisturbanceDistribution()
+    experiment = experiment_from(options, Experiment())
+    default = FLOATING_MIX if experiment.free else DisturbanceDistribution()
     mix = default if options.mix is None else settings.read(DisturbanceDistribution, options.mix)
-    conditions = CampaignConfig(
-        chosen,
-        GaitSpec(options.gait, options.speed),
-        options.plant,
-        mix.times(options.severity),
-        options.seed,
-    )
+    conditions = CampaignConfig(experiment, mix.times(options.severity), options.draws)
     robot = conditions.trial(0)[1].robot  # before a folder is made for it
-    with writing(options.output or Path("runs/campaign") / _name(robot.name, conditions)) as folder:
+    with writing(folder_of(options, experiment, "runs/campaign", robot.name)) as folder:
         return _try(options, conditions, folder)
 
 
@@ -126,17 +125,6 @@ def _try(options: argparse.Namespace, conditions: CampaignConfig, folder: Path) 
     return 0
 
 
-def _name(robot: str, conditions: CampaignConfig) -> str:
-    parts = [robot]
-    if conditions.robot.free:
-        parts.append("free")
-    if conditions.gait.name != "walk":
-        parts.append(conditions.gait.name)
-    if conditions.plant != CampaignConfig().plant:
-        parts.append(conditions.plant)
-    return "-".join(parts)
-
-
 def _save_mix(mix: DisturbanceDistribution, folder: Path) -> Path:
     head = "# template-control campaign --mix FILE draws from these ranges.\n"
     return write_text(folder / "mix.toml", head + settings.text(settings.to_table(mix)))
@@ -155,10 +143,11 @@ def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:
         first, speed_error, severity, config.
     """
     conditions = found.conditions
+    table = settings.to_table(conditions.experiment.resolved())
     return {
-        "robot": conditions.robot.model,
-        "gait": settings.to_table(conditions.gait),
-        "plant": conditions.plant,
+        "robot": found.conditions.experiment.robot_name,
+        "gait": table["motion"],
+        "plant": table["world"]["kind"],
         "trials": len(found.trials),
         "mix": settings.to_table(conditions.mix),
         "fell": _share(found, found.fell),
@@ -197,9 +186,12 @@ _COLUMNS = ("of the trials", "count", "share", "with 95 % confidence")
 
 
 def _title(found: Campaign) -> str:
-    c = found.conditions
-    speed = "" if c.gait.speed is None else f" at {c.gait.speed:g} m/s"
-    return f"{c.robot.model}, {c.gait.name}{speed}, in {c.plant}: {len(found.trials)} trials"
+    e = found.conditions.experiment
+    gait = e.motion if isinstance(e.motion, GaitSpec) else GaitSpec()
+    speed = "" if gait.speed is None else f" at {gait.speed:g} m/s"
+    return (
+        f"{e.robot_name}, {gait.name}{speed}, in {plant_name(e.world)}: {len(found.trials)} trials"
+    )
 
 
 def markdown(found: Campaign) -> str:
@@ -228,7 +220,7 @@ def _print_tables(found: Campaign, falls: dict[int, Path], figure: Path | None) 
         for t in wrong[:_LISTED]:
             end = t.reason or f"{t.speed_error or 0.0:+.1%} in speed"
             file = falls.get(t.number)
-            command = "" if file is None else f"{found.conditions.gait.name} --config {file}"
+            command = "" if file is None else f"walk --config {file}"
             listed.add_row(str(t.number), t.first, end, command)
         console.print(listed)
         if len(wrong) > _LISTED:

@@ -29,7 +29,8 @@ class _Command(NamedTuple):
     """A command of the command line.
 
     Attributes:
-        module: where its ``add_options(parser)`` and its ``run(options)`` are.
+        module: where its ``add_options(parser)`` and its ``run(options)`` are; after a colon the
+            object of the module that has them.
         about: one line.
     """
 
@@ -39,15 +40,15 @@ class _Command(NamedTuple):
 
 _COMMANDS = {
     "walk": _Command(
-        "template_control.cli.walk",
+        "template_control.cli.motion:WALK",
         "walk a robot that follows the SLIP template, headless, and report",
     ),
     "run": _Command(
-        "template_control.cli.run",
+        "template_control.cli.motion:RUN",
         "run a robot that follows the SLIP template, headless, and report",
     ),
     "go": _Command(
-        "template_control.cli.go",
+        "template_control.cli.motion:GO",
         "take a robot through a scenario of gaits and speeds, the template beside it",
     ),
     "robots": _Command(
@@ -78,6 +79,10 @@ _COMMANDS = {
     "automaton": _Command(
         "template_control.cli.automaton",
         "show the hybrid automaton that simulator, planners and robot controller read",
+    ),
+    "keys": _Command(
+        "template_control.cli.keys",
+        "list all keys of an experiment's file, each of which is an option of walk, run and go",
     ),
     "warm-up": _Command(
         "template_control.cli.warm_up",
@@ -152,9 +157,11 @@ def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     for name, command in _COMMANDS.items():
         sub_parser = commands.add_parser(name, help=command.about)
         if name == wanted:
-            module = importlib.import_module(command.module)
-            module.add_options(sub_parser)
-            sub_parser.set_defaults(run=module.run)
+            module, _, name = command.module.partition(":")
+            found: Any = importlib.import_module(module)
+            found = getattr(found, name) if name else found
+            found.add_options(sub_parser)
+            sub_parser.set_defaults(run=found.run)
     return parser
 
 
@@ -162,7 +169,7 @@ def _with_values(arguments: Sequence[str] | None) -> list[str]:
     """The words, an option joined with a value that begins with a minus and a digit."""
     words: list[str] = []
     for word in sys.argv[1:] if arguments is None else arguments:
-        if words and re.match(r"-[\d.]", word) and re.fullmatch(r"--[a-z-]+", words[-1]):
+        if words and re.match(r"-[\d.]", word) and re.fullmatch(r"--[a-z_.-]+", words[-1]):
             words[-1] += f"={word}"
         else:
             words.append(word)

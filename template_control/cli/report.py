@@ -6,7 +6,7 @@ import argparse
 import logging
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,15 +16,58 @@ from rich.console import Console
 from rich.table import Table
 
 from template_control import view
+from template_control.checks import option_types as values
 from template_control.cli.interrupts import stopped
-from template_control.cli.world_options import output_folder
 from template_control.errors import TemplateControlError
 from template_control.plant.c_library import stdout_to_stderr
 from template_control.run import failures
-from template_control.run.config import PreparedRun, RunConfig
+from template_control.run.experiment import STEPS, Experiment, PreparedExperiment
 from template_control.run.record import Record, RunInterrupted, one_line, recorded
-from template_control.storage import Files
+from template_control.run.simulation import simulate
+from template_control.storage import Files, writing
 from template_control.terminal import bar, plain_console
+
+
+def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
+    """Add ``--output``, ``--json`` and ``--no-figures``.
+
+    Args:
+        parser: of the command.
+        folder: where runs go if nothing else is said.
+    """
+    parser.add_argument(
+        "--output",
+        type=values.path,
+        default=Path(folder),
+        help=f"folder for run.npz, run.toml and figures, {folder} if not given; a run that is"
+        " there is replaced, and the command says so",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
+    )
+    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+
+
+@contextmanager
+def output_folder(folder: Path) -> Iterator[Path]:
+    """Keep a folder for a run; says on stderr if a run in it will be replaced.
+
+    Args:
+        folder: as asked for.
+
+    Yields:
+        The folder; see :func:`~template_control.storage.writing`.
+
+    Raises:
+        RecordError: if nothing can be written there, or another command writes there now.
+    """
+    with writing(folder):
+        if (folder / "run.npz").exists():
+            print(
+                f"template-control: the run in {folder} will be replaced; --output keeps both",
+                file=sys.stderr,
+            )
+        yield folder
 
 
 @dataclass(frozen=True)
@@ -59,8 +102,8 @@ class Kept:
 
 def run_and_keep(
     options: argparse.Namespace,
-    config: RunConfig,
-    ready: PreparedRun,
+    experiment: Experiment,
+    prepared: PreparedExperiment,
     doing: str,
     more: Callable[[Record, Path], Any] | None = None,
 ) -> Kept:
@@ -68,8 +111,8 @@ def run_and_keep(
 
     Args:
         options: as parsed: where it is kept.
-        config: the run.
-        ready: what it is made of.
+        experiment: as it is written.
+        prepared: the same, as it is run.
         doing: what the progress bar says.
         more: writes further files of the record into the folder; not after Ctrl-C.
 
@@ -78,21 +121,23 @@ def run_and_keep(
             recorded until then is kept, and its traceback is printed if it is another error.
     """
     files = Files()
+    ends = isinstance(prepared.planner, Mapping)  # of a route; a gait is kept for ever
+    total = prepared.steps or (None if ends else STEPS)
     with output_folder(options.output) as folder, stdout_to_stderr():
         try:
             with (
-                progress_bar(plain_console(stderr=True), doing, config.simulation.steps) as advance,
+                progress_bar(plain_console(stderr=True), doing, total) as advance,
                 _failures_told(),
             ):
-                record = ready.run(config.simulation, advance)
+                record = simulate(prepared, advance)
         except RunInterrupted as stop:
             record = stop.record
         except Exception as error:
             if stopped():  # what Ctrl-C ends may end with any error
                 raise
-            _give_up(error, config, folder)
+            _give_up(error, experiment, folder)
         path = files.write(lambda: record.save(folder / "run.npz"))
-        files.write(lambda: config.save(folder / "run.toml"))
+        files.write(lambda: experiment.save(folder / "run.toml"))
         if not record.interrupted:
             if not options.no_figures:
                 files.write(lambda: view.save_figures(record, folder))
@@ -119,20 +164,20 @@ def _failures_told() -> Iterator[None]:
         failures.LOG.removeHandler(lines)
 
 
-def _give_up(error: Exception, config: RunConfig, folder: Path) -> NoReturn:
+def _give_up(error: Exception, experiment: Experiment, folder: Path) -> NoReturn:
     """Keep what a run had recorded when an error ended it, and tell the error.
 
     Args:
         error: that is being handled. Of one that is not this library's the traceback is printed:
             it leads into the user's own code.
-        config: the run.
+        experiment: that was run.
         folder: for its files.
     """
     record, files = recorded(error), Files()
     line = one_line(error) if record is None else record.error
     if record is not None:
         path = files.write(lambda: record.save(folder / "run.npz"))
-        files.write(lambda: config.save(folder / "run.toml"))
+        files.write(lambda: experiment.save(folder / "run.toml"))
         if path is not None:
             line += f"; the run up to here is in {path}"
     if isinstance(error, TemplateControlError):

@@ -10,22 +10,21 @@ from typing import Any
 from rich.table import Table
 
 from template_control.checks import option_types as values
-from template_control.cli.run_options import add_robot_options, robot_choice
+from template_control.cli.experiment_options import add_flags, experiment_from
+from template_control.cli.flags import SUBJECT
 from template_control.cli.trial_options import (
-    add_engine,
-    add_gait,
     add_printed,
     add_workers,
     draw,
+    folder_of,
     kept,
 )
-from template_control.errors import ParameterError
 from template_control.plant.c_library import stdout_to_stderr
 from template_control.robustness.disturbances import AFTER, ALL
 from template_control.robustness.findings import Finding, Robustness
 from template_control.robustness.severity_sweep import SETTLED, measure
-from template_control.robustness.subject import Subject
-from template_control.run.specs import GaitSpec, RobotSpec
+from template_control.run.experiment import Experiment
+from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writing
 from template_control.sweep.executor import workers
@@ -56,9 +55,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " and the same command again go on where it was. Exit status: 0, 2 for bad input"
         " or a robot that falls undisturbed, 130 after Ctrl-C."
     )
-    parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
-    add_robot_options(parser)
-    add_gait(parser, "of a run at apex, 3 m/s for l0 = 1 m if not given; of a free walk the mean")
+    add_flags(parser, SUBJECT)
     parser.add_argument(
         "--disturbance",
         action="append",
@@ -66,7 +63,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"only this one; may be given several times. One of {', '.join(_NAMES)}",
     )
-    add_engine(parser)
     parser.add_argument(
         "--quick", action="store_true", help="two levels of two trials each, to see that it works"
     )
@@ -74,33 +70,25 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output",
         type=values.path,
-        help="folder for the trials and the figure; by default runs/robustness/ROBOT, with -run of"
-        " a run, -free of a free robot, and the engine's name if it is not PyBullet",
+        help="folder for the trials and the figure; by default runs/robustness/ROBOT, with -free"
+        " of a floating base, the gait's name if it is no walk, and the engine's if it is another",
     )
     add_printed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure as told; returns 0, or 130 after Ctrl-C.
-
-    Raises:
-        ParameterError: if a walk is given a speed.
-    """
-    # Before a folder is made for it.
-    choice = robot_choice(options, RobotSpec())
-    speed, name = _speed(options, choice), Path(choice.model).stem
-    name += "-free" * choice.free + "-run" * (options.gait == "run")
-    name += f"-{options.plant}" * (options.plant != Subject.plant)
-    subject = Subject(choice, speed, options.plant)
-    with writing(options.output or Path("runs/robustness") / name) as folder:
-        return _measure(options, subject, folder)
+    """Measure as told; returns 0, or 130 after Ctrl-C."""
+    experiment = experiment_from(options, Experiment())
+    where = experiment.prepare()  # before a folder is made for it
+    with writing(folder_of(options, experiment, "runs/robustness", where.robot.name)) as folder:
+        return _measure(options, experiment, folder)
 
 
-def _measure(options: argparse.Namespace, subject: Subject, folder: Path) -> int:
+def _measure(options: argparse.Namespace, experiment: Experiment, folder: Path) -> int:
     """Measure, with trials and figure in ``folder``."""
     try:
         with workers(options.workers) as pool, stdout_to_stderr():
-            found = measure(subject, options.disturbance, folder, pool, options.quick)
+            found = measure(experiment, options.disturbance, folder, pool, options.quick)
     except KeyboardInterrupt:
         return kept(folder)
     files = Files()
@@ -113,22 +101,6 @@ def _measure(options: argparse.Namespace, subject: Subject, folder: Path) -> int
         _print_table(found, figure)
     files.raise_pending()
     return 0
-
-
-def _speed(options: argparse.Namespace, choice: RobotSpec) -> float | None:
-    """Of a run, dx/dt at apex; of a free walk, its mean; None: the robot walks its own gait."""
-    robot = choice.load()
-    if choice.free:
-        if options.gait == "run":
-            raise ParameterError(f"{choice.model} walks free, and does not run: leave --gait out")
-        GaitSpec(speed=options.speed).of(robot)  # which tells where there is none
-        return None if options.speed is None else float(options.speed)
-    if options.gait == "run":
-        gait = GaitSpec("run", options.speed).of(robot)
-        return float(gait.state[0])
-    if options.speed is not None:
-        raise ParameterError("--speed goes with --gait run: leave one out, or give both")
-    return None
 
 
 def data(found: Robustness) -> dict[str, Any]:
@@ -144,7 +116,7 @@ def data(found: Robustness) -> dict[str, Any]:
     return {
         "robot": found.robot,
         "plant": found.plant,
-        "gait": {"mean_speed": found.gait.mean_speed, height: float(found.gait.state[1])},
+        "gait": {"mean_speed": _speed(found.gait), height: float(found.gait.state[1])},
         "undisturbed": {"speed_error": found.speed_error, "height_error": found.height_error},
         "disturbances": {
             f.disturbance.name: {
@@ -167,6 +139,10 @@ def data(found: Robustness) -> dict[str, Any]:
             for f in found.findings
         },
     }
+
+
+def _speed(gait: Gait) -> float:
+    return gait.step_length / gait.step_duration
 
 
 def _row(finding: Finding) -> tuple[str, ...]:
@@ -210,7 +186,7 @@ def _told(fell: int, off_gait: int) -> str:
 
 def _title(found: Robustness) -> str:
     return (
-        f"{found.robot} at {found.gait.mean_speed:.3f} m/s in {found.plant}; undisturbed it is"
+        f"{found.robot} at {_speed(found.gait):.3f} m/s in {found.plant}; undisturbed it is"
         f" {100 * found.speed_error:+.2f} % in speed and {100 * found.height_error:+.2f} % in"
         " height from its gait"
     )

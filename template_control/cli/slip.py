@@ -15,7 +15,7 @@ from rich.table import Table
 from template_control import view
 from template_control.checks import option_types as values
 from template_control.cli.go import NO_STANDS
-from template_control.cli.world_options import output_folder
+from template_control.cli.report import output_folder
 from template_control.slip.automaton.vocabulary import MapKind, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario

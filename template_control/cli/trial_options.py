@@ -11,35 +11,15 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from template_control.checks.option_types import SPEED, number, whole
+from template_control.checks.option_types import whole
 from template_control.checks.ranges import Range
 from template_control.cli.interrupts import INTERRUPTED
-from template_control.robustness.subject import ENGINES, Subject
+from template_control.plant.plant import plant_name
+from template_control.run.experiment import Experiment
+from template_control.run.specs import GaitSpec
 from template_control.view.style import save_figure
 
 _MOST = 1000
-
-
-def add_gait(parser: argparse.ArgumentParser, speed: str) -> None:
-    """Add ``--gait`` and ``--speed``.
-
-    Args:
-        parser: of the command.
-        speed: what the speed is of.
-    """
-    parser.add_argument("--gait", choices=("walk", "run"), default="walk", help="what it keeps")
-    parser.add_argument("--speed", type=number(SPEED), metavar="M/S", help=speed)
-
-
-def add_engine(parser: argparse.ArgumentParser) -> None:
-    """Add ``--plant``.
-
-    Args:
-        parser: of the command.
-    """
-    parser.add_argument(
-        "--plant", choices=tuple(ENGINES), default=Subject.plant, help="physics engine"
-    )
 
 
 def add_printed(parser: argparse.ArgumentParser) -> None:
@@ -62,6 +42,26 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="processes that run trials",
     )
+
+
+def folder_of(options: argparse.Namespace, experiment: Experiment, root: str, robot: str) -> Path:
+    """The folder for trials: as asked for, or by robot, base, gait and engine.
+
+    Args:
+        options: as parsed.
+        experiment: that is disturbed.
+        root: of the command's folders.
+        robot: its name.
+    """
+    parts = [robot]
+    if experiment.free:
+        parts.append("free")
+    gait = experiment.motion
+    if isinstance(gait, GaitSpec) and gait.name != "walk":
+        parts.append(gait.name)
+    if plant_name(experiment.world) != plant_name(Experiment().world):
+        parts.append(plant_name(experiment.world))
+    return Path(options.output or Path(root) / "-".join(parts))
 
 
 def kept(folder: Path) -> int:

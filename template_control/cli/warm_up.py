@@ -75,9 +75,15 @@ def ideal_plant() -> None:
     from template_control.embedding.robot_template import paper_gait, template_for
     from template_control.plant.ideal import IdealOptions
     from template_control.robot.library import load_robot
-    from template_control.run.options import SimulationOptions
+    from template_control.run.experiment import Experiment
     from template_control.run.simulation import simulate
 
     robot = load_robot("five-link")
-    options = SimulationOptions(steps=1, plant=IdealOptions())
-    simulate(robot, ModifiedPlanner(paper_gait(template_for(robot))), options)
+    simulate(
+        Experiment(
+            robot,
+            planner=ModifiedPlanner(paper_gait(template_for(robot))),
+            steps=1,
+            world=IdealOptions(),
+        )
+    )

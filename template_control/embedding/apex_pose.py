@@ -73,7 +73,7 @@ def apex_pose(robot: PlanarBiped, start: ApexStart) -> Pose:
     stride = simulator.run(node, APEX.state(gait.state), gait.controls)
     if not any(event.reset is Reset.SWAP for event in stride.events):
         raise ParameterError(
-            f"the legs of gait {gait.name!r} do not take turns: give SimulationOptions a pose"
+            f"the legs of gait {gait.name!r} do not take turns: give the Experiment a pose"
         )
     landing, liftoff = stride.time_of(Event.TOUCHDOWN), stride.time_of(Event.REAR_LIFTOFF)
     # The liftoff's exchange of roles has made the stance toe the front leg's.

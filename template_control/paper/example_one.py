@@ -10,6 +10,7 @@ from template_control.embedding.robot_route import robot_route
 from template_control.paper.reproduction import Reproduction
 from template_control.plant.c_library import stdout_to_stderr
 from template_control.robot.library import load_robot
+from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
@@ -123,7 +124,7 @@ def fig10_on(robot_name: str) -> Reproduction:
     robot = load_robot(robot_name)
     route = robot_route(robot, example_one())
     with stdout_to_stderr():
-        record = simulate(robot, route)
+        record = simulate(Experiment(robot, route))
     template = simulate_scenario(route.scenario)
     figures, names = summarise(record, None), record.kinds_of_stride
     torque, speed = figures["joint_torque"], figures["joint_speed"]

@@ -21,7 +21,7 @@ from template_control.paper.reproduction import Reproduction
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
@@ -272,13 +272,16 @@ def robot_walk(
     """
     gait = _gait()
     world, tuning = PLANTS[plant]
-    options = SimulationOptions(
-        steps=steps,
-        plant=world,
-        embedding=replace(tuning, guards=GuardOptions(liftoff_angle=beta)),
-        start=start_state(gait),
+    record = simulate(
+        Experiment(
+            load_robot("five-link"),
+            planner=PLANNERS[planner](gait),
+            steps=steps,
+            world=world,
+            controller=replace(tuning, guards=GuardOptions(liftoff_angle=beta)),
+            start=start_state(gait),
+        )
     )
-    record = simulate(load_robot("five-link"), PLANNERS[planner](gait), options)
     return Walk(sections(gait, record.section_state), record.fall_reason), record
 
 
@@ -389,12 +392,15 @@ def _liftoffs(case: tuple[str, str]) -> tuple[Liftoff, Record, Walk, Record]:
     """One step from the equilibrium with a liftoff rule on a plant; and the walk from z_0."""
     rule, plant = case
     gait, beta = _gait(), _LIFTOFFS[rule]
-    options = SimulationOptions(
-        steps=2,
-        plant=PLANTS[plant][0],
-        embedding=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
+    record = simulate(
+        Experiment(
+            load_robot("five-link"),
+            planner=LqrPlanner(gait),
+            steps=2,
+            world=PLANTS[plant][0],
+            controller=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
+        )
     )
-    record = simulate(load_robot("five-link"), LqrPlanner(gait), options)
     return liftoff(record), record, *robot_walk("LQR", plant, _LIFTOFF_STEPS, beta)
 
 

@@ -22,6 +22,7 @@ from template_control.plant.c_library import decimal_points, silenced
 from template_control.plant.terrain import GroundStep, Terrain, pieces
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.spec import RobotSpec
 from template_control.robot.terms import FLOATING_DOF, PLANAR_DOF
 from template_control.robot.urdf import link_masses
 
@@ -52,6 +53,9 @@ class PlantOptions(Checked):
             ground.
         terrain: any other ground, which the controller does not know; None for flat ground, or
             that with the ``ground_step``.
+        gravity: [m/s^2]; None: what the controller knows.
+        robot: that is simulated, with the joints and feet of the controller's, which does not know
+            it; None: the same.
 
     Raises:
         ParameterError: if a number is not positive and finite, or the ground is told twice.
@@ -64,6 +68,8 @@ class PlantOptions(Checked):
     mass_scale: Positive = 1.0
     ground_step: GroundStep | None = None
     terrain: Terrain | None = None
+    gravity: Positive | None = None
+    robot: RobotSpec | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

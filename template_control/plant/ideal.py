@@ -25,6 +25,7 @@ from template_control.plant.agreement import check_damping, trunk_corners
 from template_control.plant.rigid_contact import RollingFeet, pressing, solve
 from template_control.plant.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.spec import RobotSpec
 from template_control.robot.terms import PLANAR_DOF
 
 Array = NDArray[np.float64]
@@ -46,6 +47,9 @@ class IdealOptions(Checked):
         time_step: period of the torques [s]; one step of the integrator.
         mass_scale: factor of every link's mass and inertia; the controller does not know it.
         terrain: the ground, which the controller does not know; None for flat ground.
+        gravity: [m/s^2]; None: what the controller knows.
+        robot: that is simulated, with the joints and feet of the controller's, which does not know
+            it; None: the same.
 
     Raises:
         ParameterError: if a number is not positive and finite.
@@ -56,6 +60,8 @@ class IdealOptions(Checked):
     time_step: Positive = 1e-3
     mass_scale: Positive = 1.0
     terrain: Terrain | None = None
+    gravity: Positive | None = None
+    robot: RobotSpec | None = None
 
     @cached_property
     def ground(self) -> Terrain:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
+from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
 
 Array = NDArray[np.float64]
@@ -100,7 +101,7 @@ def check_world(world: World) -> None:
     lacking = [name for name in _MEMBERS if not hasattr(world, name)]
     if lacking:
         raise ParameterError(
-            f"plant is a {type(world).__name__}, which lacks {', '.join(lacking)}: give"
+            f"world is a {type(world).__name__}, which lacks {', '.join(lacking)}: give"
             " PlantOptions, MujocoOptions, IdealOptions or an object with the members of Plant"
         )
     step = world.time_step
@@ -117,6 +118,42 @@ def plant_name(world: World) -> str:
     return type(world).__name__
 
 
+R = TypeVar("R", bound=Biped)
+
+
+def robot_in(world: PlantOptions | IdealOptions, robot: R) -> R:
+    """The robot that is simulated.
+
+    Args:
+        world: may have a robot and a gravity of its own.
+        robot: the controller's model.
+
+    Raises:
+        ParameterError: if the world's robot has other joints or feet, or another base.
+        RobotError: if there is no such robot.
+    """
+    own = robot
+    if world.robot is not None:
+        found = world.robot.load()
+        if not isinstance(found, type(robot)):
+            raise ParameterError(
+                f"the robot of the world, {found.name}, has another base than {robot.name}: give"
+                " both a floating one or none"
+            )
+        for name, one, other in (
+            ("joints", robot.joint_names, found.joint_names),
+            ("feet", robot.feet, found.feet),
+        ):
+            if one != other:
+                raise ParameterError(
+                    f"the robot of the world has the {name} {', '.join(other)}: give one with"
+                    f" {', '.join(one)}, as {robot.name} has them"
+                )
+        own = found
+    gravity = world.gravity or (world.robot and world.robot.gravity) or robot.gravity
+    return own if gravity == own.gravity else own.changed(gravity)
+
+
 @checked
 def open_plant(robot: PlanarBiped, world: World) -> AbstractContextManager[Plant]:
     """Make the plant that options describe, to be used as a context manager.
@@ -127,9 +164,9 @@ def open_plant(robot: PlanarBiped, world: World) -> AbstractContextManager[Plant
             left open.
     """
     if isinstance(world, IdealOptions):
-        return IdealPlant(robot, world)
+        return IdealPlant(robot_in(world, robot), world)
     if isinstance(world, MujocoOptions):
-        return MujocoPlant(robot, world)
+        return MujocoPlant(robot_in(world, robot), world)
     if isinstance(world, PlantOptions):
-        return BulletPlant(robot, world)
+        return BulletPlant(robot_in(world, robot), world)
     return nullcontext(world)

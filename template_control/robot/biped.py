@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +13,8 @@ from numpy.typing import NDArray
 
 from template_control.errors import DivergedError
 from template_control.robot.legs import HINGES, foot_frame, leg_joints, middle, straight_legs
-from template_control.robot.requirements import check_size
+from template_control.robot.requirements import add_feet, check_size
+from template_control.robot.urdf import with_masses
 
 Array = NDArray[np.float64]
 
@@ -165,6 +168,31 @@ class Biped(ABC):
     def __repr__(self) -> str:
         joints = ", ".join(self.joint_names)
         return f"<{type(self).__name__} {self.name}: {self.mass:.4g} kg, joints {joints}>"
+
+    def changed(
+        self, gravity: float | None = None, masses: Mapping[str, float] | None = None
+    ) -> Self:
+        """The same robot under another gravity, or with other masses of its links.
+
+        Args:
+            gravity: [m/s^2]; None: as it is.
+            masses: by link [kg]; their inertias grow alike.
+
+        Raises:
+            RobotError: if it has no such link, or one that weighs nothing.
+        """
+        urdf, model = self.urdf, self.model.copy()
+        if masses:
+            urdf = with_masses(self.path, urdf, masses)
+            model = self._model_of(self.path, urdf)
+            add_feet(self.path, urdf, model, self.feet)
+        model.gravity.linear = np.array([0.0, 0.0, -(gravity or self.gravity)])
+        return type(self)(self.path, urdf, model, self.feet, self.foot_radius, self.walk)
+
+    @staticmethod
+    @abstractmethod
+    def _model_of(path: Path, urdf: str) -> pin.Model:
+        """Pinocchio's model of a URDF's text."""
 
     @abstractmethod
     def _prepare(self) -> None:

@@ -95,6 +95,11 @@ class FloatingBaseBiped(Biped):
     base_joints = _ROOT
     directions = 3
 
+    @staticmethod
+    def _model_of(path: Path, urdf: str) -> pin.Model:
+        build_model(path, urdf)  # which tells what is wrong with it
+        return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+
     def _prepare(self) -> None:
         model = self.model
         data = self._data
@@ -190,8 +195,7 @@ class FloatingBaseBiped(Biped):
             take_points(path, tree)
         spheres(path, tree, feet, foot_radius, foot_offset)
         urdf = complete(path, tree)
-        build_model(path, urdf)  # which tells what is wrong with it
-        model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+        model = cls._model_of(path, urdf)
         check_floating(path, model, feet)
         check_bodies(path, tree, model, _ROOT + 1)
         radius = add_feet(path, urdf, model, feet)

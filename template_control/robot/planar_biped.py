@@ -57,6 +57,7 @@ class PlanarBiped(Biped):
 
     base_dof = base_joints = PLANAR_DOF
     directions = 2
+    _model_of = staticmethod(build_model)
 
     def _prepare(self) -> None:
         model = self.model

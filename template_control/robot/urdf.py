@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import xml.etree.ElementTree as ET
 from collections import Counter
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
@@ -386,3 +387,30 @@ def _check_joint(path: Path, joint: ET.Element) -> None:
                 unread = True
             if unread:
                 raise RobotError(f"{where}: limit has {name} {text!r}: give a number")
+
+
+def with_masses(path: Path, urdf: str, masses: Mapping[str, float]) -> str:
+    """The text of a URDF with other masses, and with inertias in proportion.
+
+    Args:
+        path: of the file, for the message.
+        urdf: the text.
+        masses: by link [kg].
+
+    Raises:
+        RobotError: if there is no such link, or it weighs nothing.
+    """
+    before = {name: mass for name, mass in link_masses(urdf).items() if mass > 0.0}
+    robot = ET.fromstring(urdf)
+    for name, mass in masses.items():
+        if name not in before:
+            raise RobotError(
+                f"{path}: no link {name} with a mass: give some of {', '.join(before)}"
+            )
+        (link,) = (link for link in robot.findall("link") if link.get("name") == name)
+        for element, keys in (("mass", ("value",)), ("inertia", MOMENTS)):
+            found = link.find(f"inertial/{element}")
+            assert found is not None
+            for key in keys:
+                found.set(key, repr(mass / before[name] * float(found.get(key, "0"))))
+    return ET.tostring(robot, encoding="unicode")

@@ -9,7 +9,7 @@ from .campaign import save_falls as save_falls
 from .disturbances import DISTURBANCES as DISTURBANCES
 from .disturbances import LATERAL_PUSHES as LATERAL_PUSHES
 from .disturbances import Disturbance as Disturbance
-from .disturbances import Situation as Situation
+from .disturbances import footholds as footholds
 from .fall_cause import fall_cause as fall_cause
 from .findings import Finding as Finding
 from .findings import Level as Level
@@ -17,4 +17,3 @@ from .findings import Robustness as Robustness
 from .findings import wilson_interval as wilson_interval
 from .severity_sweep import measure as measure
 from .severity_sweep import trial as trial
-from .subject import Subject as Subject

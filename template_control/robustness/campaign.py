@@ -18,15 +18,15 @@ from template_control.checks.ranges import Count, Index, NotNegative
 from template_control.errors import ParameterError, SweepError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.terrain import GroundStep
-from template_control.robustness.disturbances import PUSH_SECONDS, impulse_unit
+from template_control.robustness.disturbances import PUSH_SECONDS, engine, impulse_unit
 from template_control.robustness.fall_cause import fall_cause
 from template_control.robustness.findings import wilson_interval
+from template_control.robustness.fingerprint import fingerprint
 from template_control.robustness.severity_sweep import gait_errors
-from template_control.robustness.subject import ENGINES, Engine, fingerprint
-from template_control.run.config import PreparedRun, RunConfig
-from template_control.run.options import Push, SimulationOptions
+from template_control.run.experiment import Experiment, PreparedExperiment
+from template_control.run.options import Push
 from template_control.run.sensing import SensorOptions
-from template_control.run.specs import GaitSpec, RobotSpec
+from template_control.run.simulation import simulate
 from template_control.slip.similarity import Scale
 from template_control.sweep.sweep import Item, SweepOptions, item_seed, sweep
 
@@ -77,7 +77,7 @@ class DisturbanceDistribution(Checked):
         mass: of every link, a share too much.
         push: impulse on the trunk over 0.1 s, forward positive [N s].
         ground_step: height of one step of the ground, up positive [m].
-        noise: standard deviation of measured angles [rad]; see ``SensorOptions.of_size``.
+        noise: standard deviation of measured angles [rad]; see ``SensorOptions.noise``.
         delay: from measurement to torque [s], rounded to physics steps.
         direction: of the push, to the left of forward [deg]; only a free robot has other directions
             than 0, and it is no part of a draw's severity.
@@ -190,29 +190,28 @@ class CampaignConfig(Checked):
     """What is tried.
 
     Attributes:
-        robot: which one.
-        gait: that it keeps.
-        plant: kind of the engine.
+        experiment: undisturbed: a gait that is kept, in a physics engine.
         mix: of the disturbances.
         seed: of the whole campaign; a trial's own follows from it and the trial's number.
 
     Raises:
-        ParameterError: if a value is of a wrong type or out of its range, or a planar robot is to
-            be pushed aside.
+        ParameterError: if a value is of a wrong type or out of its range, the plant is none whose
+            friction can be disturbed, or a planar robot is to be pushed to a side.
     """
 
-    robot: RobotSpec = field(default_factory=RobotSpec)
-    gait: GaitSpec = field(default_factory=GaitSpec)
-    plant: Engine = "pybullet"
+    experiment: Experiment = field(default_factory=Experiment)
     mix: DisturbanceDistribution = field(default_factory=DisturbanceDistribution)
     seed: Index = 0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.robot.free and self.mix.direction != DisturbanceDistribution().direction:
+        engine(self.experiment)
+        aside = self.mix.direction != DisturbanceDistribution().direction
+        if aside and not self.experiment.free:
             raise ParameterError(
-                f"the mix has the direction {list(self.mix.direction)}, and {self.robot.model} is"
-                " held in its plane: leave it out, or take a free robot"
+                f"the mix has the direction {list(self.mix.direction)}, and"
+                f" {self.experiment.robot_name} is held in its plane: leave it out, or take a"
+                " floating-base robot"
             )
 
     def draw(self, number: Index) -> DisturbanceSample:
@@ -223,8 +222,8 @@ class CampaignConfig(Checked):
         """
         return self.mix.draw(item_seed(self.seed, number))
 
-    def trial(self, number: Index) -> tuple[RunConfig, PreparedRun]:
-        """A trial as a run, and what the run is made of.
+    def trial(self, number: Index) -> tuple[Experiment, PreparedExperiment]:
+        """A trial's experiment, to be written and to be run.
 
         Args:
             number: of the trial, from 0.
@@ -232,32 +231,29 @@ class CampaignConfig(Checked):
         Raises:
             TemplateControlError: if robot or gait is not to be had.
         """
-        config = RunConfig(self.robot, self.gait)
-        ready = config.prepare()
-        gait, draw = ready.gait, self.draw(number)
+        where = self.experiment.prepare()
+        gait, draw, world = where.gait, self.draw(number), engine(self.experiment)
         scale = Scale.of(gait.parameters)
-        plant = ENGINES[self.plant](
-            friction=draw.friction,
-            mass_scale=1.0 + draw.mass,
-            ground_step=_ground_step(draw, scale.length, gait.step_length),
-        )
-        z = [*gait.state, 0.0][:3]
+        z = [*gait.state.tolist(), 0.0][:3]
         step, phase = divmod(draw.push_at, 1.0)
         impulse = draw.push * impulse_unit(gait.parameters)
         seconds, direction = PUSH_SECONDS * scale.time, radians(draw.direction)
-        push = Push(impulse, int(step), phase, seconds, direction)
-        delay = round(draw.delay * scale.time / plant.time_step) * plant.time_step
-        simulation = SimulationOptions(
-            steps=self.mix.steps,
-            plant=plant,
-            start=(z[0] * (1.0 + draw.speed), z[1] + draw.height * scale.length, z[2]),
-            pushes=(push,),
-            sensors=SensorOptions.of_size(
-                draw.noise, scale, item_seed(self.seed, number) % 2**_SEED_BITS
+        disturbed: dict[str, Any] = {
+            "steps": self.mix.steps,
+            "world": replace(
+                world,
+                friction=draw.friction,
+                mass_scale=world.mass_scale * (1.0 + draw.mass),
+                ground_step=_ground_step(draw, scale.length, gait.step_length),
             ),
-            delay=delay,
-        )
-        return replace(config, simulation=simulation).resolved(), ready
+            "start": (z[0] * (1.0 + draw.speed), z[1] + draw.height * scale.length, z[2]),
+            "pushes": (Push(impulse, int(step), phase, seconds, direction),),
+            "sensors": SensorOptions(
+                noise=draw.noise, seed=item_seed(self.seed, number) % 2**_SEED_BITS
+            ),
+            "delay": round(draw.delay * scale.time / world.time_step) * world.time_step,
+        }
+        return replace(self.experiment.resolved(), **disturbed), replace(where, **disturbed)
 
 
 _SEED_BITS = 63  # that TOML can say
@@ -346,13 +342,13 @@ def campaign_trial(conditions: dict[str, Any], number: int) -> dict[str, Any]:
     Returns:
         fell, reason, first, speed_error; see :class:`Trial`.
     """
-    config, ready = settings.from_table(CampaignConfig, conditions).trial(number)
-    record = ready.run(config.simulation)
+    _, where = settings.from_table(CampaignConfig, conditions).trial(number)
+    record = simulate(where)
     return {
         "fell": record.fell,
         "reason": record.fall_reason,
         "first": fall_cause(record) if record.fell else "",
-        "speed_error": None if record.fell else gait_errors(record, ready.gait)[0],
+        "speed_error": None if record.fell else gait_errors(record, where.gait)[0],
     }
 
 
@@ -381,10 +377,10 @@ def run_campaign(
         TemplateControlError: if robot or gait is not to be had.
         SweepError: if a trial ends otherwise than by its steps or a fall, or files do not fit.
     """
-    _, ready = conditions.trial(0)  # a mistake is told before a worker meets it
+    _, where = conditions.trial(0)  # a mistake is told before a worker meets it
     table = settings.to_table(conditions)
     items: list[Item] = [{"conditions": table, "number": i} for i in range(trials)]
-    stem = fingerprint(ready.robot, table)
+    stem = fingerprint(where.robot, table)
     done = sweep(
         campaign_trial,
         items,

@@ -8,77 +8,69 @@ weaker motors, which is what its torque limits are for.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.free.options import FreeOptions
-from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.planner import Planner
+from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
+from template_control.plant.plant import plant_name
 from template_control.plant.terrain import GroundStep
-from template_control.robot.biped import Biped
-from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.run.options import Push, SimulationOptions
+from template_control.run.experiment import Experiment, PreparedExperiment, perturbed_start
+from template_control.run.options import Push
 from template_control.run.sensing import SensorOptions
-from template_control.run.simulation import perturbed_start, simulate
-from template_control.slip.gaits.gait import WalkingGait
-from template_control.slip.gaits.running_gait import RunningGait
+from template_control.run.simulation import simulate
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale
 
 
-@dataclass(frozen=True)
-class Situation:
-    """Where a disturbance meets the robot.
+def engine(experiment: Experiment) -> PlantOptions:
+    """The physics engine of an experiment, whose friction, masses and ground can be disturbed.
 
-    Attributes:
-        robot: the model; its last update is overwritten.
-        gait: the gait that is kept.
-        planner: that keeps it.
-        plant: the world without a disturbance.
+    Raises:
+        ParameterError: if it has another plant.
     """
+    if not isinstance(experiment.world, PlantOptions):
+        raise ParameterError(
+            f"the world is {plant_name(experiment.world)}, whose friction cannot be disturbed: give"
+            " PlantOptions or MujocoOptions"
+        )
+    return experiment.world
 
-    robot: Biped
-    gait: WalkingGait | RunningGait
-    planner: Planner
-    plant: PlantOptions = field(default_factory=PlantOptions)
 
-    @property
-    def scale(self) -> Scale:
-        """Units of the gait's template."""
-        return Scale.of(self.gait.parameters)
+def footholds(
+    where: PreparedExperiment, start: tuple[float, float, float], steps: int
+) -> NDArray[np.float64]:
+    """Where a robot treads in each step when nothing disturbs it.
 
-    def footholds(self, start: tuple[float, float, float], steps: int) -> NDArray[np.float64]:
-        """Where the robot treads in each step when nothing disturbs it.
+    Args:
+        where: the undisturbed experiment.
+        start: (3,) dx/dt, y, dy/dt at the gait's section [m/s, m, m/s].
+        steps: how many.
 
-        Args:
-            start: (3,) dx/dt, y, dy/dt at the gait's section [m/s, m, m/s].
-            steps: how many.
-
-        Returns:
-            (n,) x of the footholds [m], the last step's last; the gait's own if the robot falls,
-            as it will then fall with the disturbance as well.
-        """
-        options = SimulationOptions(steps=steps, start=start, plant=self.plant)
-        record = simulate(self.robot, self.planner, options)
-        if record.fell:
-            return self.gait.step_length * np.arange(steps + 1.0)
-        # The last section may round to just after the last sample.
-        at = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
-        # Before the first tick the ground has not pressed yet.
-        if np.all(record.contact_force[at[1:]].any(axis=(1, 2))):
-            return np.asarray(record.foot[at, record.rear[at], 0])
-        # No foot stands at an apex: that which bore most in between.
-        load = record.contact_force[:, :, 1]
-        strides = [slice(a, b) for a, b in pairwise(at)]
-        most = [np.unravel_index(np.argmax(load[s]), load[s].shape) for s in strides]
-        holds = [record.foot[s][i, foot, 0] for s, (i, foot) in zip(strides, most, strict=True)]
-        return np.array(holds)
+    Returns:
+        (n,) x of the footholds [m], the last step's last; the gait's own if the robot falls,
+        as it will then fall with the disturbance as well.
+    """
+    record = simulate(replace(where, steps=steps, start=start))
+    if record.fell:
+        return where.gait.step_length * np.arange(steps + 1.0)
+    # The last section may round to just after the last sample.
+    at = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
+    # Before the first tick the ground has not pressed yet.
+    if np.all(record.contact_force[at[1:]].any(axis=(1, 2))):
+        return np.asarray(record.foot[at, record.rear[at], 0])
+    # No foot stands at an apex: that which bore most in between.
+    load = record.contact_force[:, :, 1]
+    strides = [slice(a, b) for a, b in pairwise(at)]
+    most = [np.unravel_index(np.argmax(load[s]), load[s].shape) for s in strides]
+    holds = [record.foot[s][i, foot, 0] for s, (i, foot) in zip(strides, most, strict=True)]
+    return np.array(holds)
 
 
 @dataclass(frozen=True)
@@ -105,7 +97,7 @@ class Disturbance:
         levels: for the reference template [SI], from mild to severe.
         trials: number of trials at each level.
         size: factor from the reference template's levels to a template's.
-        options: of the run at a level [SI] and a trial's index.
+        experiment: the disturbed one at a level [SI] and a trial's index.
         passing: whether it comes only once: the robot must then be back on its gait at the end.
             Otherwise it lasts from the start, and the robot must only go on.
         grain: levels are whole multiples of it, at least one; 0 for any levels [SI].
@@ -119,10 +111,10 @@ class Disturbance:
     levels: tuple[float, ...]
     trials: int
     size: Callable[[SlipParameters], float]
-    options: Callable[[Situation, float, int], SimulationOptions]
+    experiment: Callable[[PreparedExperiment, float, int], PreparedExperiment]
     passing: bool = False
     grain: float = 0.0
-    kick: Callable[[Situation, float], NDArray[np.float64]] | None = None
+    kick: Callable[[PreparedExperiment, float], NDArray[np.float64]] | None = None
 
     def levels_for(self, parameters: SlipParameters) -> list[float]:
         """The levels for a template [SI]."""
@@ -176,79 +168,70 @@ def impulse_unit(parameters: SlipParameters) -> float:
     return parameters.mass / REFERENCE.mass * Scale.of(parameters).speed
 
 
-def pushed(where: Situation, level: float, trial: int, direction: float = 0.0) -> SimulationOptions:
-    """A run with a push.
+def _scale(where: PreparedExperiment) -> Scale:
+    return Scale.of(where.gait.parameters)
+
+
+def pushed(
+    where: PreparedExperiment, level: float, trial: int, direction: float = 0.0
+) -> PreparedExperiment:
+    """An experiment with a push.
 
     Args:
-        where: whom it meets.
+        where: the undisturbed one.
         level: its impulse [N s].
         trial: which phase of the step it comes in.
-        direction: of a free robot, from forward to the left [rad].
+        direction: of a floating-base robot, from forward to the left [rad].
     """
-    push = Push(level, BEGIN, trial / PHASES, PUSH_SECONDS * where.scale.time, direction)
-    return SimulationOptions(steps=BEGIN + 1 + AFTER, pushes=(push,), plant=where.plant)
+    push = Push(level, BEGIN, trial / PHASES, PUSH_SECONDS * _scale(where).time, direction)
+    return replace(where, steps=BEGIN + 1 + AFTER, pushes=(push,))
 
 
-def _kicked(where: Situation, level: float) -> NDArray[np.float64]:
+def _kicked(where: PreparedExperiment, level: float) -> NDArray[np.float64]:
     return np.array([level / where.gait.parameters.mass, 0.0, 0.0])
 
 
-def _kicked_back(where: Situation, level: float) -> NDArray[np.float64]:
+def _kicked_back(where: PreparedExperiment, level: float) -> NDArray[np.float64]:
     return _kicked(where, -level)
 
 
-def _pushed_back(where: Situation, level: float, trial: int) -> SimulationOptions:
+def _pushed_back(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
     return pushed(where, -level, trial)
 
 
-def _stepped(where: Situation, level: float, trial: int) -> SimulationOptions:
+def _stepped(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
     start = perturbed_start(where.gait, trial)
-    before, beyond = where.footholds(start, _SOON + 1)[-2:]
+    before, beyond = footholds(where, start, _SOON + 1)[-2:]
     step = GroundStep(level, float(before + _EDGES[trial] * (beyond - before)))
-    plant = replace(where.plant, ground_step=step)
-    return SimulationOptions(steps=_SOON + 1 + AFTER, plant=plant, start=start)
+    world = replace(engine(where), ground_step=step)
+    return replace(where, steps=_SOON + 1 + AFTER, world=world, start=start)
 
 
-def _stepped_down(where: Situation, level: float, trial: int) -> SimulationOptions:
+def _stepped_down(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
     return _stepped(where, -level, trial)
 
 
-def _lasting(
-    where: Situation,
-    trial: int,
-    embedding: EmbeddingOptions | None = None,
-    sensors: SensorOptions | None = None,
-    delay: float = 0.0,
-    plant: PlantOptions | None = None,
-) -> SimulationOptions:
-    return SimulationOptions(
-        steps=AFTER,
-        plant=plant or where.plant,
-        embedding=embedding,
-        start=perturbed_start(where.gait, trial),
-        sensors=sensors or SensorOptions(),
-        delay=delay,
-    )
+def _lasting(where: PreparedExperiment, trial: int, **changes: Any) -> PreparedExperiment:
+    return replace(where, steps=AFTER, start=perturbed_start(where.gait, trial), **changes)
 
 
-def _slippery(where: Situation, level: float, trial: int) -> SimulationOptions:
-    return _lasting(where, trial, plant=replace(where.plant, friction=level))
+def _slippery(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
+    return _lasting(where, trial, world=replace(engine(where), friction=level))
 
 
-def _other_mass(where: Situation, level: float, trial: int) -> SimulationOptions:
-    return _lasting(where, trial, plant=replace(where.plant, mass_scale=1.0 + level))
+def _other_mass(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
+    return _lasting(where, trial, world=replace(engine(where), mass_scale=1.0 + level))
 
 
-def _weak(where: Situation, level: float, trial: int) -> SimulationOptions:
-    tuning = FreeOptions if isinstance(where.robot, FloatingBaseBiped) else EmbeddingOptions
-    return _lasting(where, trial, embedding=tuning(torque_scale=level))
+def _weak(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
+    return _lasting(where, trial, controller=replace(where.tuning, torque_scale=level))
 
 
-def _noisy(where: Situation, level: float, trial: int) -> SimulationOptions:
-    return _lasting(where, trial, sensors=SensorOptions.of_size(level, where.scale, trial))
+def _noisy(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
+    return _lasting(where, trial, sensors=SensorOptions(noise=level, seed=trial))
 
 
-def _late(where: Situation, level: float, trial: int) -> SimulationOptions:
+def _late(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
     return _lasting(where, trial, delay=level)
 
 
@@ -267,7 +250,7 @@ _HEIGHTS = (0.005, *_ladder(0.01, 8))
 _CENTIMETRES = Unit("cm", 100.0)
 _PER_CENT, _PER_CENT_LESS = Unit("%", 100.0), Unit("%", -100.0)
 
-# Name, title, unit, levels, trials, size, options.
+# Name, title, unit, levels, trials, size, experiment.
 DISTURBANCES: tuple[Disturbance, ...] = (
     Disturbance(
         "push-forward",

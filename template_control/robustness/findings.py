@@ -12,8 +12,7 @@ from template_control.checks.ranges import Count, Index
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.robustness.disturbances import Disturbance
-from template_control.slip.gaits.gait import WalkingGait
-from template_control.slip.gaits.running_gait import RunningGait
+from template_control.slip.gaits.gait import Gait
 
 _HALF = 0.5
 
@@ -132,7 +131,7 @@ class Robustness:
     """
 
     robot: str
-    gait: WalkingGait | RunningGait
+    gait: Gait
     speed_error: float
     height_error: float
     findings: tuple[Finding, ...]

@@ -20,20 +20,21 @@ from template_control import settings
 from template_control.checks.checked import checked
 from template_control.embedding.planners.planner import Context
 from template_control.errors import ParameterError, RobotError, SweepError
+from template_control.plant.plant import plant_name
+from template_control.robot.spec import RobotSpec
 from template_control.robustness.disturbances import (
     AFTER,
     ALL,
     BEGIN,
     DISTURBANCES,
     Disturbance,
-    Situation,
+    engine,
 )
 from template_control.robustness.findings import Finding, Level, Robustness
-from template_control.robustness.subject import Engine, Subject, fingerprint
-from template_control.run.options import SimulationOptions
+from template_control.robustness.fingerprint import fingerprint
+from template_control.run.experiment import Experiment, PreparedExperiment
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
-from template_control.run.specs import RobotSpec
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
@@ -43,7 +44,7 @@ Array = NDArray[np.float64]
 
 
 def template_limit(
-    disturbance: Disturbance, where: Situation, strides: int, settled: float
+    disturbance: Disturbance, where: PreparedExperiment, strides: int, settled: float
 ) -> float | None:
     """The severest level up to which the template comes back to its gait from its section.
 
@@ -68,8 +69,8 @@ def template_limit(
     return last
 
 
-def _returns(where: Situation, z: Array, strides: int, settled: float) -> bool:
-    gait, planner = where.gait, where.planner
+def _returns(where: PreparedExperiment, z: Array, strides: int, settled: float) -> bool:
+    gait, planner = where.gait, where.kept
     step = ReturnMap(gait.parameters, gait.stride)
     planner.reset()
     for _ in range(strides):
@@ -107,29 +108,23 @@ def gait_errors(record: Record, gait: Gait) -> tuple[float, float]:
 
 @checked
 def trial(
-    robot: str | dict[str, Any],
-    disturbance: str,
-    level: float,
-    number: int,
-    speed: float | None = None,
-    plant: Engine = "pybullet",
+    experiment: Experiment | dict[str, Any], disturbance: str, level: float, number: int
 ) -> dict[str, Any]:
     """One walk or run under one disturbance, as a sweep's worker runs it.
 
     Args:
-        robot: name or URDF path; or a :class:`RobotSpec` as a table.
+        experiment: undisturbed; or its table, as :func:`~.settings.to_table` makes it.
         disturbance: name of the disturbance.
         level: the disturbance's size for this robot [SI].
         number: of the trial, from 0; trials of a level differ by it.
-        speed, plant: as of a :class:`~.subject.Subject`.
 
     Returns:
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
     """
-    choice = RobotSpec(robot) if isinstance(robot, str) else _choice(robot)
-    where = Subject(choice, speed, plant).situation()
-    options = _BY_NAME[disturbance].options(where, level, number)
-    record = simulate(where.robot, where.planner, options)
+    if not isinstance(experiment, Experiment):
+        experiment = settings.from_table(Experiment, experiment)
+    where = experiment.prepare()
+    record = simulate(_BY_NAME[disturbance].experiment(where, level, number))
     errors = (None, None) if record.fell else gait_errors(record, where.gait)
     return {
         "fell": record.fell,
@@ -140,13 +135,9 @@ def trial(
     }
 
 
-def _choice(table: dict[str, Any]) -> RobotSpec:
-    return settings.from_table(RobotSpec, table)
-
-
 @checked
 def measure(
-    robot: str | RobotSpec | Subject,
+    experiment: str | RobotSpec | Experiment,
     names: Sequence[str] | None = None,
     folder: Path | None = None,
     executor: Executor | None = None,
@@ -156,7 +147,8 @@ def measure(
     """Raise disturbances until the robot's walk or run breaks.
 
     Args:
-        robot: name or URDF path, or which one; or what it keeps and where, as well.
+        experiment: what is disturbed: a gait that is kept, in a physics engine; or a robot, which
+            keeps its own walk.
         names: of the disturbances; None for all that it can have.
         folder: for the trials' results, from which the same call goes on; None keeps them in
             memory. They are those of this code and this URDF: after a change of either all
@@ -171,23 +163,20 @@ def measure(
         GaitError: if no run has this speed.
         SweepError: if a trial fails for another reason than a fall, or files do not fit.
     """
-    subject = _subject(robot)
-    choice = subject.robot
-    known = {d.name: d for d in (ALL if choice.free else DISTURBANCES)}
+    if not isinstance(experiment, Experiment):
+        experiment = Experiment(experiment)
+    known = {d.name: d for d in (ALL if experiment.free else DISTURBANCES)}
     wanted = set(known if names is None else names)
     if not wanted or not wanted <= set(known):
         raise ParameterError(f"disturbances are {sorted(wanted)}: give some of {list(known)}")
-    where = subject.situation()
-    model, gait = where.robot, where.gait
-    undisturbed = _undisturbed(choice.model, where)
+    engine(experiment)
+    table = settings.to_table(experiment.resolved())
+    where = experiment.prepare()
+    gait = where.gait
+    undisturbed = _undisturbed(where, experiment.robot_name)
     chosen = [_shortened(d, quick) for name, d in known.items() if name in wanted]
     levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
-    called = choice.model if choice == RobotSpec(choice.model) else settings.to_table(choice)
-    moving: Item = {} if subject.speed is None else {"speed": subject.speed}
-    if subject.plant != Subject.plant:
-        moving["plant"] = subject.plant
-    trials = [(d.name, d.levels, d.trials) for d in chosen]
-    stem = fingerprint(model, trials, moving, called)
+    stem = fingerprint(where.robot, [(d.name, d.levels, d.trials) for d in chosen], table)
     found = {
         d.name: Finding(d, template=template_limit(known[d.name], where, AFTER, SETTLED))
         for d in chosen
@@ -196,11 +185,10 @@ def measure(
         going = [d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken]
         items: list[Item] = [
             {
-                "robot": called,
+                "experiment": table,
                 "disturbance": d.name,
                 "level": levels[d.name][index],
                 "number": i,
-                **moving,
             }
             for d in going
             for i in range(d.trials)
@@ -223,18 +211,11 @@ def measure(
             found[d.name] = replace(found[d.name], levels=(*found[d.name].levels, level))
     errors = gait_errors(undisturbed, gait)
     findings = tuple(found[d.name] for d in chosen)
-    return Robustness(model.name, gait, *errors, findings, subject.plant)
+    return Robustness(where.robot.name, gait, *errors, findings, plant_name(where.world))
 
 
-def _subject(robot: str | RobotSpec | Subject) -> Subject:
-    if isinstance(robot, Subject):
-        return robot
-    return Subject(RobotSpec(robot) if isinstance(robot, str) else robot)
-
-
-def _undisturbed(robot: str, where: Situation) -> Record:
-    options = SimulationOptions(steps=BEGIN + 1 + AFTER, plant=where.plant)
-    record = simulate(where.robot, where.planner, options)
+def _undisturbed(where: PreparedExperiment, robot: str) -> Record:
+    record = simulate(replace(where, steps=BEGIN + 1 + AFTER))
     if record.fell:
         raise RobotError(
             f"{robot} falls without a disturbance ({record.fall_reason}):"

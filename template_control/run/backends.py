@@ -26,7 +26,7 @@ from template_control.estimation.filters import NoiseFilter
 from template_control.estimation.imu import ImuOptions, ImuSensors
 from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions
 from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
-from template_control.plant.plant import Plant, World, open_plant, plant_name
+from template_control.plant.plant import Plant, World, open_plant, plant_name, robot_in
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import (
@@ -36,7 +36,7 @@ from template_control.robot.start import (
     state_at_vlo,
     state_in,
 )
-from template_control.run.options import HeadingCommand, SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.sensing import (
     FilteredSensors,
     ForeseeingSensors,
@@ -74,7 +74,7 @@ class RobotBackend(ABC):
         """
 
     @abstractmethod
-    def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
+    def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
         """Start the controller where the run begins, and tell (q, v) there.
 
         Args:
@@ -94,7 +94,7 @@ class RobotBackend(ABC):
         """
 
     @abstractmethod
-    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+    def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
         """What tells the controller the state.
 
         Args:
@@ -140,22 +140,12 @@ class PlanarBackend(RobotBackend):
             )
         return EmbeddingController(self.robot, planners, options, route, automaton)
 
-    def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
+    def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns.
 
         Raises:
-            ParameterError: as there, or if the options have a course or a push aside.
+            ParameterError: as there.
         """
-        if o.course != HeadingCommand():
-            raise ParameterError(
-                f"{self.robot.name} is held in its plane and has no course: leave it out, or take"
-                " a free robot"
-            )
-        if any(push.direction for push in o.pushes):
-            raise ParameterError(
-                f"{self.robot.name} is held in its plane, and a push has a direction: leave it out,"
-                " or take a free robot"
-            )
         robot, route, pose = self.robot, controller.supervisor.route, o.pose
         first = planner, node = controller.supervisor.begin(route.section)
         z = route.start if o.start is None else np.array(o.start)
@@ -184,13 +174,13 @@ class PlanarBackend(RobotBackend):
         automaton = controller.supervisor.automaton
         return apex_pose(self.robot, ApexStart(z, planner.gait, swing, pitch, automaton))
 
-    def _standing_pose(self, controller: EmbeddingController, o: SimulationOptions) -> Pose:
+    def _standing_pose(self, controller: EmbeddingController, o: Experiment) -> Pose:
         """At rest on the ground of the plant.
 
         Raises:
             ParameterError: if it is steeper than a start can be made on.
         """
-        pose = standing_pose(controller.supervisor.route.parameters, ground=o.plant.ground_height)
+        pose = standing_pose(controller.supervisor.route.parameters, ground=o.world.ground_height)
         (rear, low), (front, high) = pose.feet.tolist()
         slope, (down, up) = atan2(high - low, front - rear), startable_slopes(self.robot)
         down, up = min(max(down, -STEEPEST), -LEVEL), max(min(up, STEEPEST), LEVEL)
@@ -205,13 +195,13 @@ class PlanarBackend(RobotBackend):
         """See :meth:`RobotBackend.plant`."""
         return open_plant(self.robot, world)
 
-    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+    def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
         """See :meth:`RobotBackend.senses`."""
         parameters = controller.parameters
         if isinstance(o.sensors, ImuOptions):
-            return ImuSensors(o.sensors, self.robot, Scale.of(parameters), o.plant.time_step)
-        delay = DelayCompensation(controller.options.delay, self.robot, o.plant.time_step)
-        sensors = Sensors(o.sensors, self.robot, parameters.rest_length)
+            return ImuSensors(o.sensors, self.robot, Scale.of(parameters), o.world.time_step)
+        delay = DelayCompensation(controller.options.delay, self.robot, o.world.time_step)
+        sensors = Sensors(o.sensors, self.robot, parameters)
         return ForeseeingSensors(sensors, delay)
 
     def force(self, along: float, lateral: float) -> tuple[float, ...]:
@@ -251,7 +241,7 @@ class FloatingBackend(RobotBackend):
             )
         return FreeController(self.robot, planners, options, route, automaton)
 
-    def start(self, controller: EmbeddingController, o: SimulationOptions) -> tuple[Array, Array]:
+    def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`: at VLO, in the sideways motion of the gait.
 
         Raises:
@@ -297,15 +287,15 @@ class FloatingBackend(RobotBackend):
         if isinstance(world, Plant) and not isinstance(world, PlantOptions):
             return nullcontext(world)
         if isinstance(world, MujocoOptions):
-            return FloatingBaseMujocoPlant(self.robot, world)
+            return FloatingBaseMujocoPlant(robot_in(world, self.robot), world)
         if isinstance(world, PlantOptions):
-            return FloatingBaseBulletPlant(self.robot, world)
+            return FloatingBaseBulletPlant(robot_in(world, self.robot), world)
         raise ParameterError(
             f"{self.robot.name} walks free in PyBullet and MuJoCo, and the plant is"
             f" {plant_name(world)}: give PlantOptions or MujocoOptions"
         )
 
-    def senses(self, controller: EmbeddingController, o: SimulationOptions) -> Senses:
+    def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
         """See :meth:`RobotBackend.senses`; noise is filtered.
 
         Raises:
@@ -316,13 +306,13 @@ class FloatingBackend(RobotBackend):
                 f"{self.robot.name} walks free, and the estimate is that of a planar robot: give"
                 " SensorOptions"
             )
-        sensors = Sensors(o.sensors, self.robot, controller.parameters.rest_length)
+        sensors = Sensors(o.sensors, self.robot, controller.parameters)
         tuning = controller.options.noise_filter if isinstance(controller, FreeController) else None
         if sensors.exact or tuning is None:
             return sensors
-        deviation = np.array([o.sensors.position_noise, o.sensors.velocity_noise])
+        deviation = np.array(sensors.deviations)
         return FilteredSensors(
-            sensors, NoiseFilter(self.robot, deviation, tuning), o.plant.time_step
+            sensors, NoiseFilter(self.robot, deviation, tuning), o.world.time_step
         )
 
     def force(self, along: float, lateral: float) -> tuple[float, ...]:

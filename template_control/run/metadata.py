@@ -11,7 +11,7 @@ from template_control.embedding.controller import EmbeddingController
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import plant_name
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.statistics import Statistics
 from template_control.slip.gaits.gait import flight_share
 from template_control.storage import to_jsonable
@@ -45,16 +45,20 @@ def about(controller: EmbeddingController) -> dict[str, Any]:
     return {name: to_jsonable(value, _described) for name, value in found.items()}
 
 
-def conditions(o: SimulationOptions) -> dict[str, Any]:
+def conditions(o: Experiment) -> dict[str, Any]:
     """How a simulation goes; a plant of one's own is not data.
 
     Args:
-        o: the options.
+        o: the experiment.
     """
-    told: dict[str, Any] = to_jsonable(o, _described)
-    if not isinstance(o.plant, PlantOptions | IdealOptions):
+    told = {
+        _NAMES.get(f.name, f.name): to_jsonable(getattr(o, f.name), _described)
+        for f in fields(o)
+        if f.name not in _APART
+    }
+    if not isinstance(o.world, PlantOptions | IdealOptions):
         told["plant"] = {}
-    return {"plant": plant_name(o.plant), "options": told}
+    return {"plant": plant_name(o.world), "options": told}
 
 
 def outcome(controller: EmbeddingController, figures: Statistics) -> dict[str, Any]:
@@ -70,6 +74,10 @@ def outcome(controller: EmbeddingController, figures: Statistics) -> dict[str, A
         "summary": figures,
     }
     return {name: to_jsonable(value, _described) for name, value in found.items()}
+
+
+_APART = ("robot", "motion", "planner", "automaton")
+_NAMES = {"world": "plant", "controller": "embedding"}  # in records of all versions
 
 
 def _gait(controller: EmbeddingController) -> dict[str, Any]:

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
+from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.filters import NoiseFilter
 from template_control.estimation.imu import ImuOptions
 from template_control.robot.biped import Biped
+from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
@@ -33,9 +35,12 @@ class SensorOptions(Checked):
         velocity_noise: the same of the velocities [rad/s], [m/s].
         seed: of the draws.
         contact_errors: share of contact flags that are wrong (:class:`ContactSensors`).
+        noise: instead of the first two, one number for both: that of the angles [rad]; velocities
+            have 20 times as much per second on the reference template, and on another one per its
+            own unit of time.
 
     Raises:
-        ParameterError: if a number is negative or not finite.
+        ParameterError: if a number is negative or not finite, or noise is given twice.
     """
 
     kind: ClassVar[str] = "state"
@@ -44,21 +49,24 @@ class SensorOptions(Checked):
     velocity_noise: NotNegative = 0.0
     seed: Index = 0
     contact_errors: Share = 0.0
+    noise: NotNegative = 0.0
 
-    @classmethod
-    def of_size(cls, noise: float, scale: Scale, seed: int = 0) -> SensorOptions:
-        """Noise told by one number.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.noise and (self.position_noise or self.velocity_noise):
+            raise ParameterError(
+                "SensorOptions.noise stands for position_noise and velocity_noise: leave them out"
+            )
+
+    def deviations(self, scale: Scale) -> tuple[float, float]:
+        """Standard deviations of angles [rad] and of their velocities [rad/s].
 
         Args:
-            noise: of the angles [rad]; velocities have 20 times as much per second on the
-                reference template, and on another one per its own unit of time.
             scale: of the robot's template.
-            seed: of the draws.
-
-        Raises:
-            ParameterError: if the noise is negative or not finite.
         """
-        return cls(noise, _VELOCITY_NOISE / scale.time * noise, seed)
+        if self.noise:
+            return self.noise, _VELOCITY_NOISE / scale.time * self.noise
+        return self.position_noise, self.velocity_noise
 
 
 class Senses(Protocol):
@@ -94,16 +102,17 @@ class Sensors:
     Args:
         options: the noise.
         robot: whose state.
-        length: rest length of the template [m].
+        template: of the robot.
     """
 
-    def __init__(self, options: SensorOptions, robot: Biped, length: float) -> None:
-        self.exact = options.position_noise == options.velocity_noise == 0.0
+    def __init__(self, options: SensorOptions, robot: Biped, template: SlipParameters) -> None:
+        self.deviations = options.deviations(Scale.of(template))
+        self.exact = self.deviations == (0.0, 0.0)
         self._draws = np.random.default_rng(options.seed)
         self._robot = robot
         scale = np.ones(robot.nv)
-        scale[: robot.directions] = length  # the base's place comes first
-        self._deviation = np.outer((options.position_noise, options.velocity_noise), scale)
+        scale[: robot.directions] = template.rest_length  # the base's place comes first
+        self._deviation = np.outer(self.deviations, scale)
 
     def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
         """As :meth:`Senses.measure`; without noise the true arrays themselves."""

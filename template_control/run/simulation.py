@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from math import copysign, cos, hypot, sin
 from threading import Lock
@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.default import default_planners
-from template_control.embedding.planners.planner import Planner, Planners
-from template_control.embedding.robot_route import robot_route
 from template_control.embedding.robot_template import template_for
 from template_control.embedding.state import SectionReport
 from template_control.errors import DivergedError, ParameterError
@@ -27,20 +24,19 @@ from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.backends import FloatingBackend, PlanarBackend, RobotBackend
+from template_control.run.experiment import STEPS, Experiment, PreparedExperiment
 from template_control.run.failures import QpFailures
 from template_control.run.metadata import conditions
-from template_control.run.options import Push, SimulationOptions, check_pushes
+from template_control.run.old import accepts_old_call
+from template_control.run.options import Push, check_pushes
 from template_control.run.record import Record, RunInterrupted, keep, one_line
 from template_control.run.recorder import Recorder
 from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.catching import CATCHING_STRIDES, CatchingRoute
 from template_control.slip.scenario.route import Route, SteadyRoute
-from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 Array = NDArray[np.float64]
@@ -80,75 +76,40 @@ _LOG = logging.getLogger(__name__)
 _OTHER_TEMPLATE = 0.05
 """Share by which a template may differ from the robot's own: a choice of l0, not another robot."""
 
-STEPS = 50
-"""Steps of a run on a route that does not end, where the options do not say."""
 
-
+@accepts_old_call
 @checked
-def perturbed_start(gait: Gait, seed: int) -> tuple[float, float, float]:
-    """The gait's state at its section, changed by up to 5 % in speed and 2 % of l0 in height.
-
-    Args:
-        gait: whose state is changed.
-        seed: of the draws.
-
-    Returns:
-        dx/dt, y, dy/dt [m/s, m, m/s].
-    """
-    z, length = [*gait.state, 0.0][:3], gait.parameters.rest_length
-    draw = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
-    height = z[1] + 0.02 * draw[1] * length
-    return float(z[0] * (1.0 + 0.05 * draw[0])), float(height), float(z[2])
-
-
-@checked
-def simulate(
-    robot: Biped,
-    route: Route | Scenario | Planner,
-    options: SimulationOptions | None = None,
-    progress: Callable[[int], None] | None = None,
-    planners: Planners | None = None,
-    automaton: Automaton = AUTOMATON,
-) -> Record:
-    """Run ``robot`` along a route and record it; a fall ends the run and raises nothing.
+def simulate(experiment: Experiment, progress: Callable[[int], None] | None = None) -> Record:
+    """Run an experiment and record it; a fall ends the run and raises nothing.
 
     Ctrl-C ends the run, and the loop it stands in; so does an error of the route, of a planner or
     of a task. What was recorded until then is the attribute ``record`` of the exception
     (:func:`~.record.recorded`).
 
     Args:
-        robot: model of the controller, and whose URDF the plant loads.
-        route: which stride comes next and towards which state; or a scenario, which is put on
-            the robot's template; or a planner, whose gait the robot keeps. A walk of a scenario
-            or of a planner breaks into another stride where it cannot go on, and walks again
-            (:class:`~template_control.slip.scenario.catching.CatchingRoute`).
-        options: how the run goes.
+        experiment: robot, motion, planner, controller, world and disturbances.
         progress: called with the number of completed steps after each.
-        planners: one for each kind of stride of the route; by default
-            :func:`~template_control.embedding.planners.default.default_planners`.
-        automaton: of the route's strides.
 
     Raises:
-        RobotError: if the robot's legs do not reach the start.
+        RobotError: if there is no such robot, or its legs do not reach the start.
         ParameterError: if there is no planner for a stride of the route, or no pose to start in; if
-            the template of the route is another robot's; if another run uses the robot, the route
+            the template of the motion is another robot's; if another run uses the robot, the route
             or a planner at this moment; if one of these answers with what makes no stride.
         ScenarioError: if the scenario asks for what the robot cannot do.
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
     """
-    backend, free = _backend(robot), isinstance(robot, FloatingBaseBiped)
-    o = (options or SimulationOptions()).for_robot(free)
-    if isinstance(route, Scenario):
-        route = robot_route(robot, route)
-    controller = _controller(backend, route, planners, o.tuning(free), automaton)
+    o = experiment.prepare()
+    robot, backend = o.robot, _backend(o.robot)
+    controller = _controller(backend, o)
     last = _last_step(controller, o)
-    parts = (route, controller.supervisor.route, *controller.supervisor.planners.values())
+    supervisor = controller.supervisor
+    parts = (o.motion, supervisor.route, *supervisor.planners.values(), *o.planners.values())
     with exclusive(robot, *parts):
         _check_template(robot, controller.parameters)
         q, v = backend.start(controller, o)
         senses = backend.senses(controller, o)
-        _LOG.info("%s in %s: %r", robot.name, plant_name(o.plant), controller.planner)
+        _LOG.info("%s in %s: %r", robot.name, plant_name(o.world), controller.planner)
         recorder = Recorder(controller, o.record_every, conditions(o))
 
         def ended(reason: str = "", stop: BaseException | None = None) -> Record:
@@ -160,7 +121,7 @@ def simulate(
             _LOG.info("%r in %.2f s of wall-clock time", record, record.wall_seconds)
             return record
 
-        with backend.plant(o.plant) as plant:
+        with backend.plant(o.world) as plant:
             plant.reset(q, v)
             try:
                 return ended(
@@ -218,28 +179,23 @@ def _backend(robot: Biped) -> RobotBackend:
     raise ParameterError(f"{robot!r} is of no kind that can be run: give a planar or a free biped")
 
 
-def _controller(
-    backend: RobotBackend,
-    route: Route | Planner,
-    planners: Planners | None,
-    options: EmbeddingOptions,
-    automaton: Automaton,
-) -> EmbeddingController:
+def _controller(backend: RobotBackend, o: PreparedExperiment) -> EmbeddingController:
     """Follows a route or keeps a planner's gait; a walk may break into other strides."""
+    options, automaton, planner, motion = o.tuning, o.automaton, o.planner, o.motion
     catches = options.catches and automaton is AUTOMATON
-    if isinstance(route, Planner):
-        steady = SteadyRoute.of(route.gait, automaton)
-        if not catches or steady.section is not VLO:
-            return backend.controller(route, options, steady, automaton)
-        caught = CatchingRoute(steady)
-        return backend.controller(default_planners(caught, route), options, caught, automaton)
-    chosen = planners or default_planners(route)
-    if catches and isinstance(route, ScenarioRoute) and chosen.keys() >= CATCHING_STRIDES:
-        route = CatchingRoute(route)
-    return backend.controller(chosen, options, route, automaton)
+    if isinstance(planner, Mapping):
+        assert isinstance(motion, Route)
+        if catches and isinstance(motion, ScenarioRoute) and planner.keys() >= CATCHING_STRIDES:
+            motion = CatchingRoute(motion)
+        return backend.controller(planner, options, motion, automaton)
+    steady = SteadyRoute.of(planner.gait, automaton)
+    if not catches or steady.section is not VLO:
+        return backend.controller(planner, options, steady, automaton)
+    caught = CatchingRoute(steady)
+    return backend.controller(default_planners(caught, planner), options, caught, automaton)
 
 
-def _last_step(controller: EmbeddingController, o: SimulationOptions) -> float:
+def _last_step(controller: EmbeddingController, o: PreparedExperiment) -> float:
     """How many steps the run has at most.
 
     Raises:
@@ -259,14 +215,14 @@ def _loop(
     senses: Senses,
     controller: EmbeddingController,
     recorder: Recorder,
-    o: SimulationOptions,
+    o: PreparedExperiment,
     *,
     last: float,
     progress: Callable[[int], None] | None,
 ) -> str:
     """Run until the ``last`` step is done ("") or the robot falls (why)."""
     robot, supervisor = controller.robot, controller.supervisor
-    dt = o.plant.time_step
+    dt = o.world.time_step
     delay = TorqueDelay(o.delay_ticks)
     q, v, forces = robot.neutral(), np.zeros(robot.nv), np.zeros((2, robot.directions))
     contacts = ContactSensors(o.sensors, o.falls.contact_force * robot.mass * robot.gravity)
@@ -356,10 +312,10 @@ def _push(
 
 
 def _fallen(
-    plant: Plant, controller: EmbeddingController, q: Array, o: SimulationOptions, now: float
+    plant: Plant, controller: EmbeddingController, q: Array, o: PreparedExperiment, now: float
 ) -> str:
     falls, length = o.falls, controller.parameters.rest_length
-    hip = controller.robot.hip_height(q) - o.plant.ground_height(q[0])
+    hip = controller.robot.hip_height(q) - o.world.ground_height(q[0])
     if hip < falls.height * length:
         return f"the hip was {hip:.2f} m above the ground"
     if controller.robot.tilt(q) > falls.pitch:

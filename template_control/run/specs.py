@@ -6,8 +6,7 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -27,68 +26,10 @@ from template_control.embedding.robot_template import (
 )
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
-from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.robot.library import ROBOTS, load_floating_robot, load_robot
-from template_control.robot.planar_biped import PlanarBiped
-from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.gaits.gait import Gait, WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.gaits.walking_by_speed import gait_for_speed
 from template_control.slip.similarity import REFERENCE
-
-
-@dataclass(frozen=True)
-class RobotSpec(Checked):
-    """Which robot; what a URDF of one's own may need is as in :meth:`PlanarBiped.from_urdf`.
-
-    Attributes:
-        model: a shipped robot, or the path of a URDF.
-        feet: its foot links; None: left_foot and right_foot.
-        sagittal_joints: of a 3D URDF, hips and knees.
-        foot_radius: of the spheres put into the feet of a 3D URDF [m].
-        foot_offset: of their centres from the foot links' origins, in the links' axes [m].
-        locked: angle of each locked joint of a 3D URDF [rad]; in its plane a robot's other joints
-            are locked at 0.
-        lossless: whether damping and friction of a URDF's joints are left out.
-        free: whether nothing holds the robot; its URDF is a 3D one, and all joints that are not
-            locked move.
-    """
-
-    model: str = "five-link"
-    feet: tuple[str, str] | None = None
-    sagittal_joints: tuple[str, ...] = ()
-    foot_radius: float | None = None
-    locked: Mapping[str, float] = field(default_factory=dict)
-    free: bool = False
-    lossless: bool = False
-    foot_offset: tuple[float, float, float] | None = None
-
-    def load(self) -> Biped:
-        """The robot.
-
-        Raises:
-            RobotError: if there is none, or it is no such biped.
-            ParameterError: if a shipped robot comes with what only a URDF needs.
-        """
-        own = {
-            "feet": self.feet,
-            "sagittal_joints": self.sagittal_joints,
-            "foot_radius": self.foot_radius,
-            "foot_offset": self.foot_offset,
-            "locked": self.locked,
-            "lossless": self.lossless,
-        }
-        given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
-        if not given:
-            return load_floating_robot(self.model) if self.free else load_robot(self.model)
-        if self.model in ROBOTS:
-            names = ", ".join(name.replace("_", " ") for name in given)
-            raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")
-        if self.free:
-            if self.sagittal_joints:
-                raise ParameterError("sagittal joints hold a robot in its plane: leave them out")
-            return FloatingBaseBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
-        return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
-
 
 _GAIT_NUMBERS = {
     "walk": ("speed", "touchdown_angle"),
@@ -108,15 +49,21 @@ class GaitSpec(Checked):
             [m/s]; None: 3 m/s for l0 = 1 m.
         touchdown_angle: of a walk, from the ground to the leg, instead of its own [deg].
         apex_height: of a run [m]; None: one that suits its speed.
+        from_stand: of a walk, whether the robot stands for 2 s first.
+        to_stand: of a walk, whether it stops after its steps, and stands for 2 s.
 
     Raises:
         ParameterError: if a gait is given what it does not have.
     """
 
+    kind: ClassVar[str] = "gait"
+
     name: Literal["walk", "paper", "run"] = "walk"
     speed: Speed | None = None
     touchdown_angle: Degrees | None = None
     apex_height: Positive | None = None
+    from_stand: bool = False
+    to_stand: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -124,6 +71,8 @@ class GaitSpec(Checked):
             if getattr(self, name) is not None and name not in _GAIT_NUMBERS[self.name]:
                 words = name.replace("_", " ")
                 raise ParameterError(f"{words} does not go with gait {self.name}: leave one out")
+        if self.name == "run" and (self.from_stand or self.to_stand):
+            raise ParameterError("gait run does not begin in a stand: give a walk")
 
     def of(self, robot: Biped, torque_scale: float = 1.0) -> WalkingGait | RunningGait:
         """The gait on a robot's template.
@@ -174,7 +123,7 @@ class OwnPlanner(Checked):
 
     path: str
 
-    def make(self, gait: WalkingGait | RunningGait) -> Planner:
+    def make(self, gait: Gait) -> Planner:
         """The planner.
 
         Args:

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from template_control.plant.plant import plant_name
 from template_control.robustness.campaign import Campaign, Trial
 from template_control.robustness.disturbances import AFTER
 from template_control.robustness.findings import Finding, Robustness, wilson_interval
@@ -59,7 +60,8 @@ def campaign_figure(campaign: Campaign) -> Figure:
         *axes[0].get_legend_handles_labels(), fontsize=8, loc="outside lower center", ncols=2
     )
     figure.supylabel("share of the trials [%]", fontsize=9)
-    robot, plant = as_text(campaign.conditions.robot.model), campaign.conditions.plant
+    experiment = campaign.conditions.experiment
+    robot, plant = as_text(experiment.robot_name), plant_name(experiment.world)
     figure.suptitle(f"{robot} in {plant}: {len(campaign.trials)} trials, all disturbed at once")
     return figure
 

@@ -46,7 +46,7 @@ def bolt(joints=BOLT_JOINTS, radius=0.016):
 
 def walk(robot, start=None):
     planner = tc.LqrPlanner(tc.default_gait(robot))
-    tc.simulate(robot, planner, tc.SimulationOptions(steps=1, start=start))
+    tc.simulate(tc.Experiment(robot, planner=planner, steps=1, start=start))
 
 
 def linked(folder):

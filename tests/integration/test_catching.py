@@ -213,8 +213,11 @@ def kinds(record):
 def test_a_robot_that_is_pushed_too_hard_runs_and_walks_on(name, phase):
     robot = tc.load_robot(name)
     planner = tc.LqrPlanner(tc.default_gait(robot))
-    options = tc.SimulationOptions(steps=18, pushes=(tc.Push(80.0, step=3, phase=phase),))
-    record = tc.simulate(robot, planner, options)
+    record = tc.simulate(
+        tc.Experiment(
+            robot, planner=planner, steps=18, pushes=(tc.Push(80.0, step=3, phase=phase),)
+        )
+    )
     assert record.fall_reason == ""
     found = kinds(record)
     runs = found.count("r")
@@ -236,16 +239,19 @@ def test_a_walk_of_a_scenario_runs_and_walks_on():
     robot = tc.load_robot("five-link")
     route = robot_route(robot, scenario, push_off=False)  # steps with push-off know no run
     pushes = (tc.Push(60.0, step=2, phase=0.3),)
-    record = tc.simulate(robot, route, tc.SimulationOptions(pushes=pushes))
+    record = tc.simulate(tc.Experiment(robot, route, pushes=pushes))
     assert record.arrived
     found = kinds(record)
     runs = found.count("r")
     assert runs >= 3
     assert found == ["w"] * 2 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * 4, "caught, it is a step"
     fallen = tc.simulate(
-        robot,
-        robot_route(robot, scenario, push_off=False),
-        tc.SimulationOptions(pushes=pushes, embedding=tc.EmbeddingOptions(catches=False)),
+        tc.Experiment(
+            robot,
+            robot_route(robot, scenario, push_off=False),
+            pushes=pushes,
+            controller=tc.EmbeddingOptions(catches=False),
+        )
     )
     assert set(kinds(fallen)) == {"w"}
 

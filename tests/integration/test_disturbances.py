@@ -14,15 +14,16 @@ from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.terrain import GroundStep
 from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.record import Record
 from template_control.run.sensing import ContactSensors, SensorOptions, Sensors
 from template_control.run.simulation import simulate
+from template_control.slip.parameters import SlipParameters
 from template_control.view.figures import stick_diagram
 
 
 def walk(robot, gait, **options):
-    return simulate(robot, LqrPlanner(gait), SimulationOptions(**options))
+    return simulate(Experiment(robot, planner=LqrPlanner(gait), **options))
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def on_step(gait):
     def walked(height):
         step = GroundStep.at_step(gait, height, 5)
         options = PlantOptions(ground_step=step)
-        return step, walk(load_robot("five-link"), gait, steps=9, plant=options)
+        return step, walk(load_robot("five-link"), gait, steps=9, world=options)
 
     return walked
 
@@ -82,7 +83,7 @@ def test_momentum_changes_by_the_forces_on_both_levels(on_step, robot):
 def test_an_edge_out_of_reach_changes_nothing(robot, default_gait, short_walk):
     def towards(height):
         plant = PlantOptions(ground_step=GroundStep(height, 50.0))
-        return walk(robot, default_gait, steps=short_walk.steps, plant=plant)
+        return walk(robot, default_gait, steps=short_walk.steps, world=plant)
 
     np.testing.assert_array_equal(towards(0.05).q, short_walk.q)
     # Before a step down the ground is another kind of body, which carries as well.
@@ -172,8 +173,9 @@ def test_the_controller_gets_noise_and_the_record_the_truth(robot, gait, monkeyp
 def test_noise_is_seeded_and_scales_with_the_template(robot):
     q, v, contact = np.zeros(robot.nv), np.zeros(robot.nv), np.ones(2, dtype=bool)
     options = SensorOptions(position_noise=1e-3, velocity_noise=0.1, seed=5)
-    first, again = Sensors(options, robot, 1.0), Sensors(options, robot, 0.5)
-    other = Sensors(SensorOptions(1e-3, 0.1, seed=6), robot, 1.0)
+    tall, small = SlipParameters(), SlipParameters(rest_length=0.5)
+    first, again = Sensors(options, robot, tall), Sensors(options, robot, small)
+    other = Sensors(SensorOptions(1e-3, 0.1, seed=6), robot, tall)
     for _ in range(3):
         a, b, c = (s.measure(q, v, contact) for s in (first, again, other))
         for i in range(2):
@@ -238,10 +240,10 @@ def test_torques_act_that_many_ticks_later(robot, gait, monkeypatch, ticks):
         (lambda: SensorOptions(velocity_noise=np.inf), "velocity_noise"),
         (lambda: SensorOptions(seed=-1), "seed"),
         (lambda: SensorOptions(contact_errors=1.01), "contact_errors"),
-        (lambda: SimulationOptions(delay=-1e-3), "delay"),
-        (lambda: SimulationOptions(delay=1.5e-3), "delay.*multiple.*0.001 s"),
-        (lambda: SimulationOptions(delay=np.nan), "delay"),
-        (lambda: SimulationOptions(delay=2.0), "delay"),
+        (lambda: Experiment(delay=-1e-3), "delay"),
+        (lambda: Experiment(delay=1.5e-3), "delay.*multiple.*0.001 s"),
+        (lambda: Experiment(delay=np.nan), "delay"),
+        (lambda: Experiment(delay=2.0), "delay"),
     ],
 )
 def test_bad_disturbances_are_named(make, culprit):

@@ -21,14 +21,14 @@ from template_control.slip.lateral.path import lateral_path
 
 def _weak(scale):
     """A walk whose motors are much too weak."""
-    return tc.SimulationOptions(steps=10, embedding=tc.EmbeddingOptions(torque_scale=scale))
+    return tc.Experiment(steps=10, controller=tc.EmbeddingOptions(torque_scale=scale))
 
 
 @pytest.mark.parametrize(("scale", "fails"), [(0.05, True), (1.0, False)])
 def test_a_run_in_which_the_qp_fails_says_so_at_once(robot, default_gait, caplog, scale, fails):
     options = _weak(scale)
     with caplog.at_level(logging.WARNING, "template_control.run.failures"):
-        record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
+        record = tc.simulate(replace(options, robot=robot, planner=tc.LqrPlanner(default_gait)))
     share = float(np.mean(~record.solved))
     assert (share > 0.5) is fails
     told = [m for m in caplog.records if m.name.endswith("run.failures")]
@@ -69,7 +69,7 @@ def test_few_failures_are_no_warning(caplog):
 @pytest.mark.slow(6)
 def test_a_swing_without_a_touchdown_in_sight_holds_its_foot(number):
     """Its reference was NaN, and no QP was solved from then on until the robot lay."""
-    found = trial({"model": "bolt", "free": True}, "noise", 0.02, number)
+    found = trial({"robot": {"model": "bolt", "free": True}}, "noise", 0.02, number)
     assert not found["fell"]
     assert found["steps"] == 20
 

@@ -23,7 +23,6 @@ from template_control.robot import (
     load_floating_robot,
     robot_path,
 )
-from template_control.run.options import SimulationOptions
 from template_control.run.summary import summarise
 
 
@@ -235,7 +234,7 @@ def test_it_walks_within_all_its_limits():
     robot = load_floating_robot("five-link-3d")
     gait = tc.robot_gait_for_speed(robot, 1.0)
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
-    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=20))
+    record = tc.simulate(tc.Experiment(robot, planner=planner, steps=20))
     assert not record.fell, record.fall_reason
     assert record.steps == 20
     figures = summarise(record, None)
@@ -278,8 +277,15 @@ def with_yaw(text, above):
 def test_legs_of_four_hinges_walk(load, text, above, plant):
     robot = load(with_yaw(text, above))
     assert [len(leg) for leg in robot.legs] == [4, 4]
-    options = SimulationOptions(steps=8, embedding=FreeOptions(), plant=plant)
-    record = tc.simulate(robot, tc.LqrPlanner(tc.default_gait(robot), FREE_PLANNER), options)
+    record = tc.simulate(
+        tc.Experiment(
+            robot,
+            planner=tc.LqrPlanner(tc.default_gait(robot), FREE_PLANNER),
+            steps=8,
+            controller=FreeOptions(),
+            world=plant,
+        )
+    )
     assert not record.fell, record.fall_reason
     yaw = [i for i, name in enumerate(robot.joint_names) if name.endswith("yaw")]
     assert [joint for joint, _ in robot.spare] == yaw

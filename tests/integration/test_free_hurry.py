@@ -79,7 +79,7 @@ def test_a_push_towards_the_foot_that_lands_is_taken():
     robot = tc.load_floating_robot("five-link-3d")
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 1.0), tc.embedding.FREE_PLANNER)
     push = tc.Push(10.0, 4, 0.3, direction=radians(-90.0))
-    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=10, pushes=(push,)))
+    record = tc.simulate(tc.Experiment(robot, planner=planner, steps=10, pushes=(push,)))
     assert not record.fell, record.fall_reason
     figures = record.summary
     assert figures["qp_failures"] == 0

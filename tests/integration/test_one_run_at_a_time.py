@@ -1,6 +1,7 @@
 """A run begins afresh with what an earlier one used, and shares nothing with one that goes on."""
 
 import threading
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,7 +16,7 @@ from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.scenario.scenario import Scenario, Segment
 
-OPTIONS = tc.SimulationOptions(steps=3, record_every=10)
+OPTIONS = tc.Experiment(steps=3, record_every=10)
 
 
 @pytest.mark.parametrize("kind", [tc.LqrPlanner, tc.ModifiedPlanner])
@@ -56,7 +57,7 @@ def test_running_and_transition_planners_forget_the_gaits_of_an_earlier_run():
 
 def test_a_second_run_of_one_robot_and_planner_is_as_the_first(robot, default_gait):
     planner = tc.LqrPlanner(default_gait)
-    first, second = (tc.simulate(robot, planner, OPTIONS) for _ in range(2))
+    first, second = (tc.simulate(replace(OPTIONS, robot=robot, planner=planner)) for _ in range(2))
     for name in ("time", "q", "torque", "section_state", "section_controls"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
@@ -65,7 +66,7 @@ def test_a_second_run_of_one_robot_and_planner_is_as_the_first(robot, default_ga
 def test_a_second_run_of_one_route_is_as_the_first(robot):
     walk = Scenario((Segment("walk", 1.1, steps=2),), start=(1.1, 0.978, 0.0))
     route = robot_route(robot, walk, push_off=False)
-    first, again = (tc.simulate(robot, route, OPTIONS) for _ in range(2))
+    first, again = (tc.simulate(replace(OPTIONS, robot=robot, motion=route)) for _ in range(2))
     assert first.arrived
     np.testing.assert_array_equal(again.q, first.q)
 
@@ -81,7 +82,7 @@ def test_a_robot_or_planner_in_use_is_refused_to_another_thread(shared, default_
     def meanwhile(done):
         def second():
             try:
-                tc.simulate(other["robot"], other["planner"], OPTIONS)
+                tc.simulate(replace(OPTIONS, robot=other["robot"], planner=other["planner"]))
             except ParameterError as error:
                 told.append(str(error))
 
@@ -89,9 +90,9 @@ def test_a_robot_or_planner_in_use_is_refused_to_another_thread(shared, default_
         thread.start()
         thread.join()
 
-    record = tc.simulate(own["robot"], own["planner"], OPTIONS, meanwhile)
+    record = tc.simulate(replace(OPTIONS, robot=own["robot"], planner=own["planner"]), meanwhile)
     assert record.steps == 3
     assert len(told) == 3
     assert all("is in use by another run" in line for line in told)
     # The run has given them back.
-    assert tc.simulate(other["robot"], other["planner"], OPTIONS).steps == 3
+    assert tc.simulate(replace(OPTIONS, robot=other["robot"], planner=other["planner"])).steps == 3

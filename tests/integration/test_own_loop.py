@@ -12,7 +12,7 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.robot.start import state_at_vlo
 from template_control.run.backends import FloatingBackend
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.record import FloatingRecord
 from template_control.run.simulation import simulate
 
@@ -57,9 +57,9 @@ def floating():
     robot = tc.load_floating_robot("bolt")
     backend = FloatingBackend(robot)
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 0.6), FREE_PLANNER)
-    options = SimulationOptions().for_robot(True)
+    options = Experiment(robot, planner=planner).prepare()
     controller = backend.controller(
-        planner, options.embedding, tc.slip.SteadyRoute.of(planner.gait), tc.slip.AUTOMATON
+        planner, options.tuning, tc.slip.SteadyRoute.of(planner.gait), tc.slip.AUTOMATON
     )
     q, v = backend.start(controller, options)
     with FloatingBaseBulletPlant(robot, PlantOptions()) as plant:
@@ -69,7 +69,7 @@ def floating():
 def test_a_loop_of_ones_own_is_recorded_as_simulate_does(planar, default_gait):
     record = planar[0].record()
     robot = tc.load_robot("five-link")
-    other = simulate(robot, tc.LqrPlanner(default_gait), SimulationOptions(steps=STEPS))
+    other = simulate(Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=STEPS))
     for field in fields(record):
         if field.name == "metadata" or field.name.endswith("_seconds"):
             continue

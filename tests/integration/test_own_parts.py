@@ -20,7 +20,7 @@ from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.scenario.route import SteadyRoute, StrideGoal
 from template_control.whole_body.tasks import ComTask
 
-OPTIONS = tc.SimulationOptions(steps=4, record_every=10)
+OPTIONS = tc.Experiment(steps=4, record_every=10)
 
 
 class Mine(Planner):
@@ -102,7 +102,7 @@ def test_a_planner_that_fails_ends_the_run_and_is_no_fall(
     # Pushed in double stance, the walk chooses its stiffnesses again.
     options = replace(OPTIONS, pushes=(tc.Push(40.0, 2, 0.45),))
     with pytest.raises(kind, match=text) as caught:
-        tc.simulate(robot, Mine(default_gait, fail, member), options)
+        tc.simulate(replace(options, robot=robot, planner=Mine(default_gait, fail, member)))
     assert not isinstance(caught.value, DivergedError)
     if kind is ZeroDivisionError:
         assert f"It came up in Mine.{member}." in caught.value.__notes__
@@ -117,7 +117,7 @@ def test_a_planner_that_fails_ends_the_run_and_is_no_fall(
 
 def test_an_error_before_the_first_tick_has_no_record(robot, default_gait):
     with pytest.raises(ZeroDivisionError) as caught:
-        tc.simulate(robot, Mine(default_gait, _bug, after=0), OPTIONS)
+        tc.simulate(replace(OPTIONS, robot=robot, planner=Mine(default_gait, _bug, after=0)))
     assert recorded(caught.value) is None
 
 
@@ -147,7 +147,7 @@ def test_a_route_that_asks_for_nonsense_ends_the_run_and_is_no_fall(
     route.goal = goal
     planners = {"wp": tc.LqrPlanner(default_gait)}
     with pytest.raises(ParameterError, match=text) as caught:
-        tc.simulate(robot, route, OPTIONS, planners=planners)
+        tc.simulate(replace(OPTIONS, robot=robot, motion=route, planner=planners))
     assert recorded(caught.value).steps == 1
 
 
@@ -178,9 +178,9 @@ def test_a_task_that_fails_ends_the_run_and_is_no_fall(
     stance = PHASES[Phase.DS]
     tasks = (Task((1.0, 3.0)), *stance.tasks[1:])
     phases = {**PHASES, "DS_sd^wp": replace(PHASES["DS_sd^wp"], tasks=tasks)}
-    options = replace(OPTIONS, embedding=EmbeddingOptions(phases=phases))
+    options = replace(OPTIONS, controller=EmbeddingOptions(phases=phases))
     with pytest.raises(kind, match=text) as caught:
-        tc.simulate(robot, tc.LqrPlanner(default_gait), options)
+        tc.simulate(replace(options, robot=robot, planner=tc.LqrPlanner(default_gait)))
     assert recorded(caught.value).steps >= 1
 
 
@@ -210,7 +210,9 @@ class Nowhere:
 @pytest.mark.parametrize("error", [None, DivergedError("lost it")])
 def test_a_state_that_is_not_finite_is_a_fall(robot, default_gait, error):
     plant = Nowhere(IdealPlant(tc.load_robot("five-link"), IdealOptions()), 40, error)
-    record = tc.simulate(robot, tc.LqrPlanner(default_gait), replace(OPTIONS, plant=plant))
+    record = tc.simulate(
+        replace(replace(OPTIONS, world=plant), robot=robot, planner=tc.LqrPlanner(default_gait))
+    )
     assert record.fell
     assert re.match("the simulation diverged at 0.0", record.fall_reason)
 
@@ -220,7 +222,9 @@ def test_another_error_of_a_plant_is_no_fall(robot, default_gait):
         IdealPlant(tc.load_robot("five-link"), IdealOptions()), 40, ParameterError("no licence")
     )
     with pytest.raises(ParameterError, match="no licence") as caught:
-        tc.simulate(robot, tc.LqrPlanner(default_gait), replace(OPTIONS, plant=plant))
+        tc.simulate(
+            replace(replace(OPTIONS, world=plant), robot=robot, planner=tc.LqrPlanner(default_gait))
+        )
     assert recorded(caught.value).error == "no licence"
 
 
@@ -230,7 +234,7 @@ def test_what_a_planner_lacks_is_named(robot):
             raise AssertionError("it is not asked")
 
     with pytest.raises(ParameterError, match=r"or a Planner \(this one lacks gait\)"):
-        tc.simulate(robot, Lame())
+        tc.simulate(tc.Experiment(robot, planner=Lame()))
     with pytest.raises(TypeError, match="decide"):
         type("Idle", (Planner,), {})()
 
@@ -240,7 +244,7 @@ def test_a_planner_without_the_base_class_is_told_to_derive_from_it(robot, defau
     bare = type("Bare", (), {"gait": default_gait, **members})()
     text = r"a Planner \(this one lacks .*forget.*: derive it from Planner\)"
     with pytest.raises(ParameterError, match=text):
-        tc.simulate(robot, bare)
+        tc.simulate(tc.Experiment(robot, planner=bare))
 
 
 @pytest.mark.parametrize("run", [False, True])
@@ -252,7 +256,7 @@ def test_a_gait_of_another_robot_names_both_templates(default_gait, name, run):
     own = tc.template_for(other)
     text = rf"a template of 80 kg, l0 = 1 m .* {name} has {own.mass:.4g} kg, l0 = "
     with pytest.raises(ParameterError, match=text):
-        tc.simulate(other, planner)
+        tc.simulate(tc.Experiment(other, planner=planner))
 
 
 MODULE = """

@@ -45,10 +45,12 @@ class Wrapped:
 def test_a_plant_of_ones_own_is_the_same_world(robot, default_gait, tmp_path):
     mine = Wrapped(robot)
     planner = tc.LqrPlanner(default_gait)
-    options = tc.SimulationOptions(steps=2, plant=mine, delay=5e-4)
-    record = tc.simulate(robot, planner, options)
-    theirs = tc.SimulationOptions(steps=2, plant=tc.IdealOptions(time_step=5e-4), delay=5e-4)
-    expected = tc.simulate(robot, planner, theirs)
+    record = tc.simulate(tc.Experiment(robot, planner=planner, steps=2, world=mine, delay=5e-4))
+    expected = tc.simulate(
+        tc.Experiment(
+            robot, planner=planner, steps=2, world=tc.IdealOptions(time_step=5e-4), delay=5e-4
+        )
+    )
     np.testing.assert_array_equal(record.q, expected.q)
     np.testing.assert_array_equal(record.torque, expected.torque)
     assert record.time[1] == pytest.approx(5e-4)
@@ -77,8 +79,8 @@ def test_what_a_plant_lacks_is_told():
         def reset(self, q, v):
             pass
 
-    with pytest.raises(ParameterError, match=r"plant is a Half, which lacks ground_height, read,"):
-        tc.SimulationOptions(plant=Half())
+    with pytest.raises(ParameterError, match=r"world is a Half, which lacks ground_height, read,"):
+        tc.Experiment(world=Half())
 
 
 @pytest.mark.parametrize("step", [0.0, -1e-3, np.nan, np.inf, "1"])
@@ -86,10 +88,10 @@ def test_a_time_step_that_is_none_is_told(robot, step):
     mine = Wrapped(robot)
     mine.time_step = step
     with pytest.raises(ParameterError, match=r"time_step is .*: give a positive number of seconds"):
-        tc.SimulationOptions(plant=mine)
+        tc.Experiment(world=mine)
 
 
 def test_a_plant_of_ones_own_cannot_be_written_down(robot, tmp_path):
-    config = tc.RunConfig(simulation=tc.SimulationOptions(plant=Wrapped(robot)))
-    with pytest.raises(ParameterError, match=r"simulation.plant is Wrapped, which TOML cannot say"):
-        config.save(tmp_path / "run.toml")
+    experiment = tc.Experiment(world=Wrapped(robot))
+    with pytest.raises(ParameterError, match=r"^world is Wrapped, which TOML cannot say"):
+        experiment.save(tmp_path / "run.toml")

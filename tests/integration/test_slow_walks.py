@@ -149,16 +149,20 @@ def test_a_robot_that_is_pushed_back_hard_walks_on(phase, caught):
     robot = tc.load_robot("five-link")
     planner = tc.LqrPlanner(tc.default_gait(robot))
     pushes = (tc.Push(-65.0, step=4, phase=phase),)
-    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=18, pushes=pushes))
+    record = tc.simulate(tc.Experiment(robot, planner=planner, steps=18, pushes=pushes))
     assert record.fall_reason == ""
     assert strides(record) == ["wp"] * 4 + caught + ["wp"] * (14 - len(caught))
     assert np.all(np.abs(record.torque) <= record.torque_limit)
     assert record.push.sum() * 1e-3 == pytest.approx(-65.0, rel=1e-6)
     assert record.section_state[-1, 0] == pytest.approx(1.1, abs=0.011)
     left = tc.simulate(
-        robot,
-        planner,
-        tc.SimulationOptions(steps=18, pushes=pushes, embedding=tc.EmbeddingOptions(catches=False)),
+        tc.Experiment(
+            robot,
+            planner=planner,
+            steps=18,
+            pushes=pushes,
+            controller=tc.EmbeddingOptions(catches=False),
+        )
     )
     assert left.fell
     assert set(strides(left)) == {"wp"}

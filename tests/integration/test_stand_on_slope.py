@@ -13,8 +13,6 @@ from template_control.embedding.robot_template import startable_slopes
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
 from template_control.embedding.standing.planners import standing_planners
 from template_control.errors import ParameterError
-from template_control.run.config import RunConfig
-from template_control.run.specs import RobotSpec
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Outcome
 
@@ -30,8 +28,8 @@ def sloping(degrees):
 
 def walked(plant, degrees, steps=12, robot="five-link"):
     """A record of a walk from a stand."""
-    options = tc.SimulationOptions(steps=steps, plant=plant(terrain=sloping(degrees)))
-    return RunConfig(robot=RobotSpec(robot)).with_stands(True, False).prepare().run(options)
+    walk, world = tc.run.GaitSpec(from_stand=True), plant(terrain=sloping(degrees))
+    return tc.simulate(tc.Experiment(robot, walk, steps=steps, world=world))
 
 
 @pytest.mark.parametrize("degrees", [-5.0, -2.0, 0.0, 1.0, 4.0])

@@ -17,7 +17,7 @@ from template_control.embedding.planners.planner import Decision, Planner
 from template_control.errors import ParameterError
 from template_control.robot.library import load_robot
 from template_control.robot.start import Pose
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
@@ -165,10 +165,14 @@ def hop(hops=HOPS, **options):
         feet=np.array([[0.0, HEIGHT - P.rest_length], np.add([0.0, HEIGHT], TUCKED.place)]),
         feet_velocity=np.zeros((2, 2)),
     )
-    o = SimulationOptions(
-        steps=hops, pose=start, embedding=EmbeddingOptions(phases=PHASES, torque_scale=2.0)
+    o = Experiment(
+        steps=hops, pose=start, controller=EmbeddingOptions(phases=PHASES, torque_scale=2.0)
     )
-    return simulate(load_robot("five-link"), planner, replace(o, **options), automaton=HOPPING)
+    return simulate(
+        replace(
+            replace(o, **options), robot=load_robot("five-link"), planner=planner, automaton=HOPPING
+        )
+    )
 
 
 @pytest.fixture(scope="module")
@@ -215,7 +219,7 @@ def test_record_names_the_toy_s_nodes_section_and_stride(record, tmp_path):
 def test_a_table_that_does_not_fit_the_automaton_is_refused():
     def refused(phases):
         with pytest.raises(ParameterError) as told:
-            hop(1, embedding=EmbeddingOptions(phases=phases))
+            hop(1, controller=EmbeddingOptions(phases=phases))
         return str(told.value)
 
     assert "no entry of the phases serves node F_aa^hop" in refused({Phase.SS: PHASES[Phase.SS]})

@@ -108,8 +108,15 @@ def test_an_unseen_step_leaves_the_walk_at_its_speed(default_gait, place, height
     """With the feet lower or with legs chosen by the end state alone the robot fell."""
     gait = default_gait
     plant = tc.PlantOptions(terrain=tc.Terrain.step(height, place * gait.step_length))
-    options = tc.SimulationOptions(steps=int(place) + 9, plant=plant, record_every=5)
-    record = tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(gait), options)
+    record = tc.simulate(
+        tc.Experiment(
+            tc.load_robot("five-link"),
+            planner=tc.LqrPlanner(gait),
+            steps=int(place) + 9,
+            world=plant,
+            record_every=5,
+        )
+    )
     assert not record.fell
     assert record.section_state[-2:, 0] == pytest.approx(gait.state[0], rel=0.03)
 
@@ -120,8 +127,11 @@ def test_a_step_up_right_before_a_foothold_is_climbed(default_gait, place):
     """The foot came down in front of the wall, or lifted off right behind it."""
     gait = default_gait
     plant = tc.PlantOptions(terrain=tc.Terrain.step(0.03, place * gait.step_length))
-    options = tc.SimulationOptions(steps=12, plant=plant)
-    record = tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(gait), options)
+    record = tc.simulate(
+        tc.Experiment(
+            tc.load_robot("five-link"), planner=tc.LqrPlanner(gait), steps=12, world=plant
+        )
+    )
     assert not record.fell
     assert record.foot[-1, :, 1].min() > 0.029
     assert record.section_state[-1, 0] > 0.9 * gait.state[0]

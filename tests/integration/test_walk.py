@@ -10,11 +10,12 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.terrain import GroundStep
 from template_control.robot.library import load_robot
-from template_control.robustness.disturbances import Situation
+from template_control.robustness.disturbances import footholds as find_footholds
 from template_control.robustness.severity_sweep import gait_errors
-from template_control.run.options import Push, SimulationOptions
+from template_control.run.experiment import Experiment, perturbed_start
+from template_control.run.options import Push
 from template_control.run.record import Record
-from template_control.run.simulation import perturbed_start, simulate
+from template_control.run.simulation import simulate
 from template_control.run.summary import summarise
 from template_control.slip.gaits.walking_by_speed import gait_for_speed
 from template_control.slip.parameters import SlipParameters
@@ -23,7 +24,7 @@ P = SlipParameters()
 
 
 def walk(gait, planner=LqrPlanner, **options):
-    return simulate(load_robot("five-link"), planner(gait), SimulationOptions(**options))
+    return simulate(Experiment(load_robot("five-link"), planner=planner(gait), **options))
 
 
 @pytest.fixture
@@ -132,7 +133,7 @@ def test_weak_legs_report_failed_qps_or_a_fall(gait):
     record = walk(
         gait,
         steps=5,
-        embedding=EmbeddingOptions(torque_scale=0.2),
+        controller=EmbeddingOptions(torque_scale=0.2),
     )
     assert record.fell
     assert np.abs(record.torque).max() <= 70.0
@@ -151,9 +152,9 @@ def test_bad_options_are_named():
     with pytest.raises(ParameterError, match="friction"):
         PlantOptions(friction=-1.0)
     with pytest.raises(ParameterError, match="steps"):
-        SimulationOptions(steps=0)
+        Experiment(steps=0)
     with pytest.raises(ParameterError, match="record_every"):
-        SimulationOptions(record_every=0)
+        Experiment(record_every=0)
 
 
 def settled(record, gait, steps):
@@ -204,7 +205,7 @@ def test_perturbed_starts(gait, seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.9, 1.1])
 def test_unknown_mass(gait, scale):
-    assert not walk(gait, steps=30, plant=PlantOptions(mass_scale=scale)).fell
+    assert not walk(gait, steps=30, world=PlantOptions(mass_scale=scale)).fell
 
 
 @pytest.mark.slow
@@ -212,8 +213,8 @@ def test_slippery_ground(gait):
     record = walk(
         gait,
         steps=30,
-        plant=PlantOptions(friction=0.5),
-        embedding=EmbeddingOptions(friction=0.5),
+        world=PlantOptions(friction=0.5),
+        controller=EmbeddingOptions(friction=0.5),
     )
     assert not record.fell
 
@@ -230,9 +231,8 @@ def test_pushes(default_gait, impulse, phase):
 @pytest.fixture(scope="module")
 def footholds(default_gait):
     """About the place where the ground is to step up or down."""
-    return Situation(load_robot("five-link"), default_gait, LqrPlanner(default_gait)).footholds(
-        tuple(default_gait.vlo), 5
-    )[-2:]
+    where = Experiment("five-link", planner=LqrPlanner(default_gait)).prepare()
+    return find_footholds(where, tuple(default_gait.vlo), 5)[-2:]
 
 
 @pytest.mark.slow
@@ -241,6 +241,6 @@ def footholds(default_gait):
 def test_a_step_of_the_ground_that_it_does_not_see(default_gait, footholds, height, share):
     before, beyond = footholds
     edge = GroundStep(height, before + share * (beyond - before))
-    record = walk(default_gait, steps=15, plant=PlantOptions(ground_step=edge))
+    record = walk(default_gait, steps=15, world=PlantOptions(ground_step=edge))
     assert not record.fell
     assert max(map(abs, gait_errors(record, default_gait))) < 0.02, "back within 10 steps"

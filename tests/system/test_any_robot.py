@@ -15,7 +15,7 @@ from template_control.errors import RobotError
 from template_control.robot.five_link import FiveLink, Link
 from template_control.robot.library import ROBOTS, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.parameters import SlipParameters
@@ -54,7 +54,7 @@ def random_five_link(seed, mass=None, leg=None):
 
 def walk(robot, steps):
     gait = default_gait(robot)
-    record = simulate(robot, LqrPlanner(gait), SimulationOptions(steps=steps, record_every=5))
+    record = simulate(Experiment(robot, planner=LqrPlanner(gait), steps=steps, record_every=5))
     return record, gait
 
 
@@ -109,7 +109,7 @@ def test_a_robot_never_seen_runs_a_hundred_steps(tmp_path):
     robot = PlanarBiped.from_urdf(path)
     template = template_for(robot)
     gait = running_gait(template, 2.0 * np.sqrt(template.rest_length * template.gravity / 9.81))
-    record = simulate(robot, RunningPlanner(gait), SimulationOptions(steps=100, record_every=5))
+    record = simulate(Experiment(robot, planner=RunningPlanner(gait), steps=100, record_every=5))
     assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(gait.apex[0], rel=0.01)
     assert record.summary.qp_failures == 0

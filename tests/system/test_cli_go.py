@@ -6,19 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
 from template_control.cli import report as kept
-from template_control.cli.go import _print, summarise_route
+from template_control.cli.go import print_route_table, summarise_route
 from template_control.cli.main import main
 from template_control.run.record import Record
-from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.scenario.run import ScenarioRecord
-from template_control.view.scenario_figures import (
-    route_figure,
-    save_route_figures,
-    transition_energies,
-)
 
 KEYS = {
     "robot", "completed", "fell", "fall_reason", "duration", "top_speed", "speed_error_rms",
@@ -111,7 +104,7 @@ def test_where_the_nearest_speed_was_taken_is_told(record, template, capfd):
     target[3, 0] = record.section_predicted[3, 0] + 0.5  # further than a running stride leads
     figures = summarise_route(replace(record, section_target=target), template, None)
     assert figures["nearest_speed_taken"] == {"strides": 1, "most": pytest.approx(0.5)}
-    _print(figures)
+    print_route_table(figures)
     assert "1 times, 0.50 m/s off" in capfd.readouterr().out
 
 
@@ -188,48 +181,3 @@ def test_a_fall_exits_with_one_and_keeps_the_run(scenario, tmp_path, capfd):
     assert figures["fell"]
     assert not figures["completed"]
     assert Record.load(tmp_path / "run.npz").fell
-
-
-def test_a_scenario_that_runs_is_not_walked(scenario, tmp_path, refused):
-    line = refused(["walk", "--scenario", str(scenario), "--output", str(tmp_path)])
-    assert "segment 2 is to run: give the scenario to template-control go" in line
-
-
-def test_the_figure_shows_what_was_recorded(record, template):
-    speed, path, stiffness, torque = route_figure(record, template).axes
-    shown = {line.get_label(): line for line in speed.lines}
-    np.testing.assert_array_equal(shown["robot"].get_ydata(), record.com_velocity[:, 0])
-    np.testing.assert_array_equal(shown["the template alone"].get_ydata(), template.state[:, 2])
-    holds = next(line for line in path.lines if line.get_label() == "footholds").get_xdata()
-    # Two steps, the transition's, two running strides, and that which walks again, with the last
-    # step's. None is counted twice.
-    assert 6 <= len(holds) <= 8
-    assert np.all(np.diff(np.sort(holds)) > 0.3)
-    for line in stiffness.lines:
-        carried = line.get_ydata()[np.isfinite(line.get_ydata())]
-        assert len(carried) > 100
-        assert np.all((carried > 1.0) & (carried < 80.0)), "kN/m"
-    flies = record.in_phase(Phase.F)
-    rear = stiffness.lines[0].get_ydata()
-    assert np.isnan(rear[flies]).all(), "no leg carries in flight"
-    np.testing.assert_array_equal(torque.lines[0].get_ydata(), record.torque[:, 0])
-
-
-def test_energies_are_shown_around_both_transitions(record):
-    panels = transition_energies(record).axes
-    assert [axes.get_title() for axes in panels] == ["walk to run", "run to walk"]
-    for axes in panels:
-        assert all(line.get_ydata()[0] == 0.0 for line in axes.lines)
-
-
-@pytest.mark.slow(seconds=3)
-def test_the_files_are_not_empty_and_a_walk_has_no_transitions(
-    record, template, short_walk, tmp_path
-):
-    paths = save_route_figures(record, template, tmp_path)
-    assert [path.stem for path in paths] == ["scenario", "transitions"]
-    for path in paths:
-        picture = imread(path)[..., :3]
-        assert np.mean(picture.min(axis=2) < 0.8) > 0.005, f"{path} is empty"
-    (only,) = save_route_figures(short_walk, template, tmp_path)
-    assert only.stem == "scenario"

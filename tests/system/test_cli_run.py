@@ -74,8 +74,8 @@ def test_a_joint_speed_past_its_limit_is_marked(tmp_path, capfd, gait, monkeypat
         fast["limit"] = 0.9 * fast["peak"]
         return figures
 
-    command = "go" if gait == "go" else "walk"
-    monkeypatch.setattr(f"template_control.cli.{command}.summarise", narrowed)
+    module = "go" if gait == "go" else "motion"
+    monkeypatch.setattr(f"template_control.cli.{module}.summarise", narrowed)
     words = [gait, *([SPEEDS] if gait == "go" else [])]
     steps = ["--steps", "1", "--no-figures", "--output", str(tmp_path)]
     assert main([*words, *steps]) == 0

@@ -13,7 +13,7 @@ from template_control.cli import report as kept
 from template_control.cli.main import main
 from template_control.errors import RecordError
 from template_control.robot.library import robot_path
-from template_control.run.config import RunConfig
+from template_control.run.experiment import Experiment
 from template_control.run.record import Record
 from template_control.view.figures import FIGURES, save_figures
 
@@ -98,7 +98,6 @@ def test_the_example_walks_at_several_speeds(tmp_path, capfd):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (('gait = "walk"\nacc', 'gait = "run"\nacc'), "segment 2 is to run"),
         (("start = [1.1", "start = [0.03"), "the start has 0.03 m/s at VLO"),
         (("speed = 1.1", "sped = 1.1"), "unknown key segment[0].sped"),
     ],
@@ -228,6 +227,6 @@ def test_help_explains_every_option(capfd):
 def test_the_command_takes_wrong_flags_with_every_kind_of_sensors(tmp_path, capfd, words, kind):
     walk = ["walk", "--steps", "3", "--contact-errors", "1e-6", "--no-figures", "--json", *words]
     assert main([*walk, "--output", str(tmp_path)]) == 0
-    sensors = RunConfig.load(tmp_path / "run.toml").simulation.sensors
+    sensors = Experiment.load(tmp_path / "run.toml").sensors
     assert (sensors.kind, sensors.contact_errors) == (kind, 1e-6)
     assert '"fell": false' in capfd.readouterr().out

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import template_control as tc
-from template_control.cli.world_options import simulation_choice
+from template_control.cli.experiment_options import experiment_from
 from template_control.errors import ParameterError
 from template_control.plant.bullet import FloatingBaseBulletPlant
 from template_control.plant.mujoco import FloatingBaseMujocoPlant
@@ -58,17 +58,23 @@ def test_forward_is_the_heading(bolt):
 
 def test_the_command_line_tells_a_direction(understood, refused):
     line = "template-control walk --robot bolt --free --push 0.1@2:0.5:90 --push -0.1@3"
-    pushes = simulation_choice(understood(line), tc.SimulationOptions(), ends=False).pushes
+    pushes = experiment_from(understood(line), tc.Experiment()).pushes
     assert pushes == (tc.Push(0.1, 2, 0.5, direction=radians(90.0)), tc.Push(-0.1, 3))
     words = ["walk", "--robot", "bolt", "--free", "--steps", "4", "--push"]
     assert "direction is 'left': give a number from -360" in refused([*words, "0.1@2:0.5:left"])
 
 
 def test_a_planar_robot_is_not_pushed_aside(refused, robot, gait):
-    assert "is for a free robot" in refused(["walk", "--steps", "3", "--push", "5@1:0:90"])
-    options = tc.SimulationOptions(steps=2, pushes=(tc.Push(5.0, 1, direction=0.5),))
+    assert "take a floating-base robot" in refused(["walk", "--steps", "3", "--push", "5@1:0:90"])
     with pytest.raises(ParameterError, match="a push has a direction"):
-        tc.simulate(robot, tc.LqrPlanner(gait), options)
+        tc.simulate(
+            tc.Experiment(
+                robot,
+                planner=tc.LqrPlanner(gait),
+                steps=2,
+                pushes=(tc.Push(5.0, 1, direction=0.5),),
+            )
+        )
 
 
 @pytest.mark.slow(seconds=10)
@@ -76,11 +82,11 @@ def test_a_push_aside_is_taken_and_recorded(bolt):
     """10 N s to the left at 80 kg: the robot steps there, and walks on beside its old path."""
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(bolt, 0.55), tc.embedding.FREE_PLANNER)
     push = tc.Push(0.094, 2, 0.25, 0.06, direction=radians(90.0))
-    record = tc.simulate(bolt, planner, tc.SimulationOptions(steps=10, pushes=(push,)))
+    record = tc.simulate(tc.Experiment(bolt, planner=planner, steps=10, pushes=(push,)))
     assert not record.fell, record.fall_reason
     pushed = record.push != 0.0
     assert record.push[pushed] == pytest.approx(0.094 / 0.06)
     gained = np.diff(record.sway[pushed][[0, -1], 1])
-    undisturbed = tc.simulate(bolt, planner, tc.SimulationOptions(steps=3))
+    undisturbed = tc.simulate(tc.Experiment(bolt, planner=planner, steps=3))
     gained -= np.diff(undisturbed.sway[: len(pushed)][pushed[: len(undisturbed.sway)]][[0, -1], 1])
     assert gained == pytest.approx(0.094 / bolt.mass, rel=0.3)

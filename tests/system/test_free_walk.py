@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.cli.experiment_options import experiment_from
 from template_control.cli.main import main
 from template_control.cli.report import floating_rows
-from template_control.cli.world_options import simulation_choice
 from template_control.errors import ParameterError
 from template_control.robot.library import load_floating_robot
 from template_control.run.record import load_record
@@ -22,8 +22,11 @@ STEPS = 12
 def walked(course=None, steps=STEPS):
     robot = load_floating_robot("bolt")
     gait = tc.gait_at(tc.template_for(robot), np.radians(68.0), 0.6)
-    options = tc.SimulationOptions(steps=steps, course=course or tc.HeadingCommand())
-    return tc.simulate(robot, tc.LqrPlanner(gait), options), gait
+    return tc.simulate(
+        tc.Experiment(
+            robot, planner=tc.LqrPlanner(gait), steps=steps, course=course or tc.HeadingCommand()
+        )
+    ), gait
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +63,9 @@ def test_bolt_walks_slowly_too():
     robot = load_floating_robot("bolt")
     gait = tc.gait_for_speed(tc.template_for(robot), 0.4)
     planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
-    record = tc.simulate(robot, planner, tc.SimulationOptions(steps=40, course=tc.HeadingCommand()))
+    record = tc.simulate(
+        tc.Experiment(robot, planner=planner, steps=40, course=tc.HeadingCommand())
+    )
     assert (record.steps, record.fell) == (40, False)
     assert record.summary.qp_failures == 0
     last = record.section_state[-10:].mean(axis=0) - gait.vlo
@@ -110,7 +115,7 @@ def test_a_course_turns_at_its_times():
 
 def test_the_command_line_tells_a_course(refused, understood):
     line = "template-control walk --robot bolt --free --turn 0.3 --turn -0.2@2 --turn 0@5"
-    wanted = simulation_choice(understood(line), tc.SimulationOptions(), ends=False).course
+    wanted = experiment_from(understood(line), tc.Experiment()).course
     assert wanted == tc.HeadingCommand(turning_rate=0.3, turns=((2.0, -0.2), (5.0, 0.0)))
     told = refused(["walk", "--robot", "bolt", "--free", "--turn", "left", "--steps", "1"])
     assert "--turn left: rate is 'left': give a number" in told
@@ -121,7 +126,7 @@ def test_bolt_changes_its_speed_on_command():
     robot = load_floating_robot("bolt")
     command = tc.SpeedProfile(times=(0.0, 1.0, 4.0), speeds=(0.5, 0.5, 0.65))
     route = tc.SpeedRoute(tc.template_for(robot), command)
-    record = tc.simulate(robot, route, tc.SimulationOptions(steps=20))
+    record = tc.simulate(tc.Experiment(robot, route, steps=20))
     assert not record.fell, record.fall_reason
     gait = tc.gait_for_speed(tc.template_for(robot), 0.65)
     assert record.section_state[-3:, 0].mean() == pytest.approx(gait.vlo[0], rel=0.05)
@@ -165,8 +170,8 @@ def test_what_a_free_robot_cannot_do_is_refused(refused):
     robot = load_floating_robot("bolt")
     planner = tc.LqrPlanner(tc.default_gait(robot))
     for options, culprit in (
-        (tc.SimulationOptions(plant=tc.IdealOptions()), "ideal"),
-        (tc.SimulationOptions(embedding=replace(tc.EmbeddingOptions(), friction=0.5)), "Free"),
+        (tc.Experiment(world=tc.IdealOptions()), "ideal"),
+        (tc.Experiment(controller=replace(tc.EmbeddingOptions(), friction=0.5)), "Free"),
     ):
         with pytest.raises(ParameterError, match=culprit):
-            tc.simulate(robot, planner, options)
+            tc.simulate(replace(options, robot=robot, planner=planner))

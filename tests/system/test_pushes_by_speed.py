@@ -26,10 +26,15 @@ def test_the_earliest_touchdown_leaves_the_gaits_alone(speed):
 def test_a_pushed_robot_puts_its_foot_down_in_time_and_walks_on(speed, impulse, phase):
     robot = tc.load_robot("five-link")
     gait = tc.gait_for_speed(tc.template_for(robot), speed)
-    options = tc.SimulationOptions(
-        steps=15, pushes=(tc.Push(impulse, step=4, phase=phase),), record_every=5
+    record = tc.simulate(
+        tc.Experiment(
+            robot,
+            planner=tc.LqrPlanner(gait),
+            steps=15,
+            pushes=(tc.Push(impulse, step=4, phase=phase),),
+            record_every=5,
+        )
     )
-    record = tc.simulate(robot, tc.LqrPlanner(gait), options)
     assert (record.steps, record.fell) == (15, False)
     assert record.section_state[-1, 0] == pytest.approx(gait.vlo[0], rel=0.05)
 
@@ -39,8 +44,9 @@ def test_the_fastest_walk_does_not_sway_more_and_more():
     """With straight legs at VLO large changes of the controls made it fall at step 45."""
     robot = tc.load_robot("five-link")
     gait = tc.robot_gait_for_speed(robot, tc.walking_speeds(robot)[1])
-    options = tc.SimulationOptions(steps=50, record_every=10)
-    record = tc.simulate(robot, tc.LqrPlanner(gait), options)
+    record = tc.simulate(
+        tc.Experiment(robot, planner=tc.LqrPlanner(gait), steps=50, record_every=10)
+    )
     assert (record.steps, record.fell) == (50, False)
     error = record.section_state[-20:] - gait.vlo
     assert np.all(np.abs(error.mean(axis=0)) < [0.0145, 0.003, 0.02])
@@ -56,9 +62,14 @@ def test_the_fastest_walk_does_not_sway_more_and_more():
 def test_the_default_walk_takes_a_hard_push(impulse, phase):
     robot = tc.load_robot("five-link")
     planner = tc.LqrPlanner(tc.default_gait(robot))
-    options = tc.SimulationOptions(
-        steps=18, pushes=(tc.Push(impulse, step=4, phase=phase),), record_every=5
+    record = tc.simulate(
+        tc.Experiment(
+            robot,
+            planner=planner,
+            steps=18,
+            pushes=(tc.Push(impulse, step=4, phase=phase),),
+            record_every=5,
+        )
     )
-    record = tc.simulate(robot, planner, options)
     assert (record.steps, record.fell) == (18, False)
     assert record.section_state[-1, 0] == pytest.approx(planner.gait.vlo[0], rel=0.03)

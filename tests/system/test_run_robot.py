@@ -15,8 +15,8 @@ from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.state import TemplateState
 from template_control.errors import ParameterError
 from template_control.robot.start import state_in
-from template_control.robustness.disturbances import Situation
-from template_control.run.options import SimulationOptions
+from template_control.robustness.disturbances import footholds
+from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
@@ -39,7 +39,7 @@ def run(speed, steps, name="five-link", **options):
     parameters = tc.template_for(robot)
     unit = np.sqrt(parameters.gravity * parameters.rest_length / (P.gravity * P.rest_length))
     planner = RunningPlanner(running_gait(parameters, speed * unit))
-    return simulate(robot, planner, SimulationOptions(steps=steps, **options))
+    return simulate(Experiment(robot, planner=planner, steps=steps, **options))
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_legs_reach_the_start_at_every_speed(robot, speed):
 
 def test_a_gait_that_lands_on_one_leg_only_needs_a_pose(robot, gait):
     hopping = replace(AUTOMATON, nodes=tuple(_without_swap(node) for node in AUTOMATON.nodes))
-    with pytest.raises(ParameterError, match="'run' do not take turns: give SimulationOptions"):
+    with pytest.raises(ParameterError, match="'run' do not take turns: give the Experiment"):
         apex_pose(robot, ApexStart(gait.apex, gait, SWING, automaton=hopping))
 
 
@@ -179,7 +179,7 @@ def test_robot_runs_at_other_speeds(speed):
 
 @pytest.mark.slow(seconds=7)
 def test_robot_runs_at_five_metres_a_second_with_stronger_motors():
-    record = run(5.0, 60, embedding=EmbeddingOptions(torque_scale=1.3))
+    record = run(5.0, 60, controller=EmbeddingOptions(torque_scale=1.3))
     assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(5.0, rel=0.01)
 
@@ -210,7 +210,7 @@ def test_runner_is_back_ten_steps_after_a_hard_push():
 @pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("mass_scale", [0.9, 1.1])
 def test_robot_runs_with_another_mass_than_its_model_has(mass_scale):
-    record = run(3.0, 30, plant=tc.PlantOptions(mass_scale=mass_scale))
+    record = run(3.0, 30, world=tc.PlantOptions(mass_scale=mass_scale))
     assert record.fall_reason == ""
     assert record.section_state[-10:, 0].mean() == pytest.approx(3.0, rel=0.01)
 
@@ -218,10 +218,10 @@ def test_robot_runs_with_another_mass_than_its_model_has(mass_scale):
 @pytest.mark.slow(seconds=3)
 @pytest.mark.parametrize("height", [0.03, -0.03])
 def test_robot_runs_on_over_a_step_that_it_does_not_see(robot, gait, height):
-    where = Situation(robot, gait, tc.RunningPlanner(gait))
-    before, beyond = where.footholds((*gait.apex, 0.0), 5)[-2:]
+    where = tc.Experiment(robot, planner=tc.RunningPlanner(gait)).prepare()
+    before, beyond = footholds(where, (*gait.apex, 0.0), 5)[-2:]
     step = tc.GroundStep(height, 0.5 * (before + beyond))
-    record = run(3.0, 17, plant=tc.PlantOptions(ground_step=step))
+    record = run(3.0, 17, world=tc.PlantOptions(ground_step=step))
     assert record.fall_reason == ""
     assert record.foot[-1, :, 1].min() > height - 0.01
     assert np.max(np.abs(record.section_state[14:, 0] / 3.0 - 1.0)) < 0.02

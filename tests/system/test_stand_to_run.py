@@ -20,8 +20,12 @@ ENGINES = {"pybullet": tc.PlantOptions(), "mujoco": tc.MujocoOptions()}
 )
 def test_a_robot_stands_runs_and_stands_again(example, name, engine, top):
     scenario = tc.load_scenario(EXAMPLES / f"{example}.toml")
-    options = tc.SimulationOptions(plant=ENGINES[engine], record_every=5)
-    check(tc.simulate(tc.load_robot(name), scenario, options), top)
+    check(
+        tc.simulate(
+            tc.Experiment(tc.load_robot(name), scenario, world=ENGINES[engine], record_every=5)
+        ),
+        top,
+    )
 
 
 @pytest.mark.slow(seconds=18)

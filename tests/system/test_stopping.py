@@ -48,8 +48,9 @@ def test_ctrl_c_ends_a_loop_of_runs(robot, default_gait):
         raise KeyboardInterrupt
 
     def run(_):
-        options = tc.SimulationOptions(steps=5)
-        return tc.simulate(robot, tc.LqrPlanner(default_gait), options, impatient)
+        return tc.simulate(
+            tc.Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=5), impatient
+        )
 
     with pytest.raises(RunInterrupted) as stop:
         _ = [run(i) for i in range(3)]

@@ -18,7 +18,7 @@ from template_control.slip.scenario.scenario import Scenario, Segment, load_scen
 def go(example, name, **options):
     """A robot's way through an example."""
     scenario = load_scenario(EXAMPLES / example)
-    return tc.simulate(tc.load_robot(name), scenario, tc.SimulationOptions(**options))
+    return tc.simulate(tc.Experiment(tc.load_robot(name), scenario, **options))
 
 
 def strides(record):
@@ -45,7 +45,7 @@ def settled(record):
 def test_five_link_walks_runs_at_three_metres_a_second_and_walks(friction):
     ground = tc.PlantOptions(friction=friction)
     known = tc.EmbeddingOptions(friction=friction)
-    record = go("walk_run_walk.toml", "five-link", plant=ground, embedding=known)
+    record = go("walk_run_walk.toml", "five-link", world=ground, controller=known)
     check(record)
     kinds = strides(record)
     runs = kinds.count("r")
@@ -86,7 +86,7 @@ SHORT = Scenario(
     ],
 )
 def test_five_link_holds_pushes_within_both_transitions(pushes):
-    record = tc.simulate(tc.load_robot("five-link"), SHORT, tc.SimulationOptions(pushes=pushes))
+    record = tc.simulate(tc.Experiment(tc.load_robot("five-link"), planner=SHORT, pushes=pushes))
     check(record)
     kinds = strides(record)
     for push, kind in zip(pushes, ("wr", "rw"), strict=True):
@@ -122,7 +122,7 @@ def test_runner_goes_through_example_one_from_a_start_that_is_a_hair_off(off):
     scenario = load_scenario(EXAMPLES / "example_one.toml")
     speed, height, rise = scenario.start
     scenario = replace(scenario, start=(speed + off, height, rise))
-    record = tc.simulate(tc.load_robot("runner"), scenario, tc.SimulationOptions(record_every=5))
+    record = tc.simulate(tc.Experiment(tc.load_robot("runner"), scenario, record_every=5))
     check(record)
     error = record.section_state[1:, 0] - record.section_target[:-1, 0]
     assert np.sqrt(np.mean(error**2)) < 0.15

@@ -92,7 +92,7 @@ def test_a_function_checks_its_arguments():
 
 OPTIONS = [
     tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
-    tc.SimulationOptions, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
+    tc.Experiment, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
     embedding.FrictionOptions,
     embedding.AheadOptions,
     embedding.ModifiedOptions, embedding.ReplanOptions,
@@ -120,11 +120,11 @@ def test_no_field_of_any_options_takes_a_stranger(kind):
         lambda: tc.EmbeddingOptions(friction=np.nan),
         lambda: tc.PlantOptions(friction=np.nan),
         lambda: tc.Push(impulse=np.nan),
-        lambda: tc.SimulationOptions(steps=50, pushes=(tc.Push(1.0, step=99),)),
-        lambda: tc.SimulationOptions(steps=10, pushes=(tc.Push(1.0),)),
-        lambda: tc.SimulationOptions(steps=2.5),
-        lambda: tc.SimulationOptions(pushes=tc.Push(1.0)),
-        lambda: tc.simulate("five-link", None),
+        lambda: tc.Experiment(steps=50, pushes=(tc.Push(1.0, step=99),)),
+        lambda: tc.Experiment(steps=10, pushes=(tc.Push(1.0),)),
+        lambda: tc.Experiment(steps=2.5),
+        lambda: tc.Experiment(pushes=tc.Push(1.0)),
+        lambda: tc.simulate("five-link"),
         lambda: tc.LqrPlanner(tc.SlipParameters()),
         lambda: tc.RunningPlanner(tc.gait_at(tc.SlipParameters(), np.radians(66.0), 1.1)),
         lambda: embedding.Lean((2.0, 1.0), (0.3, 0.3)),
@@ -153,14 +153,18 @@ def test_each_room_has_its_own_error():
 
 
 def test_a_push_after_the_last_of_the_steps_that_nobody_gave(robot, default_gait):
-    options = tc.SimulationOptions(pushes=(tc.Push(1.0, step=50),))
     with pytest.raises(ParameterError, match="step 50, and the run has steps 0 to 49"):
-        tc.simulate(robot, tc.LqrPlanner(default_gait), options)
+        tc.simulate(
+            tc.Experiment(
+                robot, planner=tc.LqrPlanner(default_gait), pushes=(tc.Push(1.0, step=50),)
+            )
+        )
 
 
 def test_an_array_is_a_start_and_the_run_is_kept(robot, default_gait, tmp_path):
-    options = tc.SimulationOptions(steps=1, start=default_gait.vlo)
-    record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
+    record = tc.simulate(
+        tc.Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=1, start=default_gait.vlo)
+    )
     assert record.options["start"] == default_gait.vlo.tolist()
     assert tc.Record.load(record.save(tmp_path / "run.npz")).steps == 1
 
@@ -178,6 +182,6 @@ class Unspeakable(embedding.SwingOptions):
 def test_nothing_that_cannot_be_written_down_loses_a_run(robot, default_gait):
     options = tc.EmbeddingOptions(swing=Unspeakable())
     record = tc.simulate(
-        robot, tc.LqrPlanner(default_gait), tc.SimulationOptions(steps=1, embedding=options)
+        tc.Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=1, controller=options)
     )
     assert record.options["embedding"]["swing"]["clearance"] == 0.05

@@ -34,7 +34,7 @@ terrain = tc.Terrain.slope(np.radians(2.0))
 worlds = tc.PlantOptions(terrain=terrain), tc.MujocoOptions(terrain=terrain), tc.IdealOptions()
 for world in worlds:
     record = tc.simulate(robot, tc.LqrPlanner(tc.default_gait(robot)),
-                         tc.SimulationOptions(steps=2, plant=world))
+                         tc.Experiment(steps=2, world=world))
     bits = hashlib.sha256(record.q.tobytes() + record.contact_force.tobytes()).hexdigest()
     found[world.kind] = [record.steps, bits]
 free = load_floating_robot("bolt")

@@ -49,7 +49,7 @@ def test_a_folder_s_name_is_printed_as_it_is(tmp_path, capsys):
 def test_names_are_drawn_as_they_are(short_walk, tmp_path):
     robot = tc.load_robot("runner")
     planner = tc.RunningPlanner(running_gait(tc.template_for(robot), 3.0))
-    short_run = tc.simulate(robot, planner, tc.SimulationOptions(steps=3))
+    short_run = tc.simulate(tc.Experiment(robot, planner=planner, steps=3))
     assert figures_of(short_run) == FIGURES
     name = "$x^{\\frac$\nb"  # between dollars Matplotlib reads mathematics, which these are not
     for record in (renamed(short_walk, name), renamed(short_run, name)):

@@ -114,16 +114,16 @@ def test_a_file_that_is_not_there_is_told(tmp_path):
 
 
 ROUND_TRIPS = {
-    "simulation": tc.SimulationOptions(
+    "simulation": tc.Experiment(
         steps=17,
-        plant=tc.IdealOptions(mass_scale=1.1),
-        embedding=tc.EmbeddingOptions(friction=0.123456789012345),
+        world=tc.IdealOptions(mass_scale=1.1),
+        controller=tc.EmbeddingOptions(friction=0.123456789012345),
         start=(1.1, 0.97, -0.0),
         pushes=(tc.Push(10.0), tc.Push(-3.0, 4, 0.5)),
         sensors=tc.SensorOptions(1e-3, 2e-2, 5, 0.02),
         delay=0.003,
     ),
-    "ground": tc.SimulationOptions(plant=tc.PlantOptions(ground_step=tc.GroundStep(0.01, 2.0))),
+    "ground": tc.Experiment(world=tc.PlantOptions(ground_step=tc.GroundStep(0.01, 2.0))),
     "lqr": tc.LqrOptions(offset_gain=0.1),
     "scenario": tc.example_one(),
 }
@@ -153,9 +153,7 @@ def test_a_class_that_refuses_a_value_is_heard(tmp_path):
 def test_what_toml_cannot_say_is_refused_unless_it_is_the_default():
     assert "phases" not in settings.to_table(tc.EmbeddingOptions())
     other = {**PHASES, "SS_sc^hop": next(iter(PHASES.values()))}
-    with pytest.raises(ParameterError, match=r"embedding.phases is dict, which TOML cannot say"):
-        settings.to_table(
-            replace(tc.SimulationOptions(), embedding=tc.EmbeddingOptions(phases=other))
-        )
+    with pytest.raises(ParameterError, match=r"controller.phases is dict, which TOML cannot say"):
+        settings.to_table(replace(tc.Experiment(), controller=tc.EmbeddingOptions(phases=other)))
     with pytest.raises(ParameterError, match="phases can be given in Python only"):
         settings.from_table(tc.EmbeddingOptions, {"phases": {}})

@@ -17,7 +17,7 @@ HEAVY = (
 )  # fmt: skip
 COMMANDS = (
     "walk", "run", "go", "robots", "replay", "plots", "robustness", "campaign", "slip", "gaits",
-    "automaton", "reproduce",
+    "automaton", "keys", "reproduce",
 )  # fmt: skip
 ROOMS = (
     "slip", "robot", "whole_body", "estimation", "embedding", "plant", "run", "robustness",
@@ -31,7 +31,7 @@ ONCE_IN_THE_ROOT = (
     "ModifiedPlanner", "ModifiedWalking", "Outcome", "ParameterError", "PlanarBiped", "Planner",
     "PlantOptions", "Push", "Record", "RecordError", "ReturnMap", "RobotError", "RunToWalk",
     "Scenario", "ScenarioError", "ScenarioRecord", "Segment", "SensorOptions",
-    "SimulationOptions", "SlipParameters", "Slot", "StepSolution", "Stride",
+    "Experiment", "SlipParameters", "Slot", "StepSolution", "Stride",
     "TemplateControlError", "WalkToRun", "WalkingGait", "controls", "default_gait",
     "example_one", "gait_at", "gait_for_speed", "gait_from_energy", "load_robot",
     "load_scenario", "paper_gait", "perturbed_start", "replay", "save_figures", "save_film",

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,7 @@ class StrideGoal:
     then: str | None = None
 
 
+@runtime_checkable
 class Route(Protocol):
     """Which stride comes next, at every section."""
 

@@ -84,6 +84,7 @@ class Scenario(Checked):
     """
 
     _error = ScenarioError
+    kind: ClassVar[str] = "scenario"
     old_keys: ClassVar = {"segment": "segments", "map": "map_kind"}
 
     segments: tuple[Segment, ...]

@@ -21,7 +21,7 @@ from template_control.plant.terrain_spec import KINDS, terrain_from
 from template_control.robot.five_link import SolidLink
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robustness.campaign import DisturbanceDistribution
-from template_control.run.config import RunConfig
+from template_control.run.experiment import Experiment
 from template_control.storage import writing
 
 INTERNAL = re.compile(r"\b[A-Z][a-z]+[A-Za-z]*\.[a-z_]+")
@@ -148,22 +148,22 @@ def test_ground_of_more_points_than_can_be_simulated_is_refused(make):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[gait]\nspeed = 99.0\n", "gait.speed is 99: give a number above 0 and up to 20"),
-        ("[gait]\ntouchdown_angle = 90.0\n", "gait.touchdown_angle is 90: give"),
-        ("[simulation]\nsteps = 0\n", "simulation.steps is 0: give a whole number from 1"),
-        ("[simulation.plant]\nfriction = -1.0\n", "simulation.plant.friction is -1: give"),
+        ("[motion]\nspeed = 99.0\n", "motion.speed is 99: give a number above 0 and up to 20"),
+        ("[motion]\ntouchdown_angle = 90.0\n", "motion.touchdown_angle is 90: give"),
+        ("steps = 0\n", "steps is 0: give a whole number from 1"),
+        ("[world]\nfriction = -1.0\n", "world.friction is -1: give"),
         (
-            "[[simulation.pushes]]\nimpulse = 1.0\nphase = 9.0\n",
-            "simulation.pushes[0].phase is 9:",
+            "[[pushes]]\nimpulse = 1.0\nphase = 9.0\n",
+            "pushes[0].phase is 9:",
         ),
-        ("[simulation.course]\nstep_width = -1.0\n", "simulation.course.step_width is -1"),
+        ("[course]\nstep_width = -1.0\n", "course.step_width is -1"),
     ],
 )
 def test_a_wrong_value_in_a_file_is_named_by_its_key(text, told, tmp_path):
     path = tmp_path / "run.toml"
     path.write_text(text)
     with pytest.raises(ParameterError) as caught:
-        RunConfig.load(path)
+        Experiment.load(path)
     assert told in str(caught.value)
     assert not INTERNAL.search(str(caught.value).replace("run.toml", ""))
 
@@ -194,7 +194,7 @@ def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path):
     }
     for name, text in files.items():
         (tmp_path / name).write_text(mark + text, encoding="utf-8")
-    assert RunConfig.load(tmp_path / "run.toml").gait.speed == 1.1
+    assert Experiment.load(tmp_path / "run.toml").motion.speed == 1.1
     assert slip.load_scenario(tmp_path / "scenario.toml").segments[0].steps == 2
     for name in ("ground.csv", "ground.toml"):
         assert terrain_from(str(tmp_path / name)).height_at(2.0) == 0.1

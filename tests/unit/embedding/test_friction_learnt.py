@@ -137,7 +137,7 @@ def sliding_share(robot, gait, options):
     """Share of the ticks in which a loaded foot slides, after the third step of a walk."""
     plant = PlantOptions(friction=TRUE)
     record = tc.simulate(
-        robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=8, plant=plant, embedding=options)
+        tc.Experiment(robot, planner=tc.LqrPlanner(gait), steps=8, world=plant, controller=options)
     )
     assert not record.fell
     along, up = np.abs(record.contact_force[..., 0]), record.contact_force[..., 1]

@@ -211,7 +211,7 @@ def test_strict_refuses_a_scenario_in_one_line(tmp_path, capsys):
     assert "segment 1 wants" in line
     assert len(line.splitlines()) == 1
     assert main(["walk", "--strict", "--steps", "1", "--output", str(tmp_path)]) == 2
-    assert "--strict goes with a scenario" in capsys.readouterr().err
+    assert "strict goes with a scenario" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -219,7 +219,9 @@ def test_a_robot_changes_its_speed_and_tells_what_it_accepted(tmp_path):
     """Up and down through the gap: no fall, and what was accepted is kept."""
     template = tc.template_for(tc.load_robot("five-link"))
     profile = SpeedProfile((1.0, 1.6, 6.0, 7.0), (0.38, 0.7, 0.7, 0.4))
-    record = tc.simulate(tc.load_robot("five-link"), SpeedRoute(template, profile, 11.0))
+    record = tc.simulate(
+        tc.Experiment(tc.load_robot("five-link"), SpeedRoute(template, profile, 11.0))
+    )
     assert not record.fell
     record = tc.Record.load(record.save(tmp_path / "run.npz"))
     speed = record.section_state[:, 0]

@@ -203,7 +203,7 @@ def test_a_planner_without_a_curve_is_named():
     route = SteadyRoute(P, "s", [0.0, 0.97, 0.0])
     walk = tc.LqrPlanner(walking_gait(P, 0.9))
     with pytest.raises(ParameterError, match="LqrPlanner plans no curve for node DS_ar"):
-        tc.simulate(tc.load_robot("five-link"), route, planners={"s": walk})
+        tc.simulate(tc.Experiment(tc.load_robot("five-link"), route, planner={"s": walk}))
 
 
 # ---- scenarios
@@ -297,9 +297,17 @@ def stand(spacing, impulse, beats):
     robot = tc.load_robot("five-link")
     p = tc.embedding.template_for(robot)
     pushes = (Push(impulse, step=1),) if impulse else ()
-    options = tc.SimulationOptions(steps=beats, pose=standing_pose(p, spacing), pushes=pushes)
     route = SteadyRoute(p, "s", [0.0, 0.97, 0.0])
-    return tc.simulate(robot, route, options, planners=standing_planners(p))
+    return tc.simulate(
+        tc.Experiment(
+            robot,
+            route,
+            planner=standing_planners(p),
+            steps=beats,
+            pose=standing_pose(p, spacing),
+            pushes=pushes,
+        )
+    )
 
 
 def test_the_robot_stands_still():
@@ -327,7 +335,7 @@ def walked(spacing, speed):
     still = Segment("stand", duration=1.0)
     scenario = Scenario(segments=(still, Segment("walk", speed=speed, duration=1.0), still))
     pose = standing_pose(tc.embedding.template_for(robot), spacing)
-    return tc.simulate(robot, scenario, tc.SimulationOptions(pose=pose))
+    return tc.simulate(tc.Experiment(robot, scenario, pose=pose))
 
 
 @pytest.mark.slow(seconds=20)

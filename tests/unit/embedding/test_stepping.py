@@ -115,11 +115,18 @@ def test_in_the_air_the_foot_lands_where_the_com_comes_to_rest(planners):
 def test_a_robot_that_is_pushed_steps_and_stands(impulse):
     robot = tc.load_robot("five-link")
     p = tc.template_for(robot)
-    options = tc.SimulationOptions(
-        steps=7, pose=standing_pose(p, 0.1), pushes=(Push(impulse, step=1),), record_every=5
-    )
     route = SteadyRoute(p, "s", [0.0, 0.97, 0.0])
-    record = tc.simulate(robot, route, options, planners=standing_planners(p))
+    record = tc.simulate(
+        tc.Experiment(
+            robot,
+            route,
+            planner=standing_planners(p),
+            steps=7,
+            pose=standing_pose(p, 0.1),
+            pushes=(Push(impulse, step=1),),
+            record_every=5,
+        )
+    )
     assert not record.fell
     kinds = set(record.kinds_of_stride)
     assert kinds == {"s", "sf" if impulse > 0.0 else "sb"}
@@ -139,8 +146,9 @@ def test_a_robot_walks_slowly_with_the_family_by_speed_and_closes_its_feet():
     walk = Segment("walk", speed=float(gait.vlo[0]), steps=2)
     route = ScenarioRoute(Scenario(segments=(still, walk, still)).on(p), walks="wp")
     planners = standing_planners(p, family=gaits_by_speed(p)) | {"wp": tc.LqrPlanner(gait)}
-    options = tc.SimulationOptions(pose=standing_pose(p, 0.1), record_every=5)
-    record = tc.simulate(robot, route, options, planners=planners)
+    record = tc.simulate(
+        tc.Experiment(robot, route, planner=planners, pose=standing_pose(p, 0.1), record_every=5)
+    )
     assert (record.fall_reason, record.arrived) == ("", True)
     kinds = record.kinds_of_stride
     assert kinds[-5:-2] == ["ws", "sf", "s"]

@@ -99,8 +99,8 @@ def test_axes_that_turn_do_not_forget_a_wall(robot, default_gait):
 def flawed(steps, seed, embedding=None, share=0.02):
     """Options of a run in which flags are wrong."""
     sensors = tc.SensorOptions(contact_errors=share, seed=seed)
-    return tc.SimulationOptions(
-        steps=steps, sensors=sensors, embedding=embedding or EmbeddingOptions(), record_every=10
+    return tc.Experiment(
+        steps=steps, sensors=sensors, controller=embedding or EmbeddingOptions(), record_every=10
     )
 
 
@@ -110,8 +110,8 @@ def test_a_walk_bears_wrong_flags_by_doubting_them(robot, default_gait, seed):
     """Believed at once, one of them puts a foot down 6 cm over the ground."""
     planner = tc.LqrPlanner(default_gait)
     rash = EmbeddingOptions(contacts=ContactOptions(doubt=0.0))
-    assert tc.simulate(robot, planner, flawed(20, seed, rash)).fell
-    record = tc.simulate(robot, planner, flawed(20, seed))
+    assert tc.simulate(replace(flawed(20, seed, rash), robot=robot, planner=planner)).fell
+    record = tc.simulate(replace(flawed(20, seed), robot=robot, planner=planner))
     assert not record.fell
     assert record.section_state[-5:, 0] == pytest.approx(default_gait.vlo[0], rel=0.01)
 
@@ -122,11 +122,12 @@ def test_an_undisturbed_walk_is_the_same_whatever_the_doubt(robot, default_gait)
     planner = tc.LqrPlanner(default_gait)
     walks = [
         tc.simulate(
-            robot,
-            planner,
-            tc.SimulationOptions(
-                steps=4, embedding=EmbeddingOptions(contacts=ContactOptions(doubt=doubt))
-            ),
+            tc.Experiment(
+                robot,
+                planner=planner,
+                steps=4,
+                controller=EmbeddingOptions(contacts=ContactOptions(doubt=doubt)),
+            )
         )
         for doubt in (0.0, 0.05)
     ]
@@ -138,13 +139,20 @@ def test_an_undisturbed_walk_is_the_same_whatever_the_doubt(robot, default_gait)
 def test_a_free_robot_bears_wrong_flags(name):
     robot = load_floating_robot(name)
     sensors = tc.SensorOptions(contact_errors=0.02, seed=1)
-    options = tc.SimulationOptions(steps=12, sensors=sensors, record_every=10)
-    record = tc.simulate(robot, tc.LqrPlanner(tc.default_gait(robot)), options)
+    record = tc.simulate(
+        tc.Experiment(
+            robot,
+            planner=tc.LqrPlanner(tc.default_gait(robot)),
+            steps=12,
+            sensors=sensors,
+            record_every=10,
+        )
+    )
     assert not record.fell
 
 
 @pytest.mark.slow(seconds=60)
 def test_two_hundred_steps_with_two_flags_in_a_hundred_wrong(robot, default_gait):
-    record = tc.simulate(robot, tc.LqrPlanner(default_gait), flawed(200, 0))
+    record = tc.simulate(replace(flawed(200, 0), robot=robot, planner=tc.LqrPlanner(default_gait)))
     assert not record.fell
     assert record.steps == 200

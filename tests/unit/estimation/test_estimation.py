@@ -15,8 +15,7 @@ from template_control.estimation.filters import (
 )
 from template_control.estimation.imu import ImuOptions, ImuSensors
 from template_control.robustness.severity_sweep import gait_errors
-from template_control.run.config import RunConfig
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.slip.similarity import Scale
 
 DT = 1e-3
@@ -135,10 +134,8 @@ def test_wrong_noise_is_named():
 
 
 def test_the_run_file_knows_the_estimator(tmp_path):
-    config = RunConfig(
-        planner=tc.LqrOptions(), simulation=SimulationOptions(sensors=ImuOptions(seed=7))
-    )
-    assert RunConfig.load(config.save(tmp_path / "run.toml")) == config
+    experiment = Experiment(sensors=ImuOptions(seed=7)).resolved()
+    assert Experiment.load(experiment.save(tmp_path / "run.toml")) == experiment
 
 
 def test_noise_and_estimate_exclude_each_other(refused):
@@ -150,8 +147,11 @@ def test_noise_and_estimate_exclude_each_other(refused):
 @pytest.mark.slow(seconds=20)
 def test_the_robot_walks_on_its_estimate(default_gait):
     robot = tc.load_robot("five-link")
-    options = SimulationOptions(steps=30, sensors=ImuOptions(seed=1))
-    record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
+    record = tc.simulate(
+        tc.Experiment(
+            robot, planner=tc.LqrPlanner(default_gait), steps=30, sensors=ImuOptions(seed=1)
+        )
+    )
     assert not record.fell
     speed, height = gait_errors(record, default_gait)
     assert abs(speed) < 0.02
@@ -162,5 +162,5 @@ def test_the_robot_walks_on_its_estimate(default_gait):
 def test_the_command_walks_on_an_estimate(tmp_path, capfd):
     words = ["walk", "--steps", "3", "--estimate", "--no-figures", "--json"]
     assert main([*words, "--output", str(tmp_path)]) == 0
-    assert RunConfig.load(tmp_path / "run.toml").simulation.sensors == ImuOptions()
+    assert Experiment.load(tmp_path / "run.toml").sensors == ImuOptions()
     assert '"fell": false' in capfd.readouterr().out

@@ -12,7 +12,6 @@ from template_control.estimation import NoiseFilter, NoiseFilterOptions
 from template_control.robustness.severity_sweep import gait_errors
 from template_control.run.backends import FloatingBackend
 from template_control.run.sensing import FilteredSensors, Sensors
-from template_control.slip.similarity import Scale
 
 DT = 1e-3
 DEVIATION = np.array([1e-3, 0.02])
@@ -95,11 +94,11 @@ def test_a_jolt_of_the_joints_is_believed_at_a_touchdown_only(bolt):
 def senses(robot, sensors, tuning=None):
     gait = tc.robot_gait_for_speed(robot, 0.55)
     controller = FreeController(robot, tc.LqrPlanner(gait, FREE_PLANNER), tuning)
-    return FloatingBackend(robot).senses(controller, tc.SimulationOptions(sensors=sensors))
+    return FloatingBackend(robot).senses(controller, tc.Experiment(sensors=sensors))
 
 
 def test_only_noise_is_filtered(bolt):
-    noisy = tc.SensorOptions.of_size(1e-3, Scale.of(tc.template_for(bolt)))
+    noisy = tc.SensorOptions(noise=1e-3)
     assert isinstance(senses(bolt, tc.SensorOptions()), Sensors)
     assert isinstance(senses(bolt, noisy), FilteredSensors)
     assert isinstance(senses(bolt, noisy, replace(FreeOptions(), noise_filter=None)), Sensors)
@@ -108,9 +107,12 @@ def test_only_noise_is_filtered(bolt):
 @pytest.mark.slow(seconds=15)
 def test_bolt_walks_with_noise_and_delay(bolt):
     gait = tc.robot_gait_for_speed(bolt, 0.55)
-    noise = tc.SensorOptions.of_size(1e-3, Scale.of(gait.parameters), seed=1)
-    options = tc.SimulationOptions(steps=15, sensors=noise, delay=1e-3)
-    record = tc.simulate(bolt, tc.LqrPlanner(gait, FREE_PLANNER), options)
+    noise = tc.SensorOptions(noise=1e-3, seed=1)
+    record = tc.simulate(
+        tc.Experiment(
+            bolt, planner=tc.LqrPlanner(gait, FREE_PLANNER), steps=15, sensors=noise, delay=1e-3
+        )
+    )
     assert not record.fell, record.fall_reason
     assert record.summary.qp_failures == 0
     assert abs(gait_errors(record, gait)[0]) < 0.03

@@ -21,7 +21,7 @@ from template_control.paper.example_two import (
 )
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event
@@ -34,12 +34,15 @@ def first_steps(paper_gait):
 
     @cache
     def walk(beta=None):
-        options = SimulationOptions(
-            steps=2,
-            plant=IdealOptions(),
-            embedding=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
+        return simulate(
+            Experiment(
+                load_robot("five-link"),
+                planner=LqrPlanner(paper_gait),
+                steps=2,
+                world=IdealOptions(),
+                controller=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
+            )
         )
-        return simulate(load_robot("five-link"), LqrPlanner(paper_gait), options)
 
     return walk
 

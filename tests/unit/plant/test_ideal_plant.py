@@ -12,7 +12,8 @@ from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.plant import open_plant, plant_name
 from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
-from template_control.run.options import Push, SimulationOptions
+from template_control.run.experiment import Experiment
+from template_control.run.options import Push
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
 
@@ -227,8 +228,9 @@ def test_agrees_with_pybullet_over_a_short_stance(robot):
 
 @pytest.fixture(scope="module")
 def record(gait):
-    options = SimulationOptions(steps=4, plant=IdealOptions())
-    return simulate(load_robot("five-link"), LqrPlanner(gait), options)
+    return simulate(
+        Experiment(load_robot("five-link"), planner=LqrPlanner(gait), steps=4, world=IdealOptions())
+    )
 
 
 def test_the_robot_walks_on_it(record):
@@ -265,10 +267,16 @@ def test_joints_stay_within_their_limits(record):
 
 @pytest.mark.slow(seconds=7)
 def test_a_fall_ends_the_run(robot, gait):
-    options = SimulationOptions(
-        steps=10, plant=IdealOptions(), pushes=(Push(-200.0, step=1),), record_every=10
+    record = simulate(
+        Experiment(
+            robot,
+            planner=LqrPlanner(gait),
+            steps=10,
+            world=IdealOptions(),
+            pushes=(Push(-200.0, step=1),),
+            record_every=10,
+        )
     )
-    record = simulate(robot, LqrPlanner(gait), options)
     assert record.fell
 
 

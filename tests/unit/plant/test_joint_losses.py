@@ -15,7 +15,7 @@ from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.run.specs import RobotSpec
+from template_control.robot.spec import RobotSpec
 
 DT = 1e-3  # [s]
 
@@ -108,8 +108,9 @@ def test_a_damped_walk_is_the_undamped_one_by_other_torques(written):
     for lossless in (True, False):
         robot = PlanarBiped.from_urdf(written("five-link", 'damping="20"'), lossless=lossless)
         planner = tc.LqrPlanner(tc.default_gait(robot))
-        options = tc.SimulationOptions(steps=8, plant=tc.IdealOptions())
-        records.append(tc.simulate(robot, planner, options))
+        records.append(
+            tc.simulate(tc.Experiment(robot, planner=planner, steps=8, world=tc.IdealOptions()))
+        )
     plain, damped = records
     assert not damped.fell
     np.testing.assert_allclose(damped.section_state[-3:], plain.section_state[-3:], atol=0.01)
@@ -124,9 +125,9 @@ def test_losses_change_a_run_and_lossless_leaves_them_out_to_the_last_bit(writte
     robots = tc.load_robot("five-link"), PlanarBiped.from_urdf(path, lossless=True)
     runs = [
         tc.simulate(
-            robot,
-            tc.LqrPlanner(tc.default_gait(robot)),
-            tc.SimulationOptions(steps=2, plant=options),
+            tc.Experiment(
+                robot, planner=tc.LqrPlanner(tc.default_gait(robot)), steps=2, world=options
+            )
         )
         for robot in (*robots, PlanarBiped.from_urdf(path))
     ]

@@ -91,8 +91,14 @@ def test_a_push_gives_its_impulse_to_the_whole_robot(robot):
 
 @pytest.fixture(scope="module")
 def walk(default_gait):
-    options = tc.SimulationOptions(steps=8, plant=tc.MujocoOptions())
-    return tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(default_gait), options)
+    return tc.simulate(
+        tc.Experiment(
+            tc.load_robot("five-link"),
+            planner=tc.LqrPlanner(default_gait),
+            steps=8,
+            world=tc.MujocoOptions(),
+        )
+    )
 
 
 def test_the_robot_walks_as_it_does_in_pybullet(walk, short_walk):
@@ -120,7 +126,7 @@ def test_a_step_of_the_ground_is_where_it_is_told(robot, default_gait, height):
     step = tc.GroundStep.at_step(default_gait, height, 2)
     world = tc.MujocoOptions(ground_step=step)
     record = tc.simulate(
-        robot, tc.LqrPlanner(default_gait), tc.SimulationOptions(steps=5, plant=world)
+        tc.Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=5, world=world)
     )
     assert not record.fell
     beyond = record.time > record.section_time[-2]
@@ -157,7 +163,7 @@ def test_the_command_walks_in_it_and_repeats_the_run(tmp_path, capsys):
     folder = tmp_path / "walk"
     line = ["walk", "--steps", "2", "--no-figures", "--friction", "0.6", "--output", str(folder)]
     assert main([*line, "--plant", "mujoco"]) == 0
-    assert tc.RunConfig.load(folder / "run.toml").simulation.plant == tc.MujocoOptions(friction=0.6)
+    assert tc.Experiment.load(folder / "run.toml").world == tc.MujocoOptions(friction=0.6)
     again = tmp_path / "again"
     repeat = ["walk", "--config", str(folder / "run.toml"), "--no-figures", "--output", str(again)]
     assert main(repeat) == 0
@@ -171,9 +177,13 @@ def test_the_command_walks_in_it_and_repeats_the_run(tmp_path, capsys):
 def test_pushed_walks_go_on(robot, default_gait, impulse):
     push = tc.Push(impulse, 3, 0.25)
     record = tc.simulate(
-        robot,
-        tc.LqrPlanner(default_gait),
-        tc.SimulationOptions(steps=30, plant=tc.MujocoOptions(), pushes=(push,)),
+        tc.Experiment(
+            robot,
+            planner=tc.LqrPlanner(default_gait),
+            steps=30,
+            world=tc.MujocoOptions(),
+            pushes=(push,),
+        )
     )
     assert not record.fell
     speed = record.section_state[-5:, 0].mean()
@@ -186,8 +196,9 @@ def test_pushed_walks_go_on(robot, default_gait, impulse):
 )
 def test_scenarios_of_walking_and_running_go_through(name, example):
     scenario = tc.load_scenario(EXAMPLES / f"{example}.toml")
-    options = tc.SimulationOptions(plant=tc.MujocoOptions(), record_every=4)
-    record = tc.simulate(tc.load_robot(name), scenario, options)
+    record = tc.simulate(
+        tc.Experiment(tc.load_robot(name), scenario, world=tc.MujocoOptions(), record_every=4)
+    )
     assert not record.fell
     assert record.arrived
     error = record.section_state[1:, 0] - record.section_target[:-1, 0]

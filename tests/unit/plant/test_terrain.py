@@ -295,16 +295,22 @@ def test_a_file_that_holds_no_ground_is_refused(text, told, tmp_path):
 
 def test_options_keep_their_terrain_in_a_file():
     plant = tc.MujocoOptions(terrain=GROUNDS["random"])
-    options = tc.SimulationOptions(plant=plant)
+    options = tc.Experiment(world=plant)
     table = tomllib.loads(settings.text(settings.to_table(options)))
-    assert settings.from_table(tc.SimulationOptions, table) == options
+    assert settings.from_table(tc.Experiment, table) == options
 
 
 @pytest.fixture(scope="module")
 def up_the_slope(default_gait):
     ground = Terrain.slope(np.radians(4.0), start=0.7)
-    options = tc.SimulationOptions(steps=5, plant=tc.PlantOptions(terrain=ground))
-    return tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(default_gait), options)
+    return tc.simulate(
+        tc.Experiment(
+            tc.load_robot("five-link"),
+            planner=tc.LqrPlanner(default_gait),
+            steps=5,
+            world=tc.PlantOptions(terrain=ground),
+        )
+    )
 
 
 def test_feet_stand_on_the_slope(up_the_slope):

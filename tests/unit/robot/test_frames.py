@@ -16,7 +16,7 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import FloatingBasePose, floating_state_in, state_at_vlo
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 
 BASE = ("base_x", "base_z", "base_pitch")
@@ -164,9 +164,12 @@ def test_a_free_robot_in_other_words_falls_as_it_does(plant, seed, tmp_path):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_planar_robot_in_other_words_walks_the_same_steps(plant, seed, tmp_path):
     words = Words(PlanarBiped, robot_path("five-link"), seed, tmp_path, keep=BASE)
-    options = SimulationOptions(steps=1, plant=PLANTS[plant][1])
     own, other = (
-        simulate(robot, LqrPlanner(default_gait(robot)), options)
+        simulate(
+            Experiment(
+                robot, planner=LqrPlanner(default_gait(robot)), steps=1, world=PLANTS[plant][1]
+            )
+        )
         for robot in (words.own, words.other)
     )
     assert not own.fell

@@ -14,7 +14,7 @@ from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.library import load_floating_robot, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.view.replay.robot_visuals import load_visuals
 
@@ -302,7 +302,7 @@ def test_links_and_joints_may_share_names_in_every_engine(tmp_path, five_link):
     options = {"ideal": IdealOptions(), "pybullet": PlantOptions(), "mujoco": MujocoOptions()}
     for plant in options.values():
         own, same = (
-            simulate(r, LqrPlanner(default_gait(r)), SimulationOptions(steps=1, plant=plant))
+            simulate(Experiment(r, planner=LqrPlanner(default_gait(r)), steps=1, world=plant))
             for r in (load_robot("five-link"), load_robot(path))
         )
         assert not own.fell

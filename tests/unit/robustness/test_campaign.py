@@ -15,6 +15,7 @@ from template_control import settings
 from template_control.cli import campaign as command
 from template_control.cli.main import main
 from template_control.errors import ParameterError
+from template_control.robot.spec import RobotSpec
 from template_control.robustness import (
     FLOATING_MIX,
     Campaign,
@@ -24,9 +25,8 @@ from template_control.robustness import (
     Trial,
     fall_cause,
 )
-from template_control.run.config import RunConfig
+from template_control.run.experiment import Experiment
 from template_control.run.record import Record
-from template_control.run.specs import RobotSpec
 from template_control.view.trial_figures import campaign_figure
 
 PAGE = (DOCS / "guides" / "campaign.md").read_text()
@@ -92,38 +92,37 @@ def test_a_trial_is_a_run_that_its_file_repeats(tmp_path):
     conditions = CampaignConfig(seed=5)
     config, ready = conditions.trial(3)
     draw = conditions.draw(3)
-    simulation = config.simulation
-    assert simulation.steps == 26
-    assert simulation.plant.friction == draw.friction
-    assert simulation.plant.mass_scale == 1.0 + draw.mass
-    assert simulation.start[0] == pytest.approx(ready.gait.vlo[0] * (1.0 + draw.speed))
-    (push,) = simulation.pushes
+    assert config.steps == 26
+    assert config.world.friction == draw.friction
+    assert config.world.mass_scale == 1.0 + draw.mass
+    assert config.start[0] == pytest.approx(ready.gait.vlo[0] * (1.0 + draw.speed))
+    (push,) = config.pushes
     assert push.impulse == pytest.approx(draw.push)
     assert push.step + push.phase == pytest.approx(draw.push_at)
-    assert RunConfig.load(config.save(tmp_path / "trial.toml")) == config
+    assert Experiment.load(config.save(tmp_path / "trial.toml")) == config
     assert settings.from_table(CampaignConfig, settings.to_table(conditions)) == conditions
     assert conditions.trial(4)[0] != config
 
 
 def test_a_small_robot_is_disturbed_as_a_small_one():
-    draw, conditions = CampaignConfig().draw(0), CampaignConfig(RobotSpec("bolt"))
+    draw, conditions = CampaignConfig().draw(0), CampaignConfig(Experiment("bolt"))
     config, ready = conditions.trial(0)
     p = ready.gait.parameters
     length, time = p.rest_length, np.sqrt(p.rest_length * 9.81 / p.gravity)
-    (push,) = config.simulation.pushes
+    (push,) = config.pushes
     assert push.impulse == pytest.approx(draw.push * p.mass / 80.0 * length / time)
     assert push.duration == pytest.approx(0.1 * time)
-    assert config.simulation.delay <= draw.delay * time + 0.5e-3
+    assert config.delay <= draw.delay * time + 0.5e-3
 
 
 def test_a_free_robot_is_pushed_from_all_sides(tmp_path):
-    conditions = CampaignConfig(RobotSpec("bolt", free=True), mix=FLOATING_MIX, seed=2)
+    conditions = CampaignConfig(Experiment(RobotSpec("bolt", free=True)), mix=FLOATING_MIX, seed=2)
     config, _ = conditions.trial(1)
     draw = conditions.draw(1)
-    (push,) = config.simulation.pushes
+    (push,) = config.pushes
     assert push.direction == pytest.approx(np.radians(draw.direction))
     assert config.robot.free
-    assert RunConfig.load(config.save(tmp_path / "trial.toml")) == config
+    assert Experiment.load(config.save(tmp_path / "trial.toml")) == config
     directions = [FLOATING_MIX.draw(seed).direction for seed in range(200)]
     assert min(directions) < -170.0
     assert max(directions) > 170.0
@@ -131,7 +130,7 @@ def test_a_free_robot_is_pushed_from_all_sides(tmp_path):
     planar = replace(FLOATING_MIX, direction=(0.0, 0.0)).draw(7)
     assert replace(FLOATING_MIX.draw(7), direction=0.0) == planar
     assert FLOATING_MIX.times(2.0).direction == FLOATING_MIX.direction
-    with pytest.raises(ParameterError, match=r"the mix has the direction .* five-link is held"):
+    with pytest.raises(ParameterError, match=r"the mix has the direction .* is held"):
         CampaignConfig(mix=FLOATING_MIX)
 
 

@@ -10,8 +10,7 @@ import pytest
 
 import template_control as tc
 from template_control.errors import SweepError
-from template_control.robustness import campaign
-from template_control.robustness import subject as fingerprint
+from template_control.robustness import campaign, fingerprint
 from template_control.robustness.campaign import CampaignConfig, run_campaign
 from template_control.sweep.sweep import SweepOptions, grid, sweep
 
@@ -98,7 +97,7 @@ def _told(code, seed):
 def test_a_trial_imports_no_room_that_does_not_count():
     code = """
 import sys
-import template_control.run.config, template_control.robustness.disturbances
+import template_control.run.experiment, template_control.robustness.disturbances
 import template_control.robustness.fall_cause, template_control.run.backends
 print(*{name.split(".")[1] for name in sys.modules if name.startswith("template_control.")})
 """
@@ -109,7 +108,7 @@ print(*{name.split(".")[1] for name in sys.modules if name.startswith("template_
 
 @pytest.mark.slow(4)
 def test_the_digest_is_that_of_every_process():
-    code = "from template_control.robustness import subject as f; print(f._code(f._PACKAGE))"
+    code = "from template_control.robustness import fingerprint as f; print(f._code(f._PACKAGE))"
     assert _told(code, "1") == _told(code, "2") == fingerprint._code(fingerprint._PACKAGE) + "\n"
 
 

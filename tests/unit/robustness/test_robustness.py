@@ -14,13 +14,15 @@ from template_control.embedding.planners.planner import Context
 from template_control.errors import ParameterError, RobotError, SweepError
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.library import load_robot
+from template_control.robot.spec import RobotSpec
+from template_control.robustness import disturbances
 from template_control.robustness import severity_sweep as robustness
 from template_control.robustness.disturbances import (
     AFTER,
     BEGIN,
     DISTURBANCES,
     LATERAL_PUSHES,
-    Situation,
+    footholds,
 )
 from template_control.robustness.findings import Finding, Level, wilson_interval
 from template_control.robustness.severity_sweep import (
@@ -30,14 +32,15 @@ from template_control.robustness.severity_sweep import (
     template_limit,
     trial,
 )
-from template_control.robustness.subject import ENGINES, Subject
+from template_control.run.experiment import Experiment, perturbed_start
 from template_control.run.options import FallOptions
-from template_control.run.simulation import perturbed_start, simulate
-from template_control.run.specs import RobotSpec
+from template_control.run.simulation import simulate
+from template_control.run.specs import GaitSpec
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
 from template_control.view.trial_figures import robustness_figure
 
 BY_NAME = {d.name: d for d in DISTURBANCES}
@@ -83,27 +86,27 @@ def test_levels_are_round_and_grow_more_severe():
 def test_options_hold_the_level(robot, gait, monkeypatch):
     # Where the robot really treads is the next test's.
     monkeypatch.setattr(
-        Situation, "footholds", lambda self, _, steps: self.gait.step_length * np.arange(steps + 1)
+        disturbances, "footholds", lambda e, _, steps: e.gait.step_length * np.arange(steps + 1)
     )
-    where = Situation(robot, gait, LqrPlanner(gait))
+    where = Experiment(robot, planner=LqrPlanner(gait)).prepare()
 
     def of(name, level, number=2):
-        return BY_NAME[name].options(where, level, number)
+        return BY_NAME[name].experiment(where, level, number)
 
     (push,) = of("push-forward", 15.0).pushes
     assert (push.impulse, push.step, push.phase, push.duration) == (15.0, BEGIN, 0.2, 0.1)
     assert of("push-backward", 15.0).pushes[0].impulse == -15.0
     assert of("push-backward", 15.0).steps == BEGIN + 1 + AFTER
-    assert of("step-up", 0.03).plant.ground_step.height == 0.03
-    assert of("step-down", 0.03).plant.ground_step.height == -0.03
-    edges = [of("step-up", 0.03, number).plant.ground_step.x for number in (0, 4)]
+    assert of("step-up", 0.03).world.ground_step.height == 0.03
+    assert of("step-down", 0.03).world.ground_step.height == -0.03
+    edges = [of("step-up", 0.03, number).world.ground_step.x for number in (0, 4)]
     assert edges == pytest.approx([4.3 * gait.step_length, 4.7 * gait.step_length])
-    assert of("friction", 0.4).plant.friction == 0.4
-    assert of("heavier", 0.2).plant.mass_scale == pytest.approx(1.2)
-    assert of("lighter", -0.2).plant.mass_scale == pytest.approx(0.8)
-    assert of("torque", 0.7).embedding.torque_scale == 0.7
+    assert of("friction", 0.4).world.friction == 0.4
+    assert of("heavier", 0.2).world.mass_scale == pytest.approx(1.2)
+    assert of("lighter", -0.2).world.mass_scale == pytest.approx(0.8)
+    assert of("torque", 0.7).controller.torque_scale == 0.7
     noise = of("noise", 1e-3, 4).sensors
-    assert (noise.position_noise, noise.velocity_noise, noise.seed) == (1e-3, 0.02, 4)
+    assert (noise.deviations(Scale(1.0, 1.0)), noise.seed) == ((1e-3, 0.02), 4)
     assert of("delay", 4e-3).delay_ticks == 4
     starts = {of("delay", 4e-3, i).start for i in range(5)}
     assert len(starts) == 5
@@ -113,9 +116,10 @@ def test_options_hold_the_level(robot, gait, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 4])
 def test_the_edge_of_a_step_lies_between_two_footholds(robot, gait, number):
-    options = BY_NAME["step-up"].options(Situation(robot, gait, LqrPlanner(gait)), 0.001, number)
-    edge = options.plant.ground_step.x
-    record = simulate(robot, LqrPlanner(gait), replace(options, steps=8))
+    where = Experiment(robot, planner=LqrPlanner(gait)).prepare()
+    stepped = BY_NAME["step-up"].experiment(where, 0.001, number)
+    edge = stepped.world.ground_step.x
+    record = simulate(replace(stepped, steps=8))
     at = np.searchsorted(record.time, record.section_time)
     foothold = record.foot[at, record.rear[at]]
     beyond = int(np.argmax(foothold[:, 0] > edge))
@@ -142,7 +146,7 @@ def test_the_error_of_a_walk_is_that_of_its_last_five_steps(undisturbed, default
 
 @pytest.mark.slow
 def test_trials_succeed():
-    good = trial("five-link", "push-backward", 5.0, 3)
+    good = trial(Experiment(), "push-backward", 5.0, 3)
     assert not good["fell"]
     assert good["steps"] == BEGIN + 1 + AFTER
     assert abs(good["speed_error"]) < 0.02
@@ -150,15 +154,15 @@ def test_trials_succeed():
 
 def test_footholds_of_a_run_are_where_its_feet_bear(robot):
     gait = tc.running_gait(tc.template_for(robot), 3.0)
-    where = Situation(robot, gait, tc.RunningPlanner(gait))
-    holds = where.footholds(perturbed_start(gait, 0), 3)
+    where = Experiment(robot, planner=tc.RunningPlanner(gait)).prepare()
+    holds = footholds(where, perturbed_start(gait, 0), 3)
     assert len(holds) == 3
     assert np.diff(holds) == pytest.approx(gait.step_length, rel=0.1)
 
 
 @pytest.mark.slow(seconds=6)
 def test_trials_of_a_run_succeed_and_know_its_speed():
-    good = trial("five-link", "step-down", 0.01, 1, 3.0)
+    good = trial(Experiment(motion=GaitSpec("run", 3.0)), "step-down", 0.01, 1)
     assert not good["fell"]
     assert abs(good["speed_error"]) < 0.02
     assert abs(good["height_error"]) < 0.02
@@ -166,11 +170,11 @@ def test_trials_of_a_run_succeed_and_know_its_speed():
 
 @pytest.mark.slow(seconds=3)
 def test_trials_fall_alike():
-    bad = trial("five-link", "torque", 0.5, 0)
+    bad = trial(Experiment(), "torque", 0.5, 0)
     assert bad["fell"]
     assert bad["reason"]
     assert bad["speed_error"] is None
-    assert trial("five-link", "torque", 0.5, 0) == bad
+    assert trial(Experiment(), "torque", 0.5, 0) == bad
 
 
 # -- where it breaks -------------------------------------------------------------------
@@ -211,7 +215,7 @@ def test_a_walk_off_its_gait_fails_but_does_not_break():
     assert Finding(delay, (*levels, Level(5.0, 0, 4, 0))).broken
 
 
-def made_up(robot, disturbance, level, number):
+def made_up(experiment, disturbance, level, number):
     """Falls from 10 % mass on, is off its gait from a step of 3 cm on in two trials of five."""
     fell = disturbance == "heavier" and level > 0.25
     error = 0.03 if number < 2 and level > 0.025 else -0.01
@@ -219,7 +223,7 @@ def made_up(robot, disturbance, level, number):
     return {"fell": fell, "reason": "", "steps": 3, "speed_error": error, "height_error": error}
 
 
-def not_to_be_called(robot, disturbance, level, number):
+def not_to_be_called(experiment, disturbance, level, number):
     raise AssertionError("this trial was finished before")
 
 
@@ -270,14 +274,14 @@ def test_files_are_of_this_robot_and_these_trials(cheap, tmp_path, monkeypatch):
     stiff = load_robot("five-link")
     stiff.urdf += "<!-- another -->"
     gait = tc.default_gait(stiff)
-    where = Situation(stiff, gait, LqrPlanner(gait))
-    monkeypatch.setattr(Subject, "situation", lambda _: where)
+    where = Experiment(stiff, planner=LqrPlanner(gait)).prepare()
+    monkeypatch.setattr(Experiment, "prepare", lambda _: where)
     cheap(["heavier"], tmp_path, quick=True)
     third = set(tmp_path.glob("*.jsonl")) - first - second
     assert len(first) == len(second) == len(third) == 2
 
 
-def broken(robot, disturbance, level, number):
+def broken(experiment, disturbance, level, number):
     raise RobotError("no such leg")
 
 
@@ -297,18 +301,19 @@ def test_unknown_disturbances_are_named():
 def test_a_free_robot_is_pushed_aside_too():
     bolt = tc.load_floating_robot("bolt")
     gait = tc.robot_gait_for_speed(bolt, 0.55)
-    where = Situation(bolt, gait, LqrPlanner(gait, tc.embedding.FREE_PLANNER))
-    turned = {d.name: d.options(where, 0.1, 3).pushes[0].direction for d in LATERAL_PUSHES}
+    planner = LqrPlanner(gait, tc.embedding.FREE_PLANNER)
+    where = Experiment(bolt, planner=planner).prepare()
+    turned = {d.name: d.experiment(where, 0.1, 3).pushes[0].direction for d in LATERAL_PUSHES}
     assert turned == {"push-left": np.pi / 2, "push-right": -np.pi / 2}
-    weak = BY_NAME["torque"].options(where, 0.9, 0).embedding
+    weak = BY_NAME["torque"].experiment(where, 0.9, 0).controller
     assert isinstance(weak, tc.embedding.FreeOptions)
     assert weak.torque_scale == 0.9
 
 
 @pytest.mark.slow(seconds=8)
 def test_trials_of_a_free_robot():
-    choice = settings.to_table(RobotSpec("bolt", free=True))
-    found = robustness.trial(choice, "noise", 1e-3, 0, 0.55)
+    bolt = Experiment(RobotSpec("bolt", free=True), GaitSpec(speed=0.55))
+    found = robustness.trial(settings.to_table(bolt), "noise", 1e-3, 0)
     assert not found["fell"]
     assert abs(found["speed_error"]) < 0.04
 
@@ -360,19 +365,21 @@ def come_back(gait, planner, impulse):
 @pytest.mark.parametrize(("name", "sign"), [("push-forward", 1.0), ("push-backward", -1.0)])
 def test_the_template_has_a_limit_to_pushes(robot, gait, name, sign):
     planner = LqrPlanner(gait)
-    limit = template_limit(BY_NAME[name], Situation(robot, gait, planner), AFTER, SETTLED)
+    limit = template_limit(
+        BY_NAME[name], Experiment(robot, planner=planner).prepare(), AFTER, SETTLED
+    )
     levels = [level for level in BY_NAME[name].levels_for(gait.parameters) if level <= limit + 5.1]
     back = [come_back(gait, planner, sign * level) for level in levels]
     assert back == [True] * (len(levels) - 1) + [False]
 
 
 def test_the_template_has_no_friction(robot, gait):
-    where = Situation(robot, gait, LqrPlanner(gait))
+    where = Experiment(robot, planner=LqrPlanner(gait)).prepare()
     assert template_limit(BY_NAME["friction"], where, AFTER, SETTLED) is None
 
 
 def test_a_limit_below_the_mildest_level_is_none_of_them(robot, gait):
-    where = Situation(robot, gait, LqrPlanner(gait))
+    where = Experiment(robot, planner=LqrPlanner(gait)).prepare()
     assert template_limit(BY_NAME["push-forward"], where, AFTER, 0.0) == 0.0
 
 
@@ -381,7 +388,8 @@ def test_a_limit_below_the_mildest_level_is_none_of_them(robot, gait):
 
 @pytest.mark.slow
 def test_trials_go_in_the_engine_that_is_asked_for():
-    one, other = (trial("five-link", "push-backward", 15.0, 3, plant=plant) for plant in ENGINES)
+    worlds = tc.PlantOptions(), MujocoOptions()
+    one, other = (trial(Experiment(world=w), "push-backward", 15.0, 3) for w in worlds)
     assert [one["fell"], other["fell"]] == [False, False]
     assert one["speed_error"] != other["speed_error"]
     assert one["speed_error"] == pytest.approx(other["speed_error"], abs=0.01)
@@ -389,11 +397,11 @@ def test_trials_go_in_the_engine_that_is_asked_for():
 
 def test_options_keep_the_world(robot, gait):
     plant = MujocoOptions(contact_time=5e-3)
-    where = Situation(robot, gait, LqrPlanner(gait), plant)
+    where = Experiment(robot, planner=LqrPlanner(gait), world=plant).prepare()
     for d in DISTURBANCES:
         if d.name.startswith("step"):
             continue  # walks first, to know its footholds
-        world = d.options(where, d.levels[0], 0).plant
+        world = d.experiment(where, d.levels[0], 0).world
         assert replace(world, friction=plant.friction, mass_scale=1.0) == plant
 
 
@@ -418,7 +426,7 @@ def test_more_successes_than_trials_are_refused():
 
 def test_a_base_that_no_leg_threw_so_fast_is_a_simulation_that_diverged(robot, gait):
     falls = FallOptions(thrown=0.3)  # slower than this robot walks
-    record = simulate(robot, LqrPlanner(gait), tc.SimulationOptions(steps=2, falls=falls))
+    record = simulate(Experiment(robot, planner=LqrPlanner(gait), steps=2, falls=falls))
     assert record.fell
     assert "diverged" in record.fall_reason
 
@@ -426,4 +434,4 @@ def test_a_base_that_no_leg_threw_so_fast_is_a_simulation_that_diverged(robot, g
 @pytest.mark.slow
 def test_a_trial_that_diverges_is_a_fall():
     """With long delays bolt was foreseen 1e16 m above the ground; the report ended there."""
-    assert trial("bolt", "delay", 0.016, 0)["fell"]
+    assert trial(Experiment("bolt"), "delay", 0.016, 0)["fell"]

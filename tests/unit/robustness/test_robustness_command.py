@@ -9,12 +9,12 @@ import pytest
 from places import DOCS
 
 from template_control.cli import robustness as command
+from template_control.cli.experiment_options import experiment_from
 from template_control.cli.main import build_parser, main
-from template_control.cli.run_options import robot_choice
 from template_control.robot.library import robot_path
 from template_control.robustness import disturbances, severity_sweep
 from template_control.robustness.disturbances import DISTURBANCES
-from template_control.run.specs import RobotSpec
+from template_control.run.experiment import Experiment
 
 
 @pytest.fixture
@@ -73,7 +73,8 @@ def test_a_robot_that_cannot_walk_is_one_line(tmp_path, refused):
     [
         (["--robot", "hexapod"], "hexapod"),
         (["--workers", "0"], "--workers is 0"),
-        (["--speed", "2"], "--speed goes with --gait run"),
+        (["--speed", "9"], "five-link does not walk at a mean speed of 9 m/s"),
+        (["--plant", "ideal"], "the world is ideal, whose friction cannot be disturbed"),
         (["--gait", "run", "--speed", "9"], "no running gait has 9 m/s at its apex"),
         (["--gait", "run", "--speed", "nan"], "--speed is nan"),
         (["--output", "/proc/none"], "/proc/none"),
@@ -105,7 +106,7 @@ def test_a_robot_of_ones_own_is_understood_as_walk_understands_it(
     monkeypatch.setattr(command, "measure", measured)
     assert main(["robustness", *words, "--output", str(tmp_path)]) == 130
     walked = understood(shlex.join(["template-control", "walk", *words]))
-    assert found[0].robot == robot_choice(walked, RobotSpec())
+    assert found[0].robot == experiment_from(walked, Experiment()).robot
     assert found[0].robot.locked == {"FL_HAA": 0.0}
 
 

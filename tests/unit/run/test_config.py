@@ -13,11 +13,12 @@ from places import DOCS
 
 import template_control as tc
 from template_control import settings
+from template_control.cli.experiment_options import experiment_from
 from template_control.cli.main import main
-from template_control.cli.run_options import prepared
-from template_control.run.config import RunConfig
+from template_control.robot.spec import RobotSpec
+from template_control.run.experiment import Experiment
 from template_control.run.record import Record
-from template_control.run.specs import GaitSpec, OwnPlanner, RobotSpec
+from template_control.run.specs import GaitSpec, OwnPlanner
 from template_control.slip import Slot
 
 
@@ -71,23 +72,22 @@ def test_a_scenario_is_written_down_whole(tmp_path):
 
 @pytest.fixture
 def parsed(understood):
-    """The run that a line describes, with the robot and the gait it begins with."""
+    """The experiment that a line describes."""
 
     def parse(line):
-        return prepared(understood(f"template-control walk {line}"))
+        return experiment_from(understood(f"template-control walk {line}"), Experiment())
 
     return parse
 
 
 def test_every_option_has_its_place(parsed):
-    simulation = parsed(DISTURBED)[0].simulation
-    assert simulation.plant == tc.PlantOptions(friction=0.6, mass_scale=1.05)
-    assert simulation.embedding == tc.EmbeddingOptions(friction=0.6, torque_scale=0.9)
+    simulation = parsed(DISTURBED)
+    assert simulation.world == tc.PlantOptions(friction=0.6, mass_scale=1.05)
+    assert simulation.controller == tc.EmbeddingOptions(friction=0.6, torque_scale=0.9)
     assert simulation.pushes == (tc.Push(-8.0, 1, 0.3), tc.Push(5.0, 0, 0.0))
-    assert simulation.sensors.position_noise == 5e-4
-    assert simulation.sensors.velocity_noise == pytest.approx(20 * 5e-4)
+    assert simulation.sensors == tc.SensorOptions(noise=5e-4)
     assert (simulation.delay, simulation.steps, simulation.record_every) == (0.002, 2, 2)
-    assert simulation.start is not None
+    assert simulation.seed == 3
 
 
 def test_the_touchdown_angle_is_the_gaits(parsed):
@@ -95,7 +95,7 @@ def test_the_touchdown_angle_is_the_gaits(parsed):
         ("--touchdown-angle 67", None),
         ("--touchdown-angle 67 --speed 1.15", 1.15),
     ):
-        gait = parsed(line)[1].gait
+        gait = parsed(line).prepare().gait
         assert gait.controls[Slot.TOUCHDOWN_ANGLE] == pytest.approx(math.radians(67.0))
         if speed is not None:
             assert gait.mean_speed == pytest.approx(speed)
@@ -104,40 +104,40 @@ def test_the_touchdown_angle_is_the_gaits(parsed):
 def test_the_command_line_comes_before_the_file(parsed, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(
-        '[robot]\nmodel = "rabbit"\n[gait]\nspeed = 0.8\n'
+        'steps = 9\n[robot]\nmodel = "rabbit"\n[motion]\nspeed = 0.8\n'
         '[planner]\nkind = "lqr"\noffset_gain = 0.1\n'
-        '[simulation]\nsteps = 9\n[simulation.plant]\nkind = "pybullet"\nmass_scale = 1.1\n'
+        '[world]\nkind = "pybullet"\nmass_scale = 1.1\n'
     )
-    config, ready = parsed(f"--config {path} --steps 3 --friction 0.5")
-    assert ready.robot.name == "rabbit"
-    assert config.gait == GaitSpec(speed=0.8)
+    config = parsed(f"--config {path} --steps 3 --friction 0.5")
+    assert config.robot == RobotSpec("rabbit")
+    assert config.motion == GaitSpec(speed=0.8)
     assert config.planner == tc.LqrOptions(offset_gain=0.1)
-    assert config.simulation.steps == 3
-    assert config.simulation.plant == tc.PlantOptions(friction=0.5, mass_scale=1.1)
-    assert parsed(f"--config {path} --robot five-link --speed 1.2")[1].robot.name == "five-link"
+    assert config.steps == 3
+    assert config.world == tc.PlantOptions(friction=0.5, mass_scale=1.1)
+    assert parsed(f"--config {path} --robot five-link --speed 1.2").robot == RobotSpec()
 
 
 def test_long_walks_are_thinned_unless_told_otherwise(parsed, tmp_path):
-    assert parsed("--steps 200")[0].simulation.record_every == 1
-    assert parsed("--steps 201")[0].simulation.record_every == 5
-    assert parsed("--steps 201 --record-every 2")[0].simulation.record_every == 2
+    assert parsed("--steps 200").record_every == 1
+    assert parsed("--steps 201").record_every == 5
+    assert parsed("--steps 201 --record-every 2").record_every == 2
     path = tmp_path / "long.toml"
-    path.write_text("[simulation]\nsteps = 201\n")
-    assert parsed(f"--config {path}")[0].simulation.record_every == 1
+    path.write_text("steps = 201\n")
+    assert parsed(f"--config {path}").record_every == 1
 
 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[simulation]\nstep = 3", "unknown key simulation.step: known are steps,"),
-        ("[simulation]\nsteps = 'x'", "simulation.steps is 'x': give a whole number"),
-        ("[simulation]\ndelay = 0.0005", "delay is 0.0005 s: give a multiple"),
-        ("[simulation.plant]\nkind = 'moon'", "simulation.plant.kind is 'moon': give one of"),
+        ("step = 3", "unknown key step: known are robot,"),
+        ("steps = 'x'", "steps is 'x': give a whole number"),
+        ("delay = 0.0005", "delay is 0.0005 s: give a multiple"),
+        ("[world]\nkind = 'moon'", "world.kind is 'moon': give one of"),
         ("[planner]\nkind = 'lqr'\ngain = 1", "unknown key planner.gain: known are state_cost"),
-        ("[gait]\nname = 'jump'", "gait.name is 'jump': give one of walk, paper"),
-        ("[gait]\nname = 'paper'\nspeed = 1.0", "speed does not go with gait paper"),
+        ("[motion]\nname = 'jump'", "motion.name is 'jump': give one of walk, paper"),
+        ("[motion]\nname = 'paper'\nspeed = 1.0", "speed does not go with gait paper"),
         ("[robot]\nmodel = 5", "robot.model is 5: give a text in quotes"),
-        ("robot = 'bolt'", "robot is 'bolt': give a table"),
+        ("robot = 5", "robot is 5: give a table"),
         ("[", "is no TOML"),
     ],
 )
@@ -164,7 +164,10 @@ def test_a_wrong_file_is_one_line_with_file_and_key(text, told, refused, tmp_pat
         ("--touchdown-angle 20", "no walking gait with touchdown angle 20.00 deg"),
         ("--locked knee", "--locked knee: give JOINT=ANGLE"),
         ("--locked knee=0.1", "locked go with a URDF, not with five-link"),
-        ("--planner best", "--planner is 'best': give lqr, ahead, modified or module:Class"),
+        (
+            "--planner best",
+            "--planner is 'best': give lqr, ahead, modified, deadbeat or module:Class",
+        ),
         ("--planner none_such:Planner", "there is no module none_such"),
         ("--planner math:Planner", "module math has no class Planner"),
         ("--planner queue:Empty:x", "module queue has no class Empty:x"),
@@ -188,10 +191,10 @@ def test_angles_of_locked_joints_reach_the_robot():
 def test_a_urdf_is_found_from_any_folder(parsed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(tc.robot.robot_path("five-link"), "mine.urdf")
-    config, _ = parsed("--robot mine.urdf")
+    config = parsed("--robot mine.urdf")
     config.save("run.toml")
     monkeypatch.chdir("/")
-    assert RunConfig.load(tmp_path / "run.toml").robot.load().name == "five-link"
+    assert Experiment.load(tmp_path / "run.toml").robot.load().name == "five-link"
 
 
 PLANNER = """
@@ -228,7 +231,7 @@ def test_a_planner_of_ones_own_walks_and_is_written_down(own_planner, tmp_path):
     status, record = walk(tmp_path / "own", "--planner", planner, "--steps", "1")
     assert status == 0
     assert record.planner == "Mine"
-    config = RunConfig.load(tmp_path / "own" / "run.toml")
+    config = Experiment.load(tmp_path / "own" / "run.toml")
     assert config.planner == OwnPlanner(planner)
 
 
@@ -254,15 +257,15 @@ def test_the_file_that_the_page_shows_is_understood(tmp_path):
     (shown,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     path = tmp_path / "shown.toml"
     path.write_text(shown)
-    config = RunConfig.load(path)
+    config = Experiment.load(path)
     assert config.robot == RobotSpec("rabbit")
     assert config.planner == tc.LqrOptions(offset_gain=0.15)
-    assert config.simulation.pushes == (tc.Push(3.0, 2, 0.25),)
+    assert config.pushes == (tc.Push(3.0, 2, 0.25),)
 
 
 def test_the_defaults_are_written_and_read():
-    config = RunConfig()
+    config = Experiment()
     assert (
-        settings.from_table(RunConfig, tomllib.loads(settings.text(settings.to_table(config))))
+        settings.from_table(Experiment, tomllib.loads(settings.text(settings.to_table(config))))
         == config
     )

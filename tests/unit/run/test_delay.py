@@ -89,8 +89,15 @@ def test_a_delay_is_scaled_with_the_robots_time():
 def test_a_walk_that_reckons_with_its_delay_keeps_nearer_to_its_gait(default_gait):
     def off(options):
         planner = tc.LqrPlanner(default_gait)
-        run = tc.SimulationOptions(steps=12, delay=0.008, embedding=options)
-        record = tc.simulate(tc.load_robot("five-link"), planner, run)
+        record = tc.simulate(
+            tc.Experiment(
+                tc.load_robot("five-link"),
+                planner=planner,
+                steps=12,
+                delay=0.008,
+                controller=options,
+            )
+        )
         assert not record.fell
         return np.abs(record.section_state[-5:] - default_gait.vlo).mean(axis=0)
 

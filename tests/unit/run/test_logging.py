@@ -23,9 +23,15 @@ logging.getLogger("template_control.run").warning("not seen")
 @pytest.fixture
 def weak_walk(robot, default_gait, caplog):
     """Messages of a walk whose motors are too weak."""
-    options = tc.SimulationOptions(steps=10, embedding=tc.EmbeddingOptions(torque_scale=0.07))
     with caplog.at_level(logging.DEBUG, "template_control"):
-        record = tc.simulate(robot, tc.LqrPlanner(default_gait), options)
+        record = tc.simulate(
+            tc.Experiment(
+                robot,
+                planner=tc.LqrPlanner(default_gait),
+                steps=10,
+                controller=tc.EmbeddingOptions(torque_scale=0.07),
+            )
+        )
     assert record.fell
     assert not np.all(record.solved)
     return record, caplog.records
@@ -52,9 +58,12 @@ def test_failures_of_the_qp_in_a_row_are_told_once(weak_walk):
 def told_of(impulse, robot, gait, caplog, catches=True):
     """What is told of a walk that is pushed, and its record."""
     pushes, embedding = (tc.Push(impulse, step=1),), tc.EmbeddingOptions(catches=catches)
-    options = tc.SimulationOptions(steps=4, pushes=pushes, embedding=embedding)
     with caplog.at_level(logging.DEBUG, "template_control"):
-        record = tc.simulate(robot, tc.LqrPlanner(gait), options)
+        record = tc.simulate(
+            tc.Experiment(
+                robot, planner=tc.LqrPlanner(gait), steps=4, pushes=pushes, controller=embedding
+            )
+        )
     return record, caplog.records
 
 

@@ -18,8 +18,14 @@ from template_control.slip.scenario.scenario import example_one
 @pytest.fixture(scope="module")
 def short_walk(default_gait):
     """A step with few samples: here it is written and read hundreds of times."""
-    options = tc.SimulationOptions(steps=1, record_every=20)
-    return tc.simulate(tc.load_robot("five-link"), tc.LqrPlanner(default_gait), options)
+    return tc.simulate(
+        tc.Experiment(
+            tc.load_robot("five-link"),
+            planner=tc.LqrPlanner(default_gait),
+            steps=1,
+            record_every=20,
+        )
+    )
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from template_control.embedding.phases import PHASES
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.robot.start import state_in
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.slip.gaits.running_gait import running_gait
@@ -43,7 +43,7 @@ def test_a_run_begins_once(kind):
         planner = LqrPlanner(walking_gait(parameters, 1.1))
     counts = _count_resets(planner)
     tuning = FreeOptions() if free else EmbeddingOptions(catches=False)
-    record = simulate(robot, planner, SimulationOptions(steps=1, embedding=tuning))
+    record = simulate(Experiment(robot, planner=planner, steps=1, controller=tuning))
     assert record.steps == 1
     assert len(counts) == 1
 

@@ -12,12 +12,12 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant
+from template_control.robot.spec import RobotSpec
 from template_control.robustness.campaign import CampaignConfig
 from template_control.run import simulation
-from template_control.run.config import RunConfig
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.record import load_record
-from template_control.run.specs import GaitSpec, RobotSpec
+from template_control.run.specs import GaitSpec
 from template_control.slip.similarity import Scale, scaled
 
 LINES = {
@@ -79,13 +79,14 @@ def test_the_file_holds_what_the_run_used_and_repeats_it(line, held, tmp_path):
             np.testing.assert_array_equal(one, other, err_msg=f.name)
     assert file.read_text() == (tmp_path / "again" / "run.toml").read_text()
 
-    written = RunConfig.load(file)
+    written = Experiment.load(file)
     assert len(held) == 2
     for plant, controller, options in held:
         assert isinstance(plant, Plant)
-        assert options == written.simulation
+        for name in ("pushes", "sensors", "delay", "course", "falls", "record_every"):
+            assert getattr(options, name) == getattr(written, name)
         scale = Scale.of(controller.parameters)
-        assert controller.options == scaled(written.simulation.embedding, scale)
+        assert controller.options == scaled(written.controller, scale)
         kinds = type(written.planner)
         used = [
             planner.options
@@ -93,16 +94,16 @@ def test_the_file_holds_what_the_run_used_and_repeats_it(line, held, tmp_path):
             if type(getattr(planner, "options", None)) is kinds
         ]
         assert scaled(written.planner, scale) in used
-        assert plant.options == written.simulation.plant
+        assert plant.options == written.world
 
 
 def test_the_default_is_the_robots_own_and_a_given_one_is_kept():
     free = RobotSpec("bolt", free=True)
-    assert RunConfig(free).resolved().planner == FREE_PLANNER
-    assert RunConfig(free).resolved().simulation.embedding == FreeOptions()
-    assert RunConfig().resolved().planner == LqrOptions()
-    assert RunConfig().resolved().simulation.embedding == EmbeddingOptions()
-    given = RunConfig(free, planner=LqrOptions())
+    assert Experiment(free).resolved().planner == FREE_PLANNER
+    assert Experiment(free).resolved().controller == FreeOptions()
+    assert Experiment().resolved().planner == LqrOptions()
+    assert Experiment().resolved().controller == EmbeddingOptions()
+    given = Experiment(free, planner=LqrOptions())
     assert given.resolved().planner == LqrOptions()
     (planner,) = given.prepare().planners.values()
     assert planner.options == scaled(LqrOptions(), Scale.of(planner.gait.parameters))
@@ -110,16 +111,16 @@ def test_the_default_is_the_robots_own_and_a_given_one_is_kept():
 
 @pytest.mark.parametrize("gait", [GaitSpec(), GaitSpec("run", 3.0)])
 def test_a_trial_is_written_with_the_planner_that_it_has(gait, tmp_path):
-    config, ready = CampaignConfig(gait=gait).trial(0)
-    written = RunConfig.load(config.save(tmp_path / "trial.toml"))
+    config, ready = CampaignConfig(Experiment(motion=gait)).trial(0)
+    written = Experiment.load(config.save(tmp_path / "trial.toml"))
     (planner,) = ready.planners.values()
     assert planner.options == scaled(written.planner, Scale.of(planner.gait.parameters))
 
 
 def test_a_free_trial_is_written_with_the_planner_that_it_has(tmp_path):
-    conditions = CampaignConfig(RobotSpec("bolt", free=True), GaitSpec(speed=0.6))
+    conditions = CampaignConfig(Experiment(RobotSpec("bolt", free=True), GaitSpec(speed=0.6)))
     config, ready = conditions.trial(0)
-    written = RunConfig.load(config.save(tmp_path / "trial.toml"))
+    written = Experiment.load(config.save(tmp_path / "trial.toml"))
     assert written.planner == FREE_PLANNER
     (planner,) = ready.planners.values()
     assert planner.options == scaled(FREE_PLANNER, Scale.of(planner.gait.parameters))
@@ -129,6 +130,6 @@ def test_a_free_trial_is_written_with_the_planner_that_it_has(tmp_path):
 def test_tuning_of_the_other_kind_of_robot_is_refused(free):
     tuning = EmbeddingOptions() if free else FreeOptions()
     name, had = type(tuning).__name__, "walks free" if free else "is held in its plane"
-    config = RunConfig(RobotSpec("bolt", free=free), simulation=SimulationOptions(embedding=tuning))
+    experiment = Experiment(RobotSpec("bolt", free=free), controller=tuning)
     with pytest.raises(ParameterError, match=f"{had}, and its embedding has {name}: give"):
-        config.prepare().run(config.simulation)
+        simulation.simulate(experiment)

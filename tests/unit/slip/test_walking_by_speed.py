@@ -173,7 +173,7 @@ def test_the_library_s_family_is_what_the_search_makes():
 def test_robots_walk_where_they_could_not(name, speed, height):
     robot = tc.load_robot(name)
     gait = tc.gait_for_speed(tc.template_for(robot), speed)
-    record = tc.simulate(robot, LqrPlanner(gait), tc.SimulationOptions(steps=30, record_every=5))
+    record = tc.simulate(tc.Experiment(robot, planner=LqrPlanner(gait), steps=30, record_every=5))
     assert (record.steps, record.fell) == (30, False)
     last = record.section_state[-10:].mean(axis=0) - gait.vlo
     assert np.all(np.abs(last) < [0.02, height, 0.04])
@@ -215,7 +215,7 @@ def test_robots_walk_at_the_ends_of_their_ranges(name, end):
     robot = tc.load_robot(name)
     speed = tc.walking_speeds(robot)[end]
     gait = tc.robot_gait_for_speed(robot, speed)
-    record = tc.simulate(robot, LqrPlanner(gait), tc.SimulationOptions(steps=20, record_every=5))
+    record = tc.simulate(tc.Experiment(robot, planner=LqrPlanner(gait), steps=20, record_every=5))
     assert (record.steps, record.fell) == (20, False)
     last = record.section_state[-8:].mean(axis=0) - gait.vlo
     unit = gait.parameters.speed_unit / tc.SlipParameters().speed_unit

@@ -15,7 +15,7 @@ from sweep_work import P, drawn, fragile, other, quietly, square, walking_step
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import SweepError
 from template_control.robot.library import load_robot
-from template_control.run.options import SimulationOptions
+from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.gaits.gait import gait_at
@@ -35,7 +35,7 @@ def short_scenario(speed, kind):
 
 def robot_run(speed):
     gait = gait_at(P, np.radians(66.0), speed)
-    record = simulate(load_robot("five-link"), LqrPlanner(gait), SimulationOptions(steps=2))
+    record = simulate(Experiment(load_robot("five-link"), planner=LqrPlanner(gait), steps=2))
     return {"fell": record.fell, "steps": record.steps, "distance": record.com[-1, 0]}
 
 

@@ -25,7 +25,7 @@ def record():
     robot = tc.load_floating_robot("five-link-3d")
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 1.0), tc.embedding.FREE_PLANNER)
     course = tc.HeadingCommand(turning_rate=0.4)
-    return tc.simulate(robot, planner, tc.SimulationOptions(steps=3, course=course))
+    return tc.simulate(tc.Experiment(robot, planner=planner, steps=3, course=course))
 
 
 def test_a_quaternion_turns_the_vertical_into_its_direction():

@@ -20,7 +20,7 @@ def gait(default_gait):
 
 def walk(gait, steps, **options):
     robot = tc.load_robot("five-link")
-    return tc.simulate(robot, tc.LqrPlanner(gait), tc.SimulationOptions(steps=steps, **options))
+    return tc.simulate(tc.Experiment(robot, planner=tc.LqrPlanner(gait), steps=steps, **options))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def cut(record, samples):
 def test_every_run_has_every_figure(record, gait, kind, tmp_path):
     if kind == "fallen":
         weak = tc.EmbeddingOptions(torque_scale=0.2)
-        record = walk(gait, 4, embedding=weak)
+        record = walk(gait, 4, controller=weak)
         assert record.fell
     elif kind != "whole":
         record = cut(record, 2 if kind == "two samples" else 150)

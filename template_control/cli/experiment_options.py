@@ -1,0 +1,157 @@
+"""Options of the commands that make an experiment: short flags, and one for every key.
+
+Every key of the experiment's file has a flag, ``--KEY VALUE`` with the value as TOML says it, which
+``template-control keys`` lists; :mod:`~.flags` has short ones for some.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from template_control import settings
+from template_control.checks import option_types as values
+from template_control.cli.flags import ALL, GAIT, OWN_URDF, PLANNERS, STANDS, Flag
+from template_control.embedding.free.options import FREE_PLANNER
+from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.planners.modified import ModifiedOptions
+from template_control.errors import ParameterError
+from template_control.plant.bullet import PlantOptions
+from template_control.robot.spec import RobotSpec
+from template_control.run.experiment import Experiment
+from template_control.run.specs import OwnPlanner
+from template_control.slip.scenario.scenario import Scenario
+
+_LONG, _THIN = 200, 5  # steps beyond which by default every 5th sample is kept
+
+
+def add_flags(parser: argparse.ArgumentParser, flags: Sequence[Flag]) -> None:
+    """Add ``--config``, flags, and one for every key.
+
+    Args:
+        parser: of the command.
+        flags: some of ``ALL``.
+    """
+    parser.add_argument(
+        "--config",
+        type=values.path,
+        metavar="TOML",
+        help="an experiment, such as the run.toml next to every run.npz; options on the command"
+        " line come before those of the file",
+    )
+    own = parser.add_argument_group("a URDF of your own")
+    for flag in flags:
+        flag.add(own if flag in OWN_URDF else parser)
+    parser.add_argument_group(
+        "all keys", "every key of an experiment's file is an option: template-control keys"
+    )
+    for key in settings.leaves(Experiment):
+        if "." in key.path:
+            parser.add_argument(
+                f"--{key.path}", dest="keys", action=_Key, help=argparse.SUPPRESS, metavar="VALUE"
+            )
+
+
+class _Key(argparse.Action):
+    """Collects ``--KEY VALUE``, the value as TOML says it; a text may be without its quotes."""
+
+    def __call__(self, parser: Any, namespace: Any, value: Any, option: Any = None) -> None:
+        try:
+            found = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found = value
+        keys = {**(getattr(namespace, "keys", None) or {}), str(option)[2:]: found}
+        namespace.keys = keys
+
+
+def experiment_from(options: argparse.Namespace, default: Experiment) -> Experiment:
+    """The experiment that was asked for.
+
+    Args:
+        options: as parsed.
+        default: what holds where neither an option nor a file says otherwise.
+
+    Raises:
+        TemplateControlError: naming the option or the key that is wrong.
+    """
+    base = default if options.config is None else Experiment.load(options.config)
+    given: dict[str, Any] = {}
+    for flag in ALL:
+        value = getattr(options, flag.dest, None)
+        if value is not None:
+            found = value if flag.read is None else flag.read(value)
+            given |= dict.fromkeys(flag.keys.split(), found)
+    _check_motion(base, options, given)
+    typed_keys: dict[str, Any] = options.keys or {}
+    first = ("robot", "motion", "world.kind", "sensors.kind")
+    head = {k: v for k, v in given.items() if k.startswith(first)}
+    base = base.with_(head | {k: v for k, v in typed_keys.items() if k.startswith(first)})
+    rest = {k: v for k, v in given.items() if k not in head}
+    _complete(base, options, rest)
+    rest |= {k: v for k, v in typed_keys.items() if not k.startswith(first)}
+    return base.with_(rest)
+
+
+def _check_motion(base: Experiment, options: argparse.Namespace, given: dict[str, Any]) -> None:
+    """Refuse a gait's option where there is a scenario."""
+    if isinstance(given.get("motion", base.motion), Scenario):
+        for flag in (*GAIT, *STANDS):
+            if getattr(options, flag.dest, None) is not None:
+                hint = ": give it segments that stand" if flag in STANDS else ": leave one out"
+                raise ParameterError(f"{flag.names} does not go with a scenario{hint}")
+        if "seed" in given:
+            raise ParameterError("--seed does not go with a scenario: leave one out")
+
+
+def _complete(base: Experiment, options: argparse.Namespace, given: dict[str, Any]) -> None:
+    """Set what a flag means besides its own key, which depends on the rest of the experiment."""
+    if not isinstance(base.world, PlantOptions):
+        given.pop("world.friction", None)  # the ideal world has none
+    elif "world.terrain" in given:
+        given["world.ground_step"] = None  # which the terrain replaces
+    if "world.robot" in given and isinstance(base.robot, RobotSpec):
+        model = given["world.robot"].model  # what else it needs, it needs as the controller's
+        given["world.robot"] = replace(base.robot, model=model, gravity=None, masses={})
+    if "planner" in given:
+        given["planner"] = _planner(given["planner"], base)
+    if "planner.map_kind" in given:
+        chosen = given.get("planner") or base.resolved().planner
+        if not isinstance(chosen, ModifiedOptions):
+            raise ParameterError(
+                f"--map does not go with planner {getattr(chosen, 'kind', 'of your own')}: leave it"
+                " out, or give --planner modified"
+            )
+    if "course.turns" in given:
+        (_, rate), *later = given.pop("course.turns")
+        given |= {"course.turning_rate": rate, "course.turns": later}
+    seed = given.get("seed")
+    if seed is not None:
+        given["start"] = None  # the file's
+    if getattr(options, "estimate", None):
+        if "sensors.noise" in given:
+            raise ParameterError(
+                "--noise does not go with --estimate, which has its own: leave one out"
+            )
+        given["sensors.seed"] = seed or 0
+    if "sensors.noise" in given:
+        given |= {"sensors.kind": "state"} | {
+            f"sensors.{name}_noise": 0.0 for name in ("position", "velocity")
+        }
+    if options.config is None and given.get("steps", 0) > _LONG:
+        given.setdefault("record_every", _THIN)
+
+
+def _planner(name: str, base: Experiment) -> Any:
+    """Options of a planner by its name; of the same one as before those that it had."""
+    if name not in PLANNERS:
+        if ":" not in name:
+            raise ParameterError(
+                f"--planner is {name!r}: give {', '.join(PLANNERS)} or module:Class"
+            )
+        return OwnPlanner(name)
+    if getattr(base.planner, "kind", None) == name:
+        return base.planner
+    return FREE_PLANNER if base.free and name == LqrOptions.kind else PLANNERS[name]()

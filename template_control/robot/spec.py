@@ -1,0 +1,84 @@
+"""Which robot, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Positive
+from template_control.errors import ParameterError
+from template_control.robot.biped import Biped
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.library import ROBOTS, load_floating_robot, load_robot
+from template_control.robot.planar_biped import PlanarBiped
+
+
+@dataclass(frozen=True)
+class RobotSpec(Checked):
+    """Which robot; what a URDF of one's own may need is as in :meth:`PlanarBiped.from_urdf`.
+
+    Attributes:
+        model: a shipped robot, or the path of a URDF.
+        feet: its foot links; None: left_foot and right_foot.
+        sagittal_joints: of a 3D URDF, hips and knees.
+        foot_radius: of the spheres put into the feet of a 3D URDF [m].
+        foot_offset: of their centres from the foot links' origins, in the links' axes [m].
+        locked: angle of each locked joint of a 3D URDF [rad]; in its plane a robot's other joints
+            are locked at 0.
+        lossless: whether damping and friction of a URDF's joints are left out.
+        free: whether nothing holds the robot; its URDF is a 3D one, and all joints that are not
+            locked move.
+        gravity: that its model and its template have [m/s^2]; None: 9.81.
+        masses: of links by name, instead of the URDF's [kg]; their inertias grow alike.
+    """
+
+    model: str = "five-link"
+    feet: tuple[str, str] | None = None
+    sagittal_joints: tuple[str, ...] = ()
+    foot_radius: float | None = None
+    locked: Mapping[str, float] = field(default_factory=dict)
+    free: bool = False
+    lossless: bool = False
+    foot_offset: tuple[float, float, float] | None = None
+    gravity: Positive | None = None
+    masses: Mapping[str, Positive] = field(default_factory=dict)
+
+    def load(self) -> Biped:
+        """The robot.
+
+        Raises:
+            RobotError: if there is none, it is no such biped, or it lacks a link that has a mass.
+            ParameterError: if a shipped robot comes with what only a URDF needs.
+        """
+        robot = self._load()
+        if self.gravity is None and not self.masses:
+            return robot
+        return robot.changed(self.gravity, self.masses)
+
+    def _load(self) -> Biped:
+        """The robot as its URDF has it.
+
+        Raises:
+            RobotError: if there is none, or it is no such biped.
+            ParameterError: if a shipped robot comes with what only a URDF needs.
+        """
+        own = {
+            "feet": self.feet,
+            "sagittal_joints": self.sagittal_joints,
+            "foot_radius": self.foot_radius,
+            "foot_offset": self.foot_offset,
+            "locked": self.locked,
+            "lossless": self.lossless,
+        }
+        given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
+        if not given:
+            return load_floating_robot(self.model) if self.free else load_robot(self.model)
+        if self.model in ROBOTS:
+            names = ", ".join(name.replace("_", " ") for name in given)
+            raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")
+        if self.free:
+            if self.sagittal_joints:
+                raise ParameterError("sagittal joints hold a robot in its plane: leave them out")
+            return FloatingBaseBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
+        return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
