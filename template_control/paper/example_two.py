@@ -31,7 +31,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.sweep.executor import workers
 from template_control.view.figures import stick_diagram
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, shade
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, Look, shade
 
 Array = NDArray[np.float64]
 
@@ -345,7 +345,7 @@ def fig12() -> Reproduction:
     with workers() as pool:
         walks = dict(zip(cases, pool.map(_walk, cases), strict=True))
     _, record = robot_walk("LQR", "PyBullet", steps=6)
-    sticks = stick_diagram(beginning(record, 2.2))
+    sticks = stick_diagram(beginning(record, 2.2), Look(titled=False))
     sticks.axes[0].set_title("five-link from z_0: LQR, PyBullet")
     gait = _gait()
     target = sections(gait, gait.vlo[None])[0]

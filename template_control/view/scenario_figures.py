@@ -10,87 +10,79 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
+from template_control.checks.ranges import Count
 from template_control.run.record import Record
 from template_control.run.summary import STANDING
-from template_control.slip.automaton.vocabulary import Slot, StrideKind
+from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.scenario.run import ScenarioRecord
+from template_control.view.figures import Format, figure_style
 from template_control.view.state_figures import template_energies
 from template_control.view.style import (
     COM,
+    DPI,
     LEFT,
     RIGHT,
     TEMPLATE,
+    TRANSITIONS,
     TRUNK,
+    Look,
     as_text,
+    finish,
+    mark_limits,
+    mark_transitions,
     save_figure,
     shade,
 )
 
 Array = NDArray[np.float64]
 
-_REAR, _FRONT, _COM, _GUIDE = "#2a6196", "#db7321", "#3a9a4a", "#6b7078"
+_LOOK = Look()
+_WHOLE = slice(None)
+ROUTE_FIGURES = ("scenario", "transitions")
+"""What a way through a scenario has in addition, by file name."""
 _AROUND = 1.2  # [s] shown on either side of a transition
-
-
-def _shade(axes: Axes, record: ScenarioRecord, horizontal: Array) -> None:
-    """Grey over single stance."""
-    single = np.array([name == "SS" for name in record.metadata["phases"]])[record.node]
-    axes.fill_between(
-        horizontal,
-        0.0,
-        1.0,
-        where=single.tolist(),
-        transform=axes.get_xaxis_transform(),
-        color="0.92",
-        linewidth=0,
-        zorder=0,
-    )
-    axes.margins(x=0)
 
 
 def _path(axes: Axes, record: ScenarioRecord) -> None:
     x = record.state[:, 0]
-    _shade(axes, record, x)
-    axes.plot(x, record.state[:, 1], color=_COM, linewidth=1.2, label="CoM")
+    shade(axes, record, _WHOLE, x)
+    axes.plot(x, record.state[:, 1], color=COM, linewidth=1.2, label="CoM")
+    _mark_footholds(axes, record.foothold[:, 1])
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+
+
+def _mark_footholds(axes: Axes, x: Array) -> None:
+    """Footholds along the lower edge of a panel over x [m]."""
     axes.plot(
-        record.foothold[:, 1],
-        np.zeros(len(record.foothold)),
-        "^",
-        color=_GUIDE,
-        markersize=4,
-        label="footholds",
-        clip_on=False,
-    )
-    axes.set(xlabel="x [m]", ylabel="y [m]", ylim=(0.0, 1.15))
-    axes.legend(loc="center right", ncols=2)
+        x, np.zeros(len(x)), "^", color=TRUNK, markersize=4, label="footholds", clip_on=False,
+        transform=axes.get_xaxis_transform(),
+    )  # fmt: skip
 
 
 def _controls(stiffness: Axes, angle: Axes, record: ScenarioRecord) -> None:
     loaded = np.where(record.stiffness > 0.0, record.stiffness / 1e3, np.nan)
-    for leg, (name, color) in enumerate((("rear", _REAR), ("front", _FRONT))):
-        stiffness.plot(record.time, loaded[:, leg], color=color, linewidth=1.0, label=name)
+    for leg, (name, color) in enumerate((("rear", LEFT), ("front", RIGHT))):
+        stiffness.plot(record.time, loaded[:, leg], color=color, linewidth=1.0, label=f"{name} leg")
     stiffness.set_ylabel("leg stiffness\n[kN/m]")
-    stiffness.legend(loc="upper right", ncols=2)
     degrees = np.degrees(record.controls[:, Slot.TOUCHDOWN_ANGLE])
-    angle.step(record.section_time[:-1], degrees, where="post", color=_REAR, linewidth=1.0)
+    angle.step(record.section_time[:-1], degrees, where="post", color=LEFT, linewidth=1.0)
     angle.set_ylabel("touchdown\nangle [deg]")
     for axes in (stiffness, angle):
-        _shade(axes, record, record.time)
+        shade(axes, record, _WHOLE)
 
 
 def _speed(axes: Axes, record: ScenarioRecord) -> None:
-    _shade(axes, record, record.time)
-    axes.plot(record.time, record.state[:, 2], color=_COM, linewidth=1.0, label="CoM")
+    shade(axes, record, _WHOLE)
+    axes.plot(record.time, record.state[:, 2], color=COM, linewidth=1.0, label="CoM")
     axes.plot(
         record.section_time[1:],
         record.wanted_speed,
         "--",
-        color=_GUIDE,
+        color=TRUNK,
         linewidth=1.0,
         label="wanted at the next section",
     )
     axes.set(xlabel="time [s]", ylabel="dx/dt [m/s]")
-    axes.legend(loc="upper right")
 
 
 def scenario_figure(record: ScenarioRecord) -> Figure:
@@ -103,41 +95,42 @@ def scenario_figure(record: ScenarioRecord) -> Figure:
     _controls(stiffness, angle, record)
     _speed(speed, record)
     name, map_name = as_text(record.metadata["name"]), record.metadata["map"]
-    path.set_title(f"{name}, controllers on the {map_name} map")
-    return figure
+    title = f"{name}, controllers on the {map_name} map"
+    return finish(figure, (path, stiffness, angle, speed), title, _LOOK)
 
 
 def energy_figure(record: ScenarioRecord) -> Figure:
     """Energies around each transition (Fig. 10c, d)."""
-    transitions = [
-        i
-        for i, kind in enumerate(record.strides)
-        if kind in (StrideKind.WALK_TO_RUN, StrideKind.RUN_TO_WALK)
-    ]
-    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-    panels = np.atleast_1d(figure.subplots(1, max(len(transitions), 1), squeeze=True))
     energies = record.energies()
-    for axes, i in zip(panels, transitions, strict=False):
-        begin, end = record.section_time[i : i + 2]
+    named = {
+        "forward kinetic": energies["forward"],
+        "gravitational": energies["gravity"],
+        "template's total": energies["total"],
+    }
+    return _around_transitions(record, named, as_text(record.metadata["name"]), _LOOK)
+
+
+def _around_transitions(
+    record: Record | ScenarioRecord, energies: dict[str, Array], title: str, look: Look
+) -> Figure:
+    """Energies (T,) around each transition, by name, less their first values.
+
+    Offsets do not matter here; what matters is whether the curves move together.
+    """
+    spans = _transitions(record)
+    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+    panels = figure.subplots(1, max(len(spans), 1), squeeze=False)[0]
+    for axes, span in zip(panels, spans, strict=False):
+        begin, end, name = span
         w = (record.time > begin - _AROUND) & (record.time < end + _AROUND)
-        _shade(axes, record, record.time)
-        # Offsets do not matter here; what matters is whether the curves move together.
-        for name, label, color in (
-            ("forward", "forward kinetic", _REAR),
-            ("gravity", "gravitational", _FRONT),
-            ("total", "total", _GUIDE),
-        ):
-            e = energies[name][w]
-            axes.plot(record.time[w], e - e[0], color=color, linewidth=1.1, label=label)
-        axes.axvspan(begin, end, color=_COM, alpha=0.12, linewidth=0)
-        axes.set(
-            xlabel="time [s]",
-            ylabel="energy less its first value [J]",
-            xlim=(record.time[w][0], record.time[w][-1]),
-            title="walk to run" if record.strides[i] == StrideKind.WALK_TO_RUN else "run to walk",
-        )
-        axes.legend(loc="best")
-    return figure
+        shade(axes, record, _WHOLE)
+        for (label, energy), color in zip(energies.items(), (LEFT, RIGHT, TEMPLATE), strict=True):
+            axes.plot(record.time[w], energy[w] - energy[w][0], color=color, label=label)
+        mark_transitions(axes, [span])
+        axes.set(xlabel="time [s]", xlim=(record.time[w][0], record.time[w][-1]))
+        axes.set_title(name, fontsize=9)
+    panels[0].set_ylabel("energy less its first value [J]")
+    return finish(figure, panels, f"{title}: energies at transitions", look)
 
 
 @checked
@@ -155,16 +148,9 @@ def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Pa
         RecordError: if a file cannot be written.
     """
     figures = {"scenario": scenario_figure(record)}
-    if {StrideKind.WALK_TO_RUN, StrideKind.RUN_TO_WALK} & set(record.strides):
+    if _transitions(record):
         figures["energies"] = energy_figure(record)
     return [save_figure(figure, Path(folder) / f"{name}.png") for name, figure in figures.items()]
-
-
-_WHOLE = slice(None)
-_TRANSITIONS: dict[str, str] = {
-    StrideKind.WALK_TO_RUN: "walk to run",
-    StrideKind.RUN_TO_WALK: "run to walk",
-}
 
 
 def _footholds(record: Record) -> Array:
@@ -201,18 +187,21 @@ def _template_begins(record: Record) -> tuple[float, float]:
     return begin, float(np.interp(begin, record.time, record.com[:, 0]))
 
 
-def route_figure(record: Record, template: ScenarioRecord) -> Figure:
-    """Speed, path of the CoM with footholds, leg stiffnesses and torques, single stance shaded.
+def route_figure(record: Record, template: ScenarioRecord, look: Look = _LOOK) -> Figure:
+    """Speed, path of the CoM with footholds, leg stiffnesses and torques.
 
     Where the robot stands first, the template begins when the robot has walked off.
 
     Args:
         record: the robot's run.
         template: the same scenario on the robot's template.
+        look: of the figure.
     """
     figure = Figure(figsize=(9.0, 9.6), layout="constrained")
-    speed, path, stiffness, torque = figure.subplots(4, 1)
+    panels = speed, path, stiffness, torque = figure.subplots(4, 1)
     begin, where = _template_begins(record)
+    w = look.rows(record)
+    shown = begin + template.time <= record.time[w][-1]
     speed.plot(record.time, record.com_velocity[:, 0], color=COM, linewidth=1.0, label="robot")
     speed.plot(
         begin + template.time, template.state[:, 2], "--", color=TEMPLATE, linewidth=0.8,
@@ -228,15 +217,15 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
             linewidth=1.2, label="accepted",
         )  # fmt: skip
     speed.set_ylabel("dx/dt [m/s]")
-    path.plot(*record.com.T, color=COM, linewidth=1.0, label="robot's CoM")
+    path.plot(*record.com[w].T, color=COM, linewidth=1.0, label="robot")
     path.plot(
-        where + template.state[:, 0], template.state[:, 1], "--", color=TEMPLATE, linewidth=0.8,
-        label="the template alone",
+        where + template.state[shown, 0], template.state[shown, 1], "--", color=TEMPLATE,
+        linewidth=0.8, label="the template alone",
     )  # fmt: skip
+    first, *_, last = record.com[w, 0].tolist()
     holds = _footholds(record)
-    path.plot(holds, np.zeros(len(holds)), "^", color=TRUNK, markersize=3, label="footholds")
-    path.set(xlabel="x [m]", ylabel="y [m]", ylim=(-0.02, 1.15))
-    path.margins(x=0)
+    _mark_footholds(path, holds[(holds >= first) & (holds <= last)])
+    path.set(xlabel="x [m]", ylabel="CoM y [m]", xlim=(first, last))
     for leg, (name, color) in enumerate((("rear", LEFT), ("front", RIGHT))):
         values = 1e-3 * _stiffnesses(record)[:, leg]
         stiffness.plot(record.time, values, color=color, linewidth=1.0, label=f"{name} leg")
@@ -244,93 +233,82 @@ def route_figure(record: Record, template: ScenarioRecord) -> Figure:
     for joint, name in enumerate(record.joints):
         color = (LEFT, RIGHT, COM, TRUNK)[joint % 4]
         torque.plot(record.time, record.torque[:, joint], color=color, linewidth=0.6, label=name)
-    for limit in set(record.torque_limit):
-        for sign in (-1.0, 1.0):
-            torque.axhline(sign * limit, color="0.4", linestyle=":", linewidth=0.9)
+    mark_limits(torque, [float(limit) for limit in record.torque_limit], "N m")
     torque.set(xlabel="time [s]", ylabel="torque [N m]")
     for axes in (speed, stiffness, torque):
         shade(axes, record, _WHOLE)
-        _mark_transitions(axes, record)
-        axes.set_xlim(0.0, max(record.time[-1], begin + template.time[-1]))
-    path.legend(loc="center right", fontsize=7, ncols=3)
-    for axes in (speed, stiffness, torque):
-        axes.legend(loc="upper right", fontsize=7, ncols=2)
-    name = as_text(record.robot_name)
-    speed.set_title(f"{name} through its scenario (single stance shaded)")
-    return figure
+        mark_transitions(axes, _transitions(record))
+        axes.set_xlim(record.time[w][0], record.time[w][-1])
+    return finish(figure, panels, f"{as_text(record.robot_name)} through its scenario", look)
 
 
-def _mark_transitions(axes: Axes, record: Record) -> None:
-    for begin, end, _ in _transitions(record):
-        axes.axvspan(begin, end, color=COM, alpha=0.15, linewidth=0)
-
-
-def _transitions(record: Record) -> list[tuple[float, float, str]]:
+def _transitions(record: Record | ScenarioRecord) -> list[tuple[float, float, str]]:
     """Begin and end of each transition that was completed [s], and its name."""
-    kinds = record.kinds_of_stride[:-1]
     times = record.section_time
+    kinds = record.kinds_of_stride if isinstance(record, Record) else record.strides
     return [
-        (float(times[i]), float(times[i + 1]), _TRANSITIONS[kind])
-        for i, kind in enumerate(kinds)
-        if kind in _TRANSITIONS
+        (float(times[i]), float(times[i + 1]), TRANSITIONS[kind])
+        for i, kind in enumerate(kinds[: len(times) - 1])
+        if kind in TRANSITIONS
     ]
 
 
-def transition_energies(record: Record) -> Figure:
+def transition_energies(record: Record, look: Look = _LOOK) -> Figure:
     """Energies of the robot's CoM and of the template around each transition (Fig. 10c, d).
 
     Args:
         record: the run; it has one transition at least.
+        look: of the figure.
     """
-    transitions = _transitions(record)
     p = record.template
-    forward = 0.5 * p.mass * record.com_velocity[:, 0] ** 2
-    gravity = p.mass * p.gravity * record.com[:, 1]
-    total = template_energies(record)["total"]
-    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
-    panels = figure.subplots(1, len(transitions), squeeze=False)[0]
-    for axes, (begin, end, name) in zip(panels, transitions, strict=True):
-        w = (record.time > begin - _AROUND) & (record.time < end + _AROUND)
-        shade(axes, record, _WHOLE)
-        for label, energy, color in (
-            ("forward kinetic", forward, LEFT),
-            ("gravitational", gravity, RIGHT),
-            ("template's total", total, TEMPLATE),
-        ):
-            axes.plot(record.time[w], energy[w] - energy[w][0], color=color, label=label)
-        axes.axvspan(begin, end, color=COM, alpha=0.15, linewidth=0)
-        axes.set(xlabel="time [s]", title=name, xlim=(record.time[w][0], record.time[w][-1]))
-    panels[0].set_ylabel("energy less its first value [J]")
-    panels[0].legend(loc="best")
-    return figure
+    named = {
+        "forward kinetic": 0.5 * p.mass * record.com_velocity[:, 0] ** 2,
+        "gravitational": p.mass * p.gravity * record.com[:, 1],
+        "template's total": template_energies(record)["total"],
+    }
+    return _around_transitions(record, named, as_text(record.robot_name), look)
 
 
-def route_figures(record: Record, template: ScenarioRecord) -> dict[str, Figure]:
-    """The figures by name; a run without transitions has none of their energies.
+def route_figures(
+    record: Record, template: ScenarioRecord, look: Look = _LOOK
+) -> dict[str, Figure]:
+    """Figures of a way through a scenario, by name; without transitions there are no energies.
 
     Args:
         record: the robot's run.
         template: the same scenario on the robot's template.
+        look: of the figures.
     """
-    figures = {"scenario": route_figure(record, template)}
+    figures = {"scenario": route_figure(record, template, look)}
     if _transitions(record):
-        figures["transitions"] = transition_energies(record)
+        figures["transitions"] = transition_energies(record, look)
     return figures
 
 
 @checked
-def save_route_figures(record: Record, template: ScenarioRecord, folder: str | Path) -> list[Path]:
-    """Write the :func:`route_figures` as PNG.
+def save_route_figures(
+    record: Record,
+    template: ScenarioRecord,
+    folder: str | Path,
+    dpi: Count = DPI,
+    look: Look | None = None,
+    file_format: Format = "png",
+) -> list[Path]:
+    """Write the :func:`route_figures`.
 
     Args:
         record: the robot's run.
         template: the same scenario on the robot's template.
         folder: where the files go; it must exist.
+        dpi: dots per inch of pictures made of dots.
+        look: part of the run, and whether the titles stand in the figures.
+        file_format: of the files.
 
     Returns:
         The paths of the files.
     """
-    paths = []
-    for name, figure in route_figures(record, template).items():
-        paths.append(save_figure(figure, Path(folder) / f"{name}.png"))
-    return paths
+    with figure_style():
+        return [
+            save_figure(figure, Path(folder) / f"{name}.{file_format}", dpi)
+            for name, figure in route_figures(record, template, look or _LOOK).items()
+        ]

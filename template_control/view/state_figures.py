@@ -12,11 +12,22 @@ from numpy.typing import NDArray
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.maps.section import PADDED, VLO, Section, section_of
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text, shade, window
+from template_control.view.style import (
+    COM,
+    LEFT,
+    RIGHT,
+    TEMPLATE,
+    TRUNK,
+    WINDOW,
+    Look,
+    as_text,
+    finish,
+    shade,
+)
 
 Array = NDArray[np.float64]
 
-_MOST_POINTS = 20_000  # of a line that shows a whole run
+_LOOK = Look()
 
 
 def _sections(record: Record) -> list[Section]:
@@ -36,11 +47,6 @@ def _energies_at(record: Record, sections: list[Section], states: Array) -> Arra
     return np.array([s.energy(p, z[: s.dimension]) for s, z in zip(sections, states, strict=True)])
 
 
-def _whole(record: Record) -> slice:
-    """The whole run, thinned to what a picture can show."""
-    return slice(None, None, 1 + len(record.time) // _MOST_POINTS)
-
-
 def _broken(values: Array, rear: NDArray[np.int64]) -> Array:
     """NaN where the stance foot changes, so that no line joins the two steps."""
     out = values.copy()
@@ -48,11 +54,15 @@ def _broken(values: Array, rear: NDArray[np.int64]) -> Array:
     return out
 
 
-def phase_portrait(record: Record) -> Figure:
+def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
     """y against dy/dt, and x from the rear stance foot against dx/dt, with every section.
 
-    The whole run is pale, its last 2.2 s are strong. The planner's state has its dx/dt from
+    The whole run is pale, what the look shows is strong. The planner's state has its dx/dt from
     the angular momentum about the stance foot.
+
+    Args:
+        record: the run.
+        look: of the figure.
     """
     figure = Figure(figsize=(9.0, 4.4), layout="constrained")
     upright, forward = figure.subplots(1, 2)
@@ -70,11 +80,11 @@ def phase_portrait(record: Record) -> Figure:
             (record.template_com, record.template_velocity, TEMPLATE, "--", "template"),
         ):
             across, up = position[:, axis] - origin, velocity[:, axis]
-            for w, look in (
-                (_whole(record), {"linewidth": 0.6, "alpha": 0.15}),
-                (window(record), {"linewidth": 1.2, "linestyle": style, "label": name}),
+            for w, strength in (
+                (Look().rows(record), {"linewidth": 0.6, "alpha": 0.15}),
+                (look.rows(record, WINDOW), {"linewidth": 1.2, "linestyle": style, "label": name}),
             ):
-                axes.plot(_broken(across[w], record.rear[w]), up[w], color=color, **look)
+                axes.plot(_broken(across[w], record.rear[w]), up[w], color=color, **strength)
         across = record.com[rows, axis] - origin[rows]
         axes.plot(
             across, record.com_velocity[rows, axis], "o", color=RIGHT, markersize=3, zorder=4,
@@ -91,42 +101,39 @@ def phase_portrait(record: Record) -> Figure:
         axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=f"{where} of the gait")
     upright.set(xlabel="y [m]", ylabel="dy/dt [m/s]")
     forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
-    upright.set_title(f"{as_text(record.robot_name)}: phase portrait", loc="left")
-    handles, labels = upright.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
-    return figure
+    for axes in (upright, forward):
+        axes.locator_params(axis="x", nbins=6)
+    title = f"{as_text(record.robot_name)}: phase portrait"
+    return finish(figure, (upright, forward), title, look)
 
 
-def tracking_errors(record: Record) -> Figure:
-    """CoM errors in x and y and the trunk's pitch over the whole run."""
-    figure = Figure(figsize=(9.0, 5.6), layout="constrained")
-    panels = figure.subplots(3, 1, sharex=True)
-    w = _whole(record)
+def tracking_errors(record: Record, look: Look = _LOOK) -> Figure:
+    """CoM errors in x and y, template less robot, over the run.
+
+    Args:
+        record: the run.
+        look: of the figure.
+    """
+    w = look.rows(record)
+    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    panels = figure.subplots(2, 1, sharex=True)
     error = 1e3 * record.com_error
-    pitch = np.degrees(record.q[:, 2])
-    wanted = np.degrees(record.options["embedding"]["trunk_pitch"])
-    for axes, values, reference, name, unit, color in (
-        (panels[0], error[:, 0], 0.0, "x error", "mm", LEFT),
-        (panels[1], error[:, 1], 0.0, "y error", "mm", RIGHT),
-        (panels[2], pitch, wanted, "trunk pitch", "deg", TRUNK),
-    ):
-        axes.axhline(reference, color="0.6", linewidth=0.8)
+    for axes, axis, color in zip(panels, "xy", (LEFT, RIGHT), strict=True):
+        values = error[:, "xy".index(axis)]
+        axes.axhline(0.0, color="0.6", linewidth=0.8)
         axes.plot(record.time[w], values[w], color=color, linewidth=0.8)
-        rms = np.sqrt(np.mean((values - reference) ** 2))
-        axes.set_title(f"RMS error {rms:.3g} {unit}", loc="right", fontsize=8)
-        axes.set_ylabel(f"{name} [{unit}]")
+        rms = np.sqrt(np.mean(values[w.start : w.stop] ** 2))
+        axes.set_title(f"RMS {rms:.3g} mm", loc="right", fontsize=8)
+        axes.set_ylabel(f"{axis}: template\nless robot [mm]")
         axes.margins(x=0)
-        if np.any(record.push):
+        if np.any(record.push[w.start : w.stop]):
+            pushed = record.push[w.start : w.stop] != 0.0
             axes.fill_between(
-                record.time, 0.0, 1.0, where=(record.push != 0.0).tolist(),
+                record.time[w.start : w.stop], 0.0, 1.0, where=pushed.tolist(), label="push",
                 transform=axes.get_xaxis_transform(), color=RIGHT, alpha=0.25, linewidth=0,
             )  # fmt: skip
-    title = f"{as_text(record.robot_name)}: template less robot, and trunk"
-    if np.any(record.push):
-        title += " (pushes shaded)"
-    panels[0].set_title(title)
     panels[-1].set_xlabel("time [s]")
-    return figure
+    return finish(figure, panels, f"{as_text(record.robot_name)}: CoM error", look)
 
 
 def template_energies(record: Record) -> dict[str, Array]:
@@ -165,9 +172,14 @@ def template_energies(record: Record) -> dict[str, Array]:
     }
 
 
-def energies(record: Record) -> Figure:
-    """Energies of the robot's CoM and of the template, single stance shaded."""
-    w = window(record)
+def energies(record: Record, look: Look = _LOOK) -> Figure:
+    """Energies of the robot's CoM and of the template.
+
+    Args:
+        record: the run.
+        look: of the figure.
+    """
+    w = look.rows(record, WINDOW)
     p = record.template
     template = template_energies(record)
     kinetic = 0.5 * p.mass * np.sum(record.com_velocity**2, axis=1)
@@ -195,22 +207,24 @@ def energies(record: Record) -> Figure:
     lower.set(xlabel="time [s]", ylabel="sum [J]")
     for axes in panels:
         shade(axes, record, w)
-    handles, labels = lower.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    panels[0].set_title(f"{as_text(record.robot_name)}: energies (single stance shaded)")
-    return figure
+    return finish(figure, [lower], f"{as_text(record.robot_name)}: energies", look)
 
 
-def section_states(record: Record) -> Figure:
+def section_states(record: Record, look: Look = _LOOK) -> Figure:
     """State and energy at each section against the target's and what the planner expected.
 
-    The energy is E = m v^2 / 2 + m g y, at VLO with k0 (l0 - y)^2 / 2, as in Section IV-D.
+    dx/dt is from the angular momentum where a foot stands. The energy is E = m v^2 / 2 + m g y,
+    at VLO with k0 (l0 - y)^2 / 2, as in Section IV-D.
+
+    Args:
+        record: the run.
+        look: of the figure.
     """
     state, expected = record.section_state, record.section_predicted[:-1]
     # What a stride was to end in is the target of the section where it began.
     target = np.vstack((record.section_target[:1], record.section_target[:-1]))
     sections = _sections(record)
-    steps = np.arange(len(state))
+    steps, p = np.arange(len(state)), record.template
     common: dict[str, Any] = {"linewidth": 0.9, "markersize": 3.5}
     energy = (
         _energies_at(record, sections, state),
@@ -218,10 +232,10 @@ def section_states(record: Record) -> Figure:
         _energies_at(record, sections, target),
     )
     shown = [
-        ((state[:, 0], expected[:, 0], target[:, 0]), 0.005, "dx/dt [m/s]"),
-        ((state[:, 1], expected[:, 1], target[:, 1]), 0.001, "y [m]"),
-        ((state[:, 2], expected[:, 2], target[:, 2]), 0.005, "dy/dt [m/s]"),
-        (energy, 1.0, "energy [J]"),
+        ((state[:, 0], expected[:, 0], target[:, 0]), 0.002 * p.speed_unit, "dx/dt [m/s]"),
+        ((state[:, 1], expected[:, 1], target[:, 1]), 0.001 * p.rest_length, "y [m]"),
+        ((state[:, 2], expected[:, 2], target[:, 2]), 0.002 * p.speed_unit, "dy/dt [m/s]"),
+        (energy, 0.001 * float(energy[2][0]), "energy [J]"),
     ]
     if all(section.dimension < PADDED for section in sections):
         del shown[2]  # zero at every apex
@@ -251,10 +265,14 @@ def section_states(record: Record) -> Figure:
             far, state[far, 0], "s", color=RIGHT, fillstyle="none", markersize=7,
             label="step off the planner's own law",
         )  # fmt: skip
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    title = f"{as_text(record.robot_name)}: at {_where(record)}"
-    panels[0].set_title(f"{title} (dx/dt from the angular momentum where a foot stands)")
-    panels[-1].set(xlabel="step", xlim=(-0.5, len(state) - 0.5))
+    panels[-1].set(xlabel="step", xlim=_steps(record, look))
     panels[-1].xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)
-    return figure
+    title = f"{as_text(record.robot_name)}: at {_where(record)}"
+    return finish(figure, panels, title, look)
+
+
+def _steps(record: Record, look: Look) -> tuple[float, float]:
+    """Least and greatest number of a step to show."""
+    begin, *_, end = record.time[look.rows(record)].tolist()
+    first, last = np.searchsorted(record.section_time, (begin - 1e-9, end + 1e-9)).tolist()
+    return first - 0.5, max(last, first + 1) - 0.5

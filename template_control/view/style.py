@@ -1,33 +1,144 @@
-"""Shared parts of figures: colours, time window, shading of single stance, file."""
+"""Shared parts of figures: colours, windows, shading, legend, marks, file."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from template_control.checks.checked import Checked
+from template_control.errors import ParameterError
 from template_control.run.record import Record
-from template_control.slip.automaton.vocabulary import Phase
+from template_control.slip.automaton.vocabulary import Phase, StrideKind
+from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import atomic_path
 
+Array = NDArray[np.float64]
+
 LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
+SIDES = (LEFT, RIGHT)
+"""Of the left and of the right foot, and of the rear and of the front leg."""
 WINDOW = 2.2  # [s], about four steps
+TRANSITIONS: dict[str, str] = {
+    StrideKind.WALK_TO_RUN: "walk to run",
+    StrideKind.RUN_TO_WALK: "run to walk",
+}
+"""Strides from gait to gait, in words."""
+_SINGLE, _TRANSITION = "single stance", "transition"
+_GREY, _GREEN = "0.92", 0.15  # of the shading; the green's share of COM
+_MOST_POINTS = 20_000  # of a line that shows a whole run
+_ROOMY = 1.6  # of the data: a limit further away would leave the panel empty
+DPI = 110
 
 
-def window(record: Record, seconds: float = WINDOW) -> slice:
-    """Samples of the end of a run.
+def moment(value: float | None, default: float, last: float) -> float:
+    """Time that a user gives [s].
+
+    Args:
+        value: from the run's beginning, negative from its end; None: ``default``.
+        default: [s].
+        last: end of the run [s].
+
+    Raises:
+        ParameterError: if it is not finite.
+    """
+    if value is None:
+        return default
+    if not math.isfinite(value):
+        raise ParameterError(f"start and end are seconds of the run: {value} is none")
+    return max(last + value, 0.0) if value < 0.0 else value
+
+
+def interval(
+    record: Record, start: float | None, end: float | None, default: tuple[float, float]
+) -> tuple[float, float]:
+    """Part of a run that a user asks for [s].
 
     Args:
         record: the run.
-        seconds: how much of its end [s].
+        start, end: of the part [s], negative from the run's end; None: the default's.
+        default: begin and end [s].
 
-    Returns:
-        A slice of the record's samples.
+    Raises:
+        ParameterError: if nothing lies between them.
     """
-    return slice(int(np.searchsorted(record.time, record.time[-1] - seconds)), None)
+    first, last = float(record.time[0]), float(record.time[-1])
+    begin, stop = moment(start, default[0], last), moment(end, default[1], last)
+    if not (first <= begin < stop):
+        raise ParameterError(
+            f"nothing lies between start {begin:g} s and end {stop:g} s: the run goes from"
+            f" {first:g} to {last:g} s"
+        )
+    return begin, min(stop, last)
+
+
+@dataclass(frozen=True)
+class Look(Checked):
+    """How figures of a run are drawn.
+
+    Attributes:
+        start, end: part of the run [s], negative from its end; None: what each figure shows by
+            itself.
+        titled: whether the title stands in the figure.
+    """
+
+    start: float | None = None
+    end: float | None = None
+    titled: bool = True
+
+    def rows(self, record: Record, seconds: float | None = None) -> slice:
+        """Samples to show.
+
+        Args:
+            record: the run.
+            seconds: of the part that shows what the run is about; None: the whole run.
+        """
+        last = float(record.time[-1])
+        whole = float(record.time[0]), last
+        asked = self.start is not None or self.end is not None
+        default = whole if asked or seconds is None else telling(record, seconds)
+        begin, stop = interval(record, self.start, self.end, default)
+        first, after = np.searchsorted(record.time, (begin, stop + 1e-9)).tolist()
+        first = min(first, max(after - 2, 0))
+        return slice(first, after, 1 + (after - first) // _MOST_POINTS)
+
+
+def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:
+    """Part of a run that shows what it is about [s].
+
+    That is a fall, the first push, the first change of the stride's kind, or the first uneven
+    ground; else the end.
+
+    Args:
+        record: the run.
+        seconds: its length [s].
+    """
+    time, last = record.time, float(record.time[-1])
+    pushed = np.flatnonzero(record.push)
+    kinds = record.kinds_of_stride
+    changes = [i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]]
+    heights = [record.ground.height_at(float(x)) for x in record.com[::50, 0]]
+    uneven = np.flatnonzero(np.diff(heights))
+    if record.fell:
+        middle = last
+    elif len(pushed):
+        middle = float(time[pushed[0]]) + 0.3 * seconds
+    elif changes:
+        middle = float(record.section_time[changes[0]])
+    elif len(uneven):
+        middle = float(time[::50][uneven[0]])
+    else:
+        middle = last
+    begin = min(max(middle - 0.5 * seconds, float(time[0])), max(last - seconds, float(time[0])))
+    return begin, min(begin + seconds, last)
 
 
 def as_text(name: str) -> str:
@@ -35,33 +146,112 @@ def as_text(name: str) -> str:
     return " ".join(name.split()).replace("$", r"\$")
 
 
-def single_stance(record: Record) -> NDArray[np.bool_]:
-    """(T,) whether the robot's controller was in single stance."""
-    return record.in_phase(Phase.SS)
-
-
-def shade(axes: Axes, record: Record, w: slice) -> None:
+def shade(
+    axes: Axes, record: Record | ScenarioRecord, w: slice, horizontal: Array | None = None
+) -> None:
     """Shade single stance in grey, as in Fig. 13.
 
     Args:
-        axes: a panel over time [s].
+        axes: a panel.
         record: the run.
-        w: the samples that the panel shows, from :func:`window`.
+        w: the samples that the panel shows.
+        horizontal: (T,) what it has on its abscissa; None: time [s].
     """
+    single = np.array([name == Phase.SS.name for name in record.metadata["phases"]])[record.node]
     axes.fill_between(
-        record.time[w],
-        0.0,
-        1.0,
-        where=single_stance(record)[w].tolist(),
-        transform=axes.get_xaxis_transform(),
-        color="0.92",
-        linewidth=0,
-        zorder=0,
-    )
+        (record.time if horizontal is None else horizontal)[w], 0.0, 1.0,
+        where=single[w].tolist(), transform=axes.get_xaxis_transform(), color=_GREY, linewidth=0,
+        zorder=0, label=_SINGLE,
+    )  # fmt: skip
     axes.margins(x=0)
 
 
-DPI = 110
+def mark_transitions(axes: Axes, spans: Iterable[tuple[float, float, str]]) -> None:
+    """Shade strides from gait to gait in green.
+
+    Args:
+        axes: a panel over time [s].
+        spans: begin and end of each [s], and its name.
+    """
+    for begin, end, _ in spans:
+        axes.axvspan(begin, end, color=COM, alpha=_GREEN, linewidth=0, label=_TRANSITION)
+
+
+def mark_limits(axes: Axes, limits: Sequence[float], unit: str) -> None:
+    """Dotted lines at ± each limit; a limit far beyond the data is written instead.
+
+    Args:
+        axes: a panel that shows its data.
+        limits: [unit].
+        unit: for the text.
+    """
+    largest = max((np.nanmax(np.abs(line.get_ydata())) for line in axes.lines), default=0.0)
+    near = sorted({limit for limit in limits if limit <= _ROOMY * largest})
+    far = sorted({limit for limit in limits if limit > _ROOMY * largest})
+    for limit in near:
+        for sign in (-1.0, 1.0):
+            axes.axhline(sign * limit, color="0.4", linestyle=":", linewidth=0.9, label="limit")
+    if far:
+        text = "limit ±" + ", ±".join(f"{limit:.4g}" for limit in far)
+        axes.set_title(f"{text} {unit}, outside", loc="right", fontsize=8)
+
+
+def mark_peaks(axes: Axes, time: Array, values: Array, color: str) -> None:
+    """Mark what sticks out of a panel, such as impacts, with its size.
+
+    Args:
+        axes: a panel over time [s], whose limits are set.
+        time: (n,) [s].
+        values: (n,) [N].
+        color: of the marks.
+    """
+    low, high = axes.get_ylim()
+    out = (values > high) | (values < low)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], out.astype(np.int8), [0]))))
+    shown = -np.inf
+    for first, after in edges.reshape(-1, 2):
+        peak = first + int(np.argmax(np.abs(values[first:after])))
+        up = values[peak] > high
+        if time[peak] - shown < 0.02 * (time[-1] - time[0]):
+            continue  # the same impact rattles
+        shown = time[peak]
+        place = high if up else low
+        axes.plot(
+            time[peak], place, "^" if up else "v", color=color, markersize=4, clip_on=False,
+            label="impact [kN]",
+        )  # fmt: skip
+        axes.annotate(
+            f"{1e-3 * values[peak]:.1f}", (time[peak], place), (2, -3 if up else 3),
+            textcoords="offset points", fontsize=6, color=color, va="top" if up else "bottom",
+        )  # fmt: skip
+
+
+def finish(figure: Figure, panels: Iterable[Axes], title: str, look: Look) -> Figure:
+    """Give a figure one legend, outside of its panels, and its title.
+
+    Args:
+        figure: with its panels.
+        panels: whose lines are explained, each name once.
+        title: of the figure.
+        look: whether it has one.
+    """
+    found: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    for name, color, alpha in ((_SINGLE, _GREY, None), (_TRANSITION, COM, _GREEN)):
+        if name in found:  # last, and as a patch
+            del found[name]
+            found[name] = Patch(facecolor=color, alpha=alpha, edgecolor="0.7", linewidth=0.4)
+    if found:
+        columns = min(len(found), 6)
+        figure.legend(
+            list(found.values()), list(found), loc="outside lower center", ncols=columns,
+            frameon=False, fontsize=8,
+        )  # fmt: skip
+    if look.titled:
+        figure.suptitle(title, fontsize=10)
+    return figure
 
 
 def save_figure(figure: Figure, path: str | Path, dpi: int = DPI) -> Path:

@@ -205,8 +205,11 @@ def test_figures_of_a_run_are_not_empty(record, tmp_path):
 
 def test_the_figures_show_limits_apexes_and_the_trunk(record):
     speeds = record.plot("joint_speeds")
-    levels = {float(line.get_ydata()[0]) for axes in speeds.axes for line in axes.lines}
-    assert {20.0, -20.0} <= levels
+    for axes, leg in zip(speeds.axes, record.legs, strict=True):
+        levels = {float(line.get_ydata()[0]) for line in axes.lines}
+        near = np.abs(record.v[:, 3:][:, list(leg)]).max() > 20.0 / 1.6
+        assert near == ({20.0, -20.0} <= levels)
+        assert near == (axes.get_title("right") != "limit ±20 rad/s, outside")
     speed, height = record.plot("apex_return").axes[:2]
     for axes, column in ((speed, 0), (height, 1)):
         (points,) = axes.collections

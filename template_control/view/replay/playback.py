@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -13,6 +12,7 @@ from template_control.checks.fitting import check
 from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
 from template_control.run.record import Record
+from template_control.view.style import interval
 
 Array = NDArray[np.float64]
 
@@ -81,14 +81,8 @@ def playback(
     check("speed", speed, Annotated[float, SPEEDS])
     check("fps", fps, Annotated[float, FRAME_RATES])
     record.check_shown()
-    first, last = float(record.time[0]), float(record.time[-1])
-    begin, stop = _moment(start, first, last), _moment(end, last, last)
-    if not (first <= begin < stop):
-        raise ParameterError(
-            f"nothing lies between start {begin:g} s and end {stop:g} s: the run goes from"
-            f" {first:g} to {last:g} s"
-        )
-    stop = min(stop, last)
+    whole = float(record.time[0]), float(record.time[-1])
+    begin, stop = interval(record, start, end, whole)
     duration = (stop - begin) / speed
     if duration * fps > _MOST_FRAMES:
         raise ParameterError(
@@ -102,22 +96,9 @@ def playback(
     return Playback(record, np.searchsorted(middles, moments), clock)
 
 
-def _moment(value: float | None, default: float, last: float) -> float:
-    if value is None:
-        return default
-    if not math.isfinite(value):
-        raise ParameterError(f"start and end are seconds of the run: {value} is none")
-    return max(last + value, 0.0) if value < 0.0 else value
-
-
-def weight(record: Record) -> float:
-    """The controlled robot's weight [N]."""
-    return record.weight
-
-
 def carrying(record: Record) -> NDArray[np.bool_]:
     """(T, 2) whether the ground carries the left and the right foot."""
-    return np.asarray(record.contact_force[:, :, 1] > _CARRYING * weight(record))
+    return np.asarray(record.contact_force[:, :, 1] > _CARRYING * record.weight)
 
 
 def template_legs(record: Record) -> tuple[Array, NDArray[np.bool_]]:
@@ -131,7 +112,7 @@ def template_legs(record: Record) -> tuple[Array, NDArray[np.bool_]]:
     toes = np.stack(
         (record.foot[samples, record.rear], record.foot[samples, 1 - record.rear]), axis=1
     )
-    return toes, np.linalg.norm(record.template_force, axis=2) > _CARRYING * weight(record)
+    return toes, np.linalg.norm(record.template_force, axis=2) > _CARRYING * record.weight
 
 
 def spring(radius: float) -> Array:
@@ -173,7 +154,7 @@ def arrows_of(force: Array, record: Record) -> Array:
         force: (..., 2) or (..., 3) [N].
         record: the run.
     """
-    arrow = force / weight(record)
+    arrow = force / record.weight
     size = np.linalg.norm(arrow, axis=-1, keepdims=True)
     arrow = arrow * np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))
     return np.asarray(0.4 * record.template.rest_length * arrow)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Range
 from template_control.run.record import Record
+from template_control.storage import write_text
 from template_control.view.replay.film import write_film
-from template_control.view.replay.playback import playback
+from template_control.view.replay.playback import Playback, playback
 
 if TYPE_CHECKING:
     from template_control.view.replay.viewer import ReplayServer
@@ -50,11 +51,20 @@ def replay(
         ParameterError: if a number is out of its range.
         RecordError: if the run or its robot cannot be shown, or the server does not start.
     """
-    from template_control.view.replay.scene import scene_commands
     from template_control.view.replay.viewer import ReplayServer
 
     frames = playback(record, fps=fps, speed=speed, start=start, end=end)
-    return ReplayServer(scene_commands(frames), port)
+    return ReplayServer(_page(frames), port)
+
+
+def _page(frames: Playback) -> str:
+    """Page of a replay, with its legend."""
+    from template_control.view.replay.scene import scene_commands
+    from template_control.view.replay.viewer import page_of
+
+    record = frames.record
+    title = f"{record.robot_name}, gait {record.gait_name}, {record.steps} steps"
+    return page_of(title + ", fell" if record.fell else title, scene_commands(frames))
 
 
 @checked
@@ -76,14 +86,8 @@ def save_html(
         ParameterError: if a number is out of its range.
         RecordError: if the run cannot be shown, or the file not be written.
     """
-    from template_control.view.replay.scene import scene_commands
-    from template_control.view.replay.viewer import write_page
-
-    frames = playback(record, fps=fps, speed=speed, start=start, end=end)
-    title = f"{record.robot_name}, gait {record.gait_name}, {record.steps} steps"
-    if record.fell:
-        title += ", fell"
-    return write_page(Path(path), title, scene_commands(frames))
+    page = _page(playback(record, fps=fps, speed=speed, start=start, end=end))
+    return write_text(path, page)
 
 
 @checked

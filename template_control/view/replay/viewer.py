@@ -1,26 +1,24 @@
-"""Viewers of a replay's scene: meshcat's server, and one page without server or network."""
+"""Viewers of a replay's scene: one page without network, as a file or served to the browser."""
 
 from __future__ import annotations
 
-import atexit
 import base64
 import contextlib
 import html
 import os
-import sys
 import time
 import webbrowser
+from collections.abc import Sequence
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from string import Template
-from subprocess import PIPE, Popen
+from threading import Thread
 from typing import Any
 
 import meshcat
 import umsgpack
-import zmq
 
 from template_control.errors import RecordError
-from template_control.storage import atomic_path
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
@@ -74,47 +72,30 @@ _LEGEND = (
 )
 
 
-def write_page(path: Path, title: str, commands: list[Any]) -> Path:
-    """Write meshcat's viewer with the commands of a scene into one HTML file.
+def page_of(title: str, commands: list[Any]) -> str:
+    """Meshcat's viewer with the commands of a scene as one HTML page.
 
     Args:
-        path: of the file.
         title: of the page.
         commands: as :func:`~template_control.view.replay.scene.scene_commands` makes them.
-
-    Raises:
-        RecordError: if the file cannot be written.
     """
     packed = (base64.b64encode(umsgpack.packb(c.lower())).decode() for c in commands)
-    page = _PAGE.substitute(
+    return _PAGE.substitute(
         title=html.escape(title),
         legend="<br>".join(f'<b style="color: {c}">&#9632;</b> {text}' for c, text in _LEGEND),
         viewer=_VIEWER.read_text(encoding="utf-8"),
         commands=",\n".join(f'"{text}"' for text in packed),
     )
-    with atomic_path(path) as place:
-        place.write_text(page, encoding="utf-8")
-    return path
 
 
-# meshcat's own main program has no option for the port.
-_SERVER = """
-import sys
-from meshcat.servers.zmqserver import ZMQWebSocketBridge
-try:
-    bridge = ZMQWebSocketBridge(port=int(sys.argv[1]) if sys.argv[1:] else None)
-except OSError as error:
-    sys.exit(error.strerror)
-print(bridge.zmq_url, bridge.web_url, flush=True)
-bridge.run()
-"""
+_PORTS = range(7000, 7100)
 
 
 class ReplayServer:
-    """A running server; ends with :meth:`close`, the ``with`` block, or the process.
+    """A running server of a replay's page; ends with :meth:`close` or the ``with`` block.
 
     Args:
-        commands: as :func:`~template_control.view.replay.scene.scene_commands` makes them.
+        page: HTML text.
         port: of the server; None for the first free one from 7000 up.
 
     Attributes:
@@ -124,29 +105,23 @@ class ReplayServer:
         RecordError: if the server does not start.
     """
 
-    def __init__(self, commands: list[Any], port: int | None = None) -> None:
-        words = [sys.executable, "-c", _SERVER, *([] if port is None else [str(port)])]
-        # In a session of its own: Ctrl-C in the terminal is for us alone.
-        self._process = Popen(words, stdout=PIPE, stderr=PIPE, text=True, start_new_session=True)
-        atexit.register(self.close)
-        assert self._process.stdout is not None
-        queue, _, self.url = self._process.stdout.readline().strip().partition(" ")
-        if not self.url:
-            _, why = self._process.communicate()
-            self.close()
-            where = "" if port is None else f" on port {port}"
-            reason = (why.strip().splitlines() or ["no reason given"])[-1]
-            raise RecordError(
-                f"the replay's server does not start{where} ({reason}): give another --port, or"
-                " write a page with --html"
-            )
-        with zmq.Context() as context, context.socket(zmq.REQ) as socket:
-            socket.connect(queue)
-            for command in commands:
-                lowered = command.lower()
-                head = [lowered["type"].encode(), lowered["path"].encode()]
-                socket.send_multipart([*head, umsgpack.packb(lowered)])
-                socket.recv()
+    def __init__(self, page: str, port: int | None = None) -> None:
+        text = page.encode()
+
+        class Answer(BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                self.send_response(200)
+                self.send_header("Content-Type", "text/html; charset=utf-8")
+                self.send_header("Content-Length", str(len(text)))
+                self.end_headers()
+                self.wfile.write(text)
+
+            def log_message(self, *_: object) -> None:
+                """Nothing: the terminal is the user's."""
+
+        self._server = _listening(Answer, _PORTS if port is None else [port])
+        self.url = f"http://127.0.0.1:{self._server.server_port}/"
+        Thread(target=self._server.serve_forever, daemon=True).start()
 
     def open_browser(self) -> bool:
         """Show the replay in the user's browser; False where there is no display."""
@@ -162,12 +137,36 @@ class ReplayServer:
 
     def close(self) -> None:
         """End the server."""
-        atexit.unregister(self.close)
-        self._process.kill()
-        self._process.communicate()
+        self._server.shutdown()
+        self._server.server_close()
 
     def __enter__(self) -> ReplayServer:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _listening(answer: type[BaseHTTPRequestHandler], ports: Sequence[int]) -> ThreadingHTTPServer:
+    """A server on the first free port.
+
+    Raises:
+        RecordError: if none is free.
+    """
+    for port in ports:
+        try:
+            return _Server(("127.0.0.1", port), answer)
+        except OSError as error:
+            reason = error.strerror
+    where = f"port {ports[0]}" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]}"
+    raise RecordError(
+        f"the replay's server does not start on {where} ({reason}): give another --port, or write a"
+        " page with --html"
+    )
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, *_: object) -> None:
+        """Nothing: a browser that goes away while it loads is no error."""

@@ -11,6 +11,7 @@ from template_control.cli.main import main
 from template_control.slip.maps.section import VLO
 from template_control.view.figures import figures_of
 from template_control.view.state_figures import phase_portrait, section_states, template_energies
+from template_control.view.style import Look, telling
 
 
 @pytest.fixture(scope="module")
@@ -74,10 +75,63 @@ def test_the_command_draws_elsewhere(record, tmp_path):
     assert len(list((tmp_path / "new" / "folder").glob("*.png"))) == len(figures_of(record))
 
 
+def test_the_command_draws_what_it_is_asked_for(record, tmp_path, capfd):
+    run = record.save(tmp_path / "run.npz")
+    words = ["--figures", "com,forces", "--format", "pdf", "--start", "0.2", "--end", "-0.3"]
+    assert main(["plots", str(run), *words, "--no-title", "--dpi", "300"]) == 0
+    paths = [tmp_path / name for name in ("com.pdf", "forces.pdf")]
+    assert capfd.readouterr().out.split() == [str(path) for path in paths]
+    assert all(path.read_bytes().startswith(b"%PDF") for path in paths)
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_a_look_chooses_the_part_and_the_title(record):
+    look = Look(0.2, -0.3, titled=False)
+    for name in ("com", "torques", "forces", "tracking", "turning", "energies"):
+        figure = tc.plot(record, name, look)
+        line = max(figure.axes[0].lines, key=lambda line: len(line.get_xdata()))
+        shown = line.get_xdata()[[0, -1]]
+        np.testing.assert_allclose(shown, (0.2, record.time[-1] - 0.3), atol=2e-3)
+        assert figure.get_suptitle() == ""
+    assert "five-link" in tc.plot(record, "com").get_suptitle()
+    with pytest.raises(tc.TemplateControlError, match="nothing lies between start 9 s"):
+        tc.plot(record, "com", Look(9.0))
+
+
+def test_a_figure_has_one_legend_that_explains_all_of_it(record):
+    for name in figures_of(record):
+        figure = tc.plot(record, name)
+        assert len(figure.legends) <= 1
+        assert not any(axes.get_legend() for axes in figure.axes)
+        shaded = any(axes.collections for axes in figure.axes if axes.get_xlabel() == "time [s]")
+        told = {text.get_text() for legend in figure.legends for text in legend.get_texts()}
+        assert not shaded or told & {"single stance", "push"}, name
+
+
+def test_the_telling_part_of_a_run_has_its_push(record):
+    begin, end = telling(record, 0.6)
+    pushed = record.time[record.push != 0.0]
+    assert begin < pushed[0] < pushed[-1] < end
+    still = replace(record, push=np.zeros_like(record.push))
+    assert telling(still, 0.6)[1] == pytest.approx(record.time[-1])
+
+
+def test_an_impact_is_marked_with_its_size(record):
+    force = record.contact_force.copy()
+    hit = len(force) // 2
+    force[hit, 0, 1] = 9876.0
+    hard = replace(record, contact_force=force)
+    figure = tc.plot(hard, "forces", Look(record.time[hit] - 0.2, record.time[hit] + 0.2))
+    assert "9.9" in {text.get_text() for text in figure.axes[0].texts}
+
+
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
         (["missing.npz"], "missing.npz"),
+        (["run.npz", "--figures", "com,none"], "no figure 'none'"),
+        (["run.npz", "--start", "5", "--end", "4"], "nothing lies between start 5 s and end 4 s"),
+        (["run.npz", "--dpi", "3"], "--dpi is 3"),
         (["junk.npz"], "junk.npz"),
         (["run.npz", "--output", "/proc/none"], "/proc/none"),
         (["short.npz"], "fewer than two samples"),

@@ -117,13 +117,17 @@ def test_bad_input_is_one_line(arguments, culprit, run_file, tmp_path, monkeypat
 # Server and browser.
 
 
-def test_the_server_serves_and_ends(record, monkeypatch):
+def test_the_server_serves_the_page_and_ends(record, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with tc.replay(record, end=0.3) as server:
         assert not server.open_browser()
         with urllib.request.urlopen(server.url, timeout=10) as answer:
-            assert b"MeshCat" in answer.read()
+            page = answer.read().decode()
+    file = tc.save_html(record, tmp_path / "page.html", end=0.3).read_text()
+    head = page.index("for (const text of")  # the objects' names are drawn anew
+    assert (page[:head], len(page)) == (file[:head], len(file))
+    assert "left foot: ground force, footholds" in page, "the page's legend"
     with pytest.raises(OSError, match="refused"):
         urllib.request.urlopen(server.url, timeout=10)
 
