@@ -125,7 +125,7 @@ def _time_parts(controller: EmbeddingController, parts: Parts) -> None:
     robot, supervisor = controller.robot, controller.supervisor
     robot.update = _timed(robot.update, parts.update)  # type: ignore[method-assign]
     controller.qp.solve = _timed(controller.qp.solve, parts.quadratic)  # type: ignore[method-assign]
-    for name in ("decide", "replan_after_touchdown", "continue_without_touchdown", "replan"):
+    for name in ("decide", "replan"):
         setattr(supervisor, name, _whole(getattr(supervisor, name), parts.plans))
     for workspace in (*controller.qp._workspaces, *controller.qp._braked):
         workspace.solve = _timed(workspace.solve, parts.solves)  # type: ignore[method-assign]

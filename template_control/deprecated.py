@@ -43,6 +43,7 @@ DEPRECATED = {
     "template_control.run.GaitChoice": "template_control.run:GaitSpec",
     "template_control.run.RobotChoice": "template_control.robot:RobotSpec",
     "template_control.run.RobotSpec": "template_control.robot:RobotSpec",
+    "template_control.slip.CatchOptions": "template_control.embedding:CatchOptions",
     "template_control.whole_body.Wanted": "template_control.whole_body:References",
 }
 """Old name -> new one, as "package:name" of a public package."""

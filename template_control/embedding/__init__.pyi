@@ -31,6 +31,7 @@ from .planners.running import RunningOptions as RunningOptions
 from .planners.running import RunningPlanner as RunningPlanner
 from .planners.transition import TransitionOptions as TransitionOptions
 from .planners.transition import TransitionPlanner as TransitionPlanner
+from .recovery import CatchOptions as CatchOptions
 from .robot_route import robot_route as robot_route
 from .robot_template import default_gait as default_gait
 from .robot_template import paper_gait as paper_gait

@@ -21,8 +21,9 @@ from template_control.embedding.learners.learners import Learners
 from template_control.embedding.leg_forces import unload_cap
 from template_control.embedding.modes import PLACED, Mode, PathClock, RobotGuards, modes
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.planners.planner import Cause, Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
+from template_control.embedding.recovery import NEEDED, Recovery
 from template_control.embedding.state import SectionReport, Snapshot, StateObserver, rolled
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet
@@ -104,7 +105,9 @@ class EmbeddingController:
         self._guards = RobotGuards(self.parameters, o.guards)
         self._modes = modes(automaton, robot.nv, o.phases)
         curved = {name for name, mode in self._modes.items() if mode.control.follow_curve}
-        self.supervisor = StrideSupervisor(route, planners, o.replan, automaton, curved)
+        recovers = o.catches and automaton is AUTOMATON and planners.keys() >= NEEDED
+        recovery = Recovery(self.parameters) if recovers else None
+        self.supervisor = StrideSupervisor(route, planners, o.replan, automaton, curved, recovery)
         self.mode = next(iter(self._modes.values()))
         self._slope_unknown = False  # the ground under feet that both stand where a run begins
         self.qp = WholeBodyQp(robot, o)
@@ -318,7 +321,8 @@ class EmbeddingController:
 
     def _lift(self, foot: int, swung: float = 0.0) -> None:
         """A swing keeps the shape with which it began, whatever the next stride's is."""
-        goal = self.reports[-1].goal if self.reports else self.supervisor.first_goal()
+        supervisor = self.supervisor
+        goal = supervisor.goal if supervisor.deciding else supervisor.first_goal()
         self.feet.swing[foot].options = self.mode.swing or self.swings.towards(goal)
         self.feet.lift(foot, self.robot, swung)
 
@@ -336,9 +340,10 @@ class EmbeddingController:
             self.supervisor.choose_assist(self.node, s)
         if self.mode.control.use_pre_impact_velocity:
             s = replace(s, state=np.concatenate((s.state[:2], self.observer.pre_impact_velocity)))
-        choose = self.mode.control.replan_at_touchdown
-        replan = self.supervisor.replan_after_touchdown
-        self._enter(replan(self.node, s, self.time, higher, choose=choose).name)
+        chooses = self.mode.control.replan_at_touchdown
+        cause = Cause.TOUCHDOWN if chooses else Cause.GROUND_HEIGHT
+        replan = self.supervisor.replan
+        self._enter(replan(cause, self.node, s, self.time, height_error=higher).name)
         self.path_clock.restart()
 
     def _update_slope(self, foot: int) -> bool:
@@ -357,8 +362,8 @@ class EmbeddingController:
 
     def _decide(self, section: Section) -> None:
         s, learners = self.observer.now, self.learners
-        if self.reports:
-            learners.end_stride(section, s.state, self.reports[-1].decision.nominal)
+        if self.supervisor.deciding:
+            learners.end_stride(section, s.state, self.supervisor.decision.nominal)
         self._enter(self.supervisor.decide(section, s, self.time, learners.state).name)
         learners.begin_stride(self.supervisor, self.mode.trimmed)
         self.path_clock.restart()
@@ -366,13 +371,13 @@ class EmbeddingController:
     def _replan(self) -> None:
         """Plan from here where a touchdown is overdue or the robot has left its path."""
         s, supervisor, clock = self.observer.now, self.supervisor, self.path_clock
-        if supervisor.touchdown_overdue(self.node, clock.time):
-            supervisor.continue_without_touchdown(self.node, s, self.time)
-        elif supervisor.deviates(s.state[2] - clock.reference[2], clock.time, self.time):
-            self._enter(supervisor.replan(self.node, s, clock.time, self.time).name)
-            self.learners.lean.aim(self.reports[-1].goal)
-        else:
+        deviation = s.state[2] - clock.reference[2]
+        cause = supervisor.surprise(self.node, deviation, clock.time, self.time)
+        if cause is None:
             return
+        node = supervisor.replan(cause, self.node, s, self.time, phase_time=clock.time)
+        self._enter(node.name)
+        self.learners.lean.aim(supervisor.goal)
         self.path_clock.restart()
 
     # -- references and forces ----
@@ -470,7 +475,7 @@ class SwingController:
                     foothold = observer.now.toes[Leg.REAR] + gait.step_length
                     due = gait.step_duration - feet.swing_time[foot]
                 if mode.control.rolling_contact:
-                    angle = float(supervisor.reports[-1].decision.controls[Slot.TOUCHDOWN_ANGLE])
+                    angle = float(supervisor.decision.controls[Slot.TOUCHDOWN_ANGLE])
                     foothold = rolled(foothold, angle, robot.foot_radius)
                 swing.advance(foothold, due, dt, observer.ground)
             self._references.furthest[foot] = swing.furthest(hip, robot.leg_length)

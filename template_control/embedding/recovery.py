@@ -1,155 +1,193 @@
-"""Recovery: another stride where the present one cannot go on, a step where no curve rests."""
+"""Recovery: what a stride that cannot go on breaks into, and the way back to the walk.
+
+A walk that is too fast runs until it is slow. One that is too slow is carried on in its double
+stance, or comes to a stand there; on one leg it steps back. From a stand it starts again, and a
+stand that is pushed too hard makes a step.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.fitting import asked
-from template_control.embedding.planners.planner import (
-    Cause,
-    Context,
-    Decision,
-    RestContext,
-    decided,
-    rest_decided,
-)
-from template_control.embedding.replanning import free_controls
-from template_control.embedding.rollout import TemplateRollout
-from template_control.embedding.state import SectionReport, TemplateState
-from template_control.slip.automaton.automaton import BREAKS, STEP_OUT
-from template_control.slip.automaton.hybrid import Node
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
-from template_control.slip.dynamics.stride import Stride
-from template_control.slip.maps.section import REST, section_of
-from template_control.slip.scenario.catching import BreakingRoute
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative, Positive
+from template_control.slip.automaton.automaton import AUTOMATON, RUN_ON
+from template_control.slip.automaton.vocabulary import StrideKind
+from template_control.slip.gaits.running_gait import running_speeds, suited_height
+from template_control.slip.maps.section import APEX, REST, Section
+from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal
+from template_control.slip.scenario.scenario import STAND_HEIGHT
+from template_control.slip.similarity import REFERENCE, SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
 
 
-# Stiffnesses over k0 with which a slow walk is tried before the robot comes to a stand.
-_LEGS = (0.4, 0.6, 0.8, 1.1)
+class Exit(NamedTuple):
+    """A way out of a stride.
+
+    Attributes:
+        node: of the automaton, where the robot leaves its stride.
+        stride: kind of the other stride.
+        entry: node where that one goes on.
+    """
+
+    node: str
+    stride: str
+    entry: str
 
 
-def find_recovery(
-    rollout: TemplateRollout,
-    node: Node,
-    report: SectionReport,
-    sensed: TemplateState,
-    *,
-    excess: float,
-    turn: float,
-) -> tuple[Node, SectionReport] | None:
-    """Another stride from here.
+_BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
+_BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
+_BETWEEN_FEET = ("DS_ar^s", "DS_br^ws", "DS_br^sf")
+_STEPS = (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK)
+
+EXITS: tuple[Exit, ...] = (
+    *(Exit(node, StrideKind.WALK_TO_RUN, entry) for node, entry in RUN_ON.items()),
+    *(Exit(node, StrideKind.CHANGE_SPEED, "DS_bl^ww") for node in _BOTH_STAND),
+    *(Exit(node, StrideKind.WALK_TO_STAND, "DS_br^ws") for node in _BOTH_STAND),
+    *(Exit(node, StrideKind.STEP_BACK, "SS_bt^sb") for node in _BEFORE_VLO),
+    *(Exit(node, step, AUTOMATON.starts[step]) for node in _BETWEEN_FEET for step in _STEPS),
+)
+"""All of them. A fast walk runs. The springs of a slow one would throw it back: a curve in time
+carries the CoM while both feet stand, on or to rest; the foot that is up is set down behind again.
+Where both feet stand and the CoM cannot come to rest, a step is made."""
+
+
+def entry(node: str, left: str, stride: str) -> str | None:
+    """Node where a stride goes on from another one; None where it cannot.
 
     Args:
-        rollout: of the present stride.
         node: of the automaton, the robot's.
-        report: of the present stride.
-        sensed: the robot's state.
-        excess: how far off the robot's speed is [m/s].
-        turn: how far the touchdown angle can still be changed [rad].
-
-    Returns:
-        The node that the robot is in then, and the report with the new stride in it; None where
-        the route knows no other stride, or the template does not complete it.
+        left: kind of the stride that is left.
+        stride: kind of the other; the same one goes on where it is.
     """
-    route, automaton = rollout.planners.route, rollout.automaton
-    if not isinstance(route, BreakingRoute):
-        return None
-    for goal in asked(route.instead, report.goal, float(sensed.state[2]), excess):
-        name = node.name
-        if goal.stride != report.goal.stride:
-            name = BREAKS.get(goal.stride, {}).get(name, "")
-        if name not in automaton.index or goal.stride not in rollout.planners.planners:
-            continue
-        end = section_of(automaton.sections(name)[1])
-        if end is REST and _goes_on(rollout, node, report, sensed):
-            continue  # a stand is for a walk that gets no further
-        other = automaton.node(name)
-        decision = _decision(rollout, other, replace(report, goal=goal), sensed, turn)
-        if decision is not None and decision.feasible:
-            target = end.padded(goal.target)
-            asked(route.take, goal)
-            return other, replace(report, goal=goal, target=target, decision=decision)
-    return None
+    if stride == left:
+        return node
+    ways = (way.entry for way in EXITS if way.node == node and way.stride == stride)
+    return next(ways, None)
 
 
-def _goes_on(
-    rollout: TemplateRollout, node: Node, report: SectionReport, sensed: TemplateState
-) -> bool:
-    """Whether the template completes the present stride from here, with these legs or others."""
-    ahead, u = rollout.ahead(node, sensed), report.decision.controls
-    legs = [u]
-    free = free_controls(rollout.automaton, node)
-    for share in _LEGS:
-        other = u.copy()
-        other[free] = share * rollout.ground.leg_stiffness
-        legs.append(other)
-    return any(ahead(other)[1] is Outcome.SECTION for other in legs)
+def steps_from(node: str) -> list[str]:
+    """Kinds of the steps that can be made from a stand in ``node``, the first one first."""
+    return [way.stride for way in EXITS if way.node == node and node in _BETWEEN_FEET]
 
 
-def _decision(
-    rollout: TemplateRollout, node: Node, report: SectionReport, sensed: TemplateState, turn: float
-) -> Decision | None:
-    """Decision where the goal of ``report`` begins at ``node``; None by a planner that has none.
+_WALKS = (StrideKind.WALK, StrideKind.WALK_PUSH_OFF)
+_RUN_ON, _CARRY_ON = StrideKind.WALK_TO_RUN, StrideKind.CHANGE_SPEED
+_STOPS = (StrideKind.WALK_TO_STAND, StrideKind.STEP_BACK)
+_AFTER: dict[tuple[str, Section], str] = {
+    (StrideKind.WALK_TO_RUN, APEX): StrideKind.RUN_TO_WALK,
+    **{(stop, REST): StrideKind.STAND_TO_WALK for stop in _STOPS},
+}  # where a stride that was broken into has led to: the stride back to the walk
 
-    Its decision is the one of the stride that is left.
+NEEDED = frozenset((StrideKind.WALK_TO_RUN, StrideKind.RUN, StrideKind.RUN_TO_WALK))
+"""Strides that need a planner where walks are to recover."""
+
+
+@dataclass(frozen=True)
+class CatchOptions(Checked):
+    """When a walk breaks into another stride, and when a run that catches it is over.
+
+    Attributes:
+        excess: a walk that is faster than wanted by less than this is left to its planner,
+        fast: unless it is at least this fast at VLO, where the template is about to take off.
+        walkable: at an apex with at most this speed the robot walks again.
+        slow: dx/dt at apex that the run slows down to; less than ``walkable``, as no run settles
+            on its speed exactly.
+        lag: a walk whose CoM moves slower than its wanted speed at VLO by at least this is carried
+            on by both feet, comes to a stand or steps back. While both feet stand, a walk that is
+            not disturbed is faster than at VLO.
     """
-    goal, present = report.goal, report.decision
-    planner = rollout.planners.of(goal)
-    if node.name in rollout.curved:
-        return _along_curve(rollout, node, sensed, goal, present)
-    slots = free_controls(rollout.automaton, node)
-    if node.edge(Event.TOUCHDOWN) is not None:
-        slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
-    ahead = rollout.ahead(node, sensed)
-    context = RestContext(ahead, present, goal.target, slots, turn, Cause.NO_FUTURE)
-    return rest_decided(planner, context)
+
+    excess: NotNegative = tuned(0.42, SPEED)
+    fast: Positive = tuned(1.45, SPEED)
+    walkable: Positive = tuned(1.45, SPEED)
+    slow: Positive = tuned(1.35, SPEED)
+    lag: NotNegative = tuned(0.25, SPEED)
 
 
-def _along_curve(
-    rollout: TemplateRollout, node: Node, sensed: TemplateState, goal: StrideGoal, present: Decision
-) -> Decision:
-    """Decision of ``goal``'s planner where a curve leads from here to its section."""
-    wanted = section_of(rollout.automaton.sections(node.name)[1]).padded(goal.target)
-    u = np.zeros(NUM_SLOTS)
-    begun = replace(present, predicted=wanted, nominal=False, controls=u)
-    planner = rollout.planners.of(goal)
-    decision, stride = rollout.curve(node.name, sensed, sensed.state, planner, begun)
-    return replace(decision, feasible=decision.feasible and stride.completed, lasting=True)
-
-
-def curve_or_step(
-    rollout: TemplateRollout, node: str, sensed: TemplateState, state: Array, report: SectionReport
-) -> tuple[SectionReport, Stride]:
-    """The curve of the stride's planner from here, or else the first step that leads to rest.
+class Recovery:
+    """Goals of a walk that breaks into other strides, until it walks again.
 
     Args:
-        rollout: of the present stride.
-        node: of the automaton, where a curve carries the robot.
-        sensed: the robot, for its toes and the acceleration wanted so far.
-        state: (4,) x, y, dx/dt, dy/dt.
-        report: of the present stride.
-
-    Returns:
-        The report with what holds from now on, and the stride from here. Its first node is
-        another one where a step is made instead.
+        parameters: the template.
+        options: when it breaks into what, and when the run is over.
     """
-    planner = rollout.planners.of(report.goal)
-    decision, stride = rollout.curve(node, sensed, state, planner, report.decision)
-    if not decision.feasible:
-        for kind in STEP_OUT.get(node, ()):
-            other = rollout.planners.planners.get(kind)
-            if other is None:
-                continue
-            start = rollout.automaton.starts[kind]
-            first = decided(other.decide, Context(REST.of(state), cause=Cause.NO_FUTURE))
-            instead, step = rollout.curve(start, sensed, state, other, first)
-            if instead.feasible:
-                goal = replace(report.goal, stride=kind)
-                return replace(report, goal=goal, decision=instead), step
-    return replace(report, decision=decision), stride
+
+    def __init__(self, parameters: SlipParameters, options: CatchOptions | None = None) -> None:
+        self.parameters = parameters
+        self.options = scaled(options or CatchOptions(), Scale.of(parameters))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget an earlier run."""
+        self.follow(None)
+
+    def follow(self, goal: StrideGoal | None) -> None:
+        """The stride that begins is the route's own.
+
+        Args:
+            goal: of it; None at the route's end.
+        """
+        self._walk = goal if goal is not None and goal.stride in _WALKS else None
+        self._taken = ""  # the stride that was broken into
+
+    def take(self, goal: StrideGoal) -> None:
+        """The robot has broken into ``goal``, one of :meth:`ways`."""
+        self._taken = goal.stride
+
+    def goal(self, section: Section, z: Array) -> StrideGoal | None:
+        """The stride that begins where another one was broken into before.
+
+        Args:
+            section: that was reached.
+            z: (n,) state there.
+
+        Returns:
+            None where the route goes on.
+        """
+        walk, back = self._walk, _AFTER.get((self._taken, section))
+        if walk is None or back is None:
+            return None
+        if section is APEX and z[0] > self.options.walkable:
+            return self._run(walk, StrideKind.RUN, self.options.slow, StrideKind.RUN_TO_WALK)
+        return replace(walk, stride=back, then=walk.stride)
+
+    def ways(self, goal: StrideGoal, speed: float, excess: float) -> Sequence[StrideGoal]:
+        """What the robot can break into within a stride, the best first; empty: nothing.
+
+        Args:
+            goal: of that stride.
+            speed: dx/dt now [m/s].
+            excess: by which the robot is faster than wanted [m/s]: dx/dt at the section less the
+                target's, and what disturbances have added since.
+        """
+        slowest, fastest = running_speeds(self.parameters)
+        o, at_vlo = self.options, float(goal.target[0]) + excess
+        walk = goal.stride in _WALKS
+        carried = self._taken == goal.stride == _CARRY_ON
+        if (walk or carried) and speed <= goal.target[0] - o.lag:
+            return self._slower(goal, goal.then if carried else goal.stride)
+        fast = walk and (excess >= o.excess or at_vlo >= o.fast)
+        on = self._taken == goal.stride == _RUN_ON
+        if speed < slowest or not (fast or on):
+            return ()
+        return (self._run(goal, _RUN_ON, min(speed, fastest), StrideKind.RUN),)
+
+    def _slower(self, goal: StrideGoal, walk: str | None) -> Sequence[StrideGoal]:
+        """On to the goal's target and the next stride of ``walk``, or to a stand."""
+        height = STAND_HEIGHT / REFERENCE.rest_length * self.parameters.rest_length
+        rest = replace(goal, target=np.array([0.0, height, 0.0]), then=StrideKind.STAND_TO_WALK)
+        stops = [replace(rest, stride=stop) for stop in _STOPS]
+        return replace(goal, stride=_CARRY_ON, then=walk), *stops
+
+    def _run(self, walk: StrideGoal, stride: str, speed: float, then: str) -> StrideGoal:
+        p = self.parameters
+        target = np.array([speed, suited_height(speed / p.speed_unit) * p.rest_length])
+        return StrideGoal(stride, target, speed, walk.segment, then)

@@ -5,10 +5,10 @@ Until a leg lands these are all its controls, from then on the stiffnesses of wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from math import asin, atan2, hypot, isnan
+from math import asin, atan2, hypot, inf, isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -25,12 +25,16 @@ from template_control.embedding.planners.planner import (
     rest_decided,
 )
 from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
+from template_control.embedding.recovery import Recovery, entry, steps_from
 from template_control.embedding.rollout import TemplateRollout
-from template_control.embedding.state import SectionReport, TemplateState
+from template_control.embedding.state import TemplateState
 from template_control.slip.automaton.hybrid import Automaton, Node
-from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
+from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
+from template_control.slip.maps.section import REST, section_of
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, RATE_SQUARED, Scale
 
 Array = NDArray[np.float64]
@@ -56,9 +60,6 @@ SOONEST_SHARE = 0.08
 # stride slow and sinking. Legs that push longer give back some of the energy that the climb took.
 # One that steps down ends it fast, and a step can brake only from some of the states that it may
 # end in: a planner knows them by their price.
-HEIGHT_ERROR = 0.008
-"""Height of the ground under the foot that has landed over that under the other one, from which on
-the stiffnesses are chosen again [m]."""
 END_TOLERANCE = (0.1, 0.02, 0.1)
 """Errors of dx/dt, y, dy/dt where such a stride ends that count as 1 [m/s, m, m/s]."""
 _CHANGE = 0.5  # of a stiffness, over the gait's, that counts as 1
@@ -215,41 +216,52 @@ def reachable_turn(scale: Scale, time_to_go: float) -> float:
     return rate * min(max(time_to_go, 0.0), _FORESIGHT * scale.time) ** 2
 
 
-def reachable_angles(
-    rollout: TemplateRollout,
-    node: Node,
-    sensed: TemplateState,
-    report: SectionReport,
-    time_to_go: float,
-) -> tuple[float, float]:
+class Situation(NamedTuple):
+    """A robot within a stride, and what holds for it.
+
+    Attributes:
+        node: of the automaton, the robot's.
+        sensed: the robot's state.
+        goal: of the stride.
+        decision: for it so far.
+        whole: nothing of the stride has been used yet: it is in its first node, on springs.
+        to_go: time until the touchdown is due [s].
+        cause: why it is planned again.
+        height_error: of the ground under the foot that has landed over the other one's [m].
+    """
+
+    node: Node
+    sensed: TemplateState
+    goal: StrideGoal
+    decision: Decision
+    whole: bool = False
+    to_go: float = inf
+    cause: Cause = Cause.DEVIATION
+    height_error: float = 0.0
+
+
+def reachable_angles(rollout: TemplateRollout, s: Situation) -> tuple[float, float]:
     """Least and greatest touchdown angle that the swing foot can still land with [rad].
 
     Args:
         rollout: of the present stride.
-        node: of the automaton, the robot's.
-        sensed: the robot's state.
-        report: of the present stride.
-        time_to_go: until the touchdown is due [s].
+        s: where the robot is.
     """
-    planners, u = rollout.planners, report.decision.controls
-    change, angle = reachable_turn(rollout.scale, time_to_go), float(u[Slot.TOUCHDOWN_ANGLE])
+    planners, u = rollout.planners, s.decision.controls
+    change, angle = reachable_turn(rollout.scale, s.to_go), float(u[Slot.TOUCHDOWN_ANGLE])
     most = angle + change
-    if node.rear is not None and node.edge(Event.TOUCHDOWN) is not None:
-        step = planners.of(report.goal).gait.step_duration
+    if s.node.rear is not None and s.node.edge(Event.TOUCHDOWN) is not None:
+        step = planners.of(s.goal).gait.step_duration
         soonest = min(SOONEST * rollout.scale.time, SOONEST_SHARE * step)
-        time = max(min(time_to_go, soonest), _AT_ONCE)
-        stiffness = float(u[node.rear])
-        most = min(most, touchdown_angle_after(sensed, planners.route.parameters, stiffness, time))
+        time, stiffness = max(min(s.to_go, soonest), _AT_ONCE), float(u[s.node.rear])
+        most = min(
+            most, touchdown_angle_after(s.sensed, planners.route.parameters, stiffness, time)
+        )
     return min(angle - change, most), most
 
 
 def choose_all_controls(
-    rollout: TemplateRollout,
-    node: Node,
-    sensed: TemplateState,
-    report: SectionReport,
-    angles: tuple[float, float],
-    cause: Cause,
+    rollout: TemplateRollout, s: Situation, angles: tuple[float, float]
 ) -> Decision | None:
     """Decide anew at the section state from which the template would have come to here.
 
@@ -257,24 +269,21 @@ def choose_all_controls(
 
     Args:
         rollout: of the present stride.
-        node: of the automaton, the first one of a stride.
-        sensed: the robot's state.
-        report: of the present stride.
+        s: where the robot is, in the first node of a stride.
         angles: least and greatest touchdown angle that the swing foot can still reach [rad].
-        cause: of the new decision.
 
     Returns:
         None where the template cannot have come from a section.
     """
-    planner = rollout.planners.of(report.goal)
+    planner = rollout.planners.of(s.goal)
 
     def decide(so_far: Array) -> Decision | None:
-        z = rollout.backward_to_section(node, so_far, sensed)
+        z = rollout.backward_to_section(s.node, so_far, s.sensed)
         if z is None:
             return None
-        return decided(planner.decide, Context(z, report.goal.target, angles, cause))
+        return decided(planner.decide, Context(z, s.goal.target, angles, s.cause))
 
-    decision = decide(report.decision.controls)
+    decision = decide(s.decision.controls)
     if decision is not None and decision.feasible:
         return decision
     # The template would have flown or sunk with the legs so far; the robot's motors are weaker.
@@ -282,78 +291,75 @@ def choose_all_controls(
     return decision if other is None else other
 
 
-def choose_stiffnesses(
-    rollout: TemplateRollout,
-    node: Node,
-    sensed: TemplateState,
-    report: SectionReport,
-    cause: Cause,
-) -> Decision | None:
+def choose_stiffnesses(rollout: TemplateRollout, s: Situation) -> Decision | None:
     """Let the planner choose the stiffnesses that the rest of the stride depends on.
 
-    Args:
-        rollout: of the present stride.
-        node: of the automaton, the robot's.
-        sensed: the robot's state.
-        report: of the present stride.
-        cause: of the new decision.
+    Arguments as for :func:`reachable_angles`.
 
     Returns:
         None of a planner of whole strides.
     """
-    free = free_controls(rollout.automaton, node)
-    ahead, target = rollout.ahead(node, sensed), report.goal.target
-    context = RestContext(ahead, report.decision, target, free, cause=cause)
-    return rest_decided(rollout.planners.of(report.goal), context)
+    free = free_controls(rollout.automaton, s.node)
+    ahead = rollout.ahead(s.node, s.sensed)
+    context = RestContext(ahead, s.decision, s.goal.target, free, cause=s.cause)
+    return rest_decided(rollout.planners.of(s.goal), context)
 
 
-def choose_after_touchdown(
-    rollout: TemplateRollout, node: Node, sensed: TemplateState, report: SectionReport
-) -> Decision | None:
-    """Choice of what is still free as a foot lands, from where it did.
-
-    Arguments as for :func:`choose_stiffnesses`.
-
-    Returns:
-        None where what was decided holds on.
-    """
-    decision = choose_stiffnesses(rollout, node, sensed, report, Cause.TOUCHDOWN)
+def _after_touchdown(rollout: TemplateRollout, s: Situation) -> Decision | None:
+    decision = choose_stiffnesses(rollout, s)
     if decision is not None:
         return decision
-    angle = ballistic_touchdown_angle(sensed, rollout.planners.route.parameters)
-    start = rollout.automaton.start(report.goal.stride)
-    return choose_all_controls(rollout, start, sensed, report, (angle, angle), Cause.TOUCHDOWN)
+    angle = ballistic_touchdown_angle(s.sensed, rollout.planners.route.parameters)
+    start = rollout.automaton.start(s.goal.stride)
+    return choose_all_controls(rollout, s._replace(node=start), (angle, angle))
 
 
-def choose_on_unexpected_ground(
-    rollout: TemplateRollout,
-    node: Node,
-    sensed: TemplateState,
-    report: SectionReport,
-    height_error: float,
-) -> Decision:
-    """The stiffnesses after a foot has landed on ground that is higher or lower than expected.
-
-    Args:
-        rollout: of the present stride.
-        node: of the automaton, the robot's.
-        sensed: the robot's state.
-        report: of the present stride.
-        height_error: of the ground over the other foot's [m].
-    """
-    planner = rollout.planners.of(report.goal)
-    free = free_controls(rollout.automaton, node)
-    nominal, ahead = planner.gait.controls, rollout.ahead(node, sensed)
-    target = report.target[: len(report.goal.target)]
+def _on_unexpected_ground(rollout: TemplateRollout, s: Situation) -> Decision | None:
+    if abs(s.height_error) <= rollout.height_error or s.node.name in rollout.curved:
+        return None
+    planner, ahead = rollout.planners.of(s.goal), rollout.ahead(s.node, s.sensed)
+    free, nominal = free_controls(rollout.automaton, s.node), planner.gait.controls
     # After a step up the end nearest to the gait is the best: three steps later the walk is
     # back. The cheapest one goes on with a stride of half the speed.
-    price = planner.cost if height_error < 0.0 else None
-    return choose_legs(ahead, report.decision, target, free, nominal, rollout.scale, price)
+    cost = planner.cost if s.height_error < 0.0 else None
+    return choose_legs(ahead, s.decision, s.goal.target, free, nominal, rollout.scale, cost)
 
 
-def choose_assist(
-    rollout: TemplateRollout, node: Node, sensed: TemplateState, report: SectionReport
-) -> None:
+def _after_deviation(rollout: TemplateRollout, s: Situation) -> Decision | None:
+    if s.whole:
+        return choose_all_controls(rollout, s, reachable_angles(rollout, s))
+    return choose_stiffnesses(rollout, s)
+
+
+class Rule(NamedTuple):
+    """Row of the table of causes.
+
+    Attributes:
+        choose: what can still be chosen; None where what was decided holds.
+        recovers: the robot may break into another stride.
+        angle_drop: how much lower the touchdown angle is than decided [rad].
+    """
+
+    choose: Callable[[TemplateRollout, Situation], Decision | None]
+    recovers: bool = False
+    angle_drop: float = 0.0
+
+
+RULES: Mapping[Cause, Rule] = {
+    # The stiffnesses, from here; by a planner of whole strides all but the angle, from the section.
+    Cause.TOUCHDOWN: Rule(_after_touchdown),
+    # The stiffnesses, from here, near the gait's or by the cost of where they lead.
+    Cause.GROUND_HEIGHT: Rule(_on_unexpected_ground),
+    # Until a leg lands all, from the section state that would have led here; then the stiffnesses.
+    Cause.DEVIATION: Rule(_after_deviation, recovers=True),
+    Cause.NO_FUTURE: Rule(_after_deviation, recovers=True),
+    # Nothing: the template goes on without a touchdown, on ground that is lower than thought.
+    Cause.OVERDUE: Rule(lambda rollout, s: None, angle_drop=0.15),
+}
+"""By the cause of a new plan within a stride: what is free, from where, and what else there is."""
+
+
+def choose_assist(rollout: TemplateRollout, s: Situation) -> None:
     """Let the template run on with the assist that its step needs from here.
 
     For the speed at the step's end, where a foot has landed off: near a symmetric gait neither the
@@ -362,19 +368,17 @@ def choose_assist(
 
     Args:
         rollout: of the present stride; it keeps the assist until it stands on other ground.
-        node: of the automaton, the robot's.
-        sensed: the robot's state.
-        report: of the present stride.
+        s: where the robot is.
     """
     bound = _ASSIST * rollout.scale.factor(ACCELERATION)
-    gait: Gait = rollout.planners.of(report.goal).gait
+    gait: Gait = rollout.planners.of(s.goal).gait
     ground, left_alone = rollout.ground, uncontrolled(gait)
-    controls = report.decision.controls
+    controls = s.decision.controls
 
     def drift(change: float) -> float | None:
         """Of the step with another assist, as a forward speed [m/s]; None if it does not end."""
         rollout.set_ground(replace(ground, assist=ground.assist + change))
-        end, outcome = rollout.ahead(node, sensed)(controls)
+        end, outcome = rollout.ahead(s.node, s.sensed)(controls)
         return float(left_alone @ (end - gait.state)) if outcome is Outcome.SECTION else None
 
     rollout.set_ground(replace(ground, assist=ground.assist + _change(drift, bound)))
@@ -400,3 +404,94 @@ def _change(drift: Callable[[float], float | None], bound: float) -> float:
             return 0.0
         ends[0 if value * at_a > 0.0 else 1] = change, value
     return change
+
+
+# Stiffnesses over k0 with which a slow walk is tried before the robot comes to a stand.
+_LEGS = (0.4, 0.6, 0.8, 1.1)
+
+
+def find_recovery(
+    rollout: TemplateRollout, s: Situation, recovery: Recovery, excess: float
+) -> Situation | None:
+    """Another stride from here.
+
+    Args:
+        rollout: of the present stride.
+        s: where the robot is.
+        recovery: what it may break into.
+        excess: how far off the robot's speed is [m/s].
+
+    Returns:
+        The robot in that stride; None where there is none, or the template does not complete it.
+    """
+    automaton, speed = rollout.automaton, float(s.sensed.state[2])
+    for goal in recovery.ways(s.goal, speed, excess):
+        name = entry(s.node.name, s.goal.stride, goal.stride)
+        if name not in automaton.index or goal.stride not in rollout.planners.planners:
+            continue
+        if section_of(automaton.sections(name)[1]) is REST and _goes_on(rollout, s):
+            continue  # a stand is for a walk that gets no further
+        other = s._replace(node=automaton.node(name), goal=goal, cause=Cause.RECOVERY)
+        decision = _break_into(rollout, other)
+        if decision is not None and decision.feasible:
+            recovery.take(goal)
+            return other._replace(decision=decision)
+    return None
+
+
+def _goes_on(rollout: TemplateRollout, s: Situation) -> bool:
+    """Whether the template completes the present stride from here, with these legs or others."""
+    ahead, u = rollout.ahead(s.node, s.sensed), s.decision.controls
+    legs = [u]
+    free = free_controls(rollout.automaton, s.node)
+    for share in _LEGS:
+        other = u.copy()
+        other[free] = share * rollout.ground.leg_stiffness
+        legs.append(other)
+    return any(ahead(other)[1] is Outcome.SECTION for other in legs)
+
+
+def _break_into(rollout: TemplateRollout, s: Situation) -> Decision | None:
+    """Decision of another stride, that of the one which is left so far; None: there is none."""
+    planner = rollout.planners.of(s.goal)
+    if s.node.name in rollout.curved:
+        wanted = section_of(rollout.automaton.sections(s.node.name)[1]).padded(s.goal.target)
+        u = np.zeros(NUM_SLOTS)
+        begun = replace(s.decision, predicted=wanted, nominal=False, controls=u)
+        decision, stride = rollout.curve(s.node.name, s.sensed, s.sensed.state, planner, begun)
+        return replace(decision, feasible=decision.feasible and stride.completed, lasting=True)
+    slots = free_controls(rollout.automaton, s.node)
+    if s.node.edge(Event.TOUCHDOWN) is not None:
+        slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
+    ahead, turn = rollout.ahead(s.node, s.sensed), reachable_turn(rollout.scale, s.to_go)
+    context = RestContext(ahead, s.decision, s.goal.target, slots, turn, s.cause)
+    return rest_decided(planner, context)
+
+
+def curve_or_step(
+    rollout: TemplateRollout, s: Situation, state: Array
+) -> tuple[StrideGoal, Decision, Stride]:
+    """The curve of the stride's planner from here, or else the first step that leads to rest.
+
+    Args:
+        rollout: of the present stride.
+        s: where the robot is, in a node where a curve carries it.
+        state: (4,) x, y, dx/dt, dy/dt.
+
+    Returns:
+        Goal and decision that hold from now on, and the stride from here: where a step is made
+        instead, the goal's stride and the first node are others.
+    """
+    planners = rollout.planners
+    node, planner = s.node.name, planners.of(s.goal)
+    decision, stride = rollout.curve(node, s.sensed, state, planner, s.decision)
+    for kind in () if decision.feasible else steps_from(node):
+        other = planners.planners.get(kind)
+        if other is None:
+            continue
+        start = rollout.automaton.starts[kind]
+        first = decided(other.decide, Context(REST.of(state), cause=Cause.RECOVERY))
+        instead, step = rollout.curve(start, s.sensed, state, other, first)
+        if instead.feasible:
+            return replace(s.goal, stride=kind), instead, step
+    return s.goal, decision, stride

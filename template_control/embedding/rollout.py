@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -23,6 +23,7 @@ from template_control.embedding.planners.planner import (
     curved,
     decided,
 )
+from template_control.embedding.recovery import Recovery
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -55,6 +56,9 @@ class ReplanOptions(Checked):
 # go on from the robot's: its leg cannot pull, the robot's can.
 _CALMER = (0.5, 0.0)
 _HIGHEST = 0.99  # of l0: above this height no such path starts
+HEIGHT_ERROR = 0.008
+"""Height of the ground under the foot that has landed over that under the other one, from which on
+it is unexpected [m], for the reference template."""
 _TARGETS = {size: Annotated[Array, Shape((size,))] for size in (2, 3)}
 
 
@@ -65,16 +69,26 @@ class RoutePlanners:
         route: which stride comes next, and towards which state.
         planners: one for each kind of stride of the route.
         automaton: of the strides.
+        recovery: what its walks break into; None: nothing.
     """
 
-    def __init__(self, route: Route, planners: Planners, automaton: Automaton) -> None:
+    def __init__(
+        self,
+        route: Route,
+        planners: Planners,
+        automaton: Automaton,
+        recovery: Recovery | None = None,
+    ) -> None:
         self.route = route
         self.planners = planners
         self.automaton = automaton
+        self.recovery = recovery
 
     def reset(self) -> None:
         """Forget an earlier run."""
         asked(self.route.reset)
+        if self.recovery is not None:
+            self.recovery.reset()
         for planner in self.planners.values():
             asked(planner.reset)
 
@@ -90,24 +104,34 @@ class RoutePlanners:
         return goal
 
     def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
-        """As :meth:`~template_control.slip.scenario.route.Route.next`, checked.
+        """The stride that begins: a recovery's, or the route's.
 
         Args:
             section: where the robot is.
             z: (n,) its state there.
             now: time [s].
 
+        Returns:
+            None where the route ends.
+
         Raises:
             ParameterError: naming the route's class, if it asks for no stride that there is.
         """
-        return self._goal(self.route.next, section, z, now)
+        if self.recovery is None:
+            return self._goal(self.route.next, section, z, now)
+        goal = self.recovery.goal(section, z)
+        if goal is None:
+            goal = self._goal(self.route.next, section, z, now)
+            self.recovery.follow(goal)
+        return goal
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
-        """As :meth:`~template_control.slip.scenario.route.Route.ahead`, checked as :meth:`next`.
+        """What :meth:`next` would return here; neither the route nor the recovery goes on.
 
         Arguments as for :meth:`next`.
         """
-        return self._goal(self.route.ahead, section, z, now)
+        goal = None if self.recovery is None else self.recovery.goal(section, z)
+        return goal or self._goal(self.route.ahead, section, z, now)
 
     def _goal(
         self, method: Callable[[Section, Array, float], StrideGoal | None], *where: Any
@@ -147,7 +171,7 @@ class RoutePlanners:
         z: Array,
         now: float,
         estimators: EstimatorState,
-        reports: Sequence[SectionReport],
+        last: SectionReport | None,
     ) -> tuple[SectionReport, Array, bool]:
         """Learn from the stride that ended, ask the route for the next one, and plan it.
 
@@ -156,38 +180,40 @@ class RoutePlanners:
             z: (n,) state there.
             now: time [s].
             estimators: what the controller has learnt, for the report.
-            reports: of the strides so far; none at the start.
+            last: of the stride that ended; None at the start.
 
         Returns:
             What was decided, the section state from which its path starts, and whether the route
             goes on.
         """
         begin = time.perf_counter()
-        if reports:
-            last = reports[-1]
+        if last is not None:
             asked(self.of(last.goal).observe, last.decision, z)
         wanted = self.next(section, z, now)
         # The last stride goes on until whoever drives the robot ends the run.
-        goal = reports[-1].goal if wanted is None else wanted
+        goal = wanted or (self.first_goal() if last is None else last.goal)
         planner = self.of(goal)
-        other = reports and reports[-1].goal.stride != goal.stride
-        if other:
+        if last is not None and last.goal.stride != goal.stride:
             asked(planner.forget)
         decision, start = self.plan(section, z, goal)
         seconds = time.perf_counter() - begin
-        end = section_of(self.automaton.sections(self.automaton.start(goal.stride).name)[1])
         report = SectionReport(
             time=now,
             section=section,
             state=section.padded(z),
             goal=goal,
-            target=end.padded(goal.target),
+            target=self.padded_target(goal),
             decision=decision,
             offset=check(f"{type(planner).__name__}.offset", planner.offset, Triple).copy(),
             estimators=estimators,
             plan_seconds=seconds,
         )
         return report, start, wanted is not None
+
+    def padded_target(self, goal: StrideGoal) -> Array:
+        """(3,) dx/dt, y, dy/dt where a goal leads to."""
+        end = section_of(self.automaton.sections(self.automaton.starts[goal.stride])[1])
+        return end.padded(goal.target)
 
     def plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
         """A decision at ``z``, and the section state from which its path starts.
@@ -224,6 +250,8 @@ class TemplateRollout:
 
     Attributes:
         scale: units of the template, by which tuned numbers are multiplied.
+        height_error: of the ground under a foot that has landed, from which on it is unexpected
+            [m].
     """
 
     def __init__(self, planners: RoutePlanners, automaton: Automaton, curved: Set[str]) -> None:
@@ -232,6 +260,7 @@ class TemplateRollout:
         self.curved = curved
         self._parameters = planners.route.parameters
         self.scale = Scale.of(self._parameters)
+        self.height_error = HEIGHT_ERROR * self.scale.length
         self._simulator = self._mirrored = StrideSimulator(self._parameters, automaton)
 
     def set_ground(self, ground: SlipParameters) -> bool:

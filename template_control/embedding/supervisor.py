@@ -14,22 +14,15 @@ from numpy.typing import NDArray
 
 from template_control.checks.fitting import answered_or_none
 from template_control.embedding.com_path import Landing, TemplatePath, join
-from template_control.embedding.planners.planner import (
-    Cause,
-    Decision,
-    Planner,
-    Planners,
-)
-from template_control.embedding.recovery import curve_or_step, find_recovery
+from template_control.embedding.planners.planner import Cause, Decision, Planner, Planners
+from template_control.embedding.recovery import Recovery
 from template_control.embedding.replanning import (
-    HEIGHT_ERROR,
-    choose_after_touchdown,
-    choose_all_controls,
+    RULES,
+    Situation,
     choose_assist,
-    choose_on_unexpected_ground,
     choose_stiffnesses,
-    reachable_angles,
-    reachable_turn,
+    curve_or_step,
+    find_recovery,
 )
 from template_control.embedding.rollout import ReplanOptions, RoutePlanners, TemplateRollout
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
@@ -44,7 +37,6 @@ Array = NDArray[np.float64]
 
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
-_ANGLE_DROP = 0.15  # [rad] by which the touchdown angle of an overdue touchdown is taken lower
 
 
 class StrideSupervisor:
@@ -56,9 +48,12 @@ class StrideSupervisor:
         options: when to plan again.
         automaton: of the strides.
         curved: nodes in which the planner's curve is followed, not the template's springs.
+        recovery: what a walk that cannot go on breaks into; None: nothing.
 
     Attributes:
-        reports: one a section, the start's included.
+        goal: of the present stride.
+        decision: for it, the last one.
+        log: one report for each stride that has ended.
         path: the template's, from the last plan on.
         event_times: time on the path of the next occurrence of each :class:`Event` [s], else inf.
         feet: that were the rear and the front leg's where the path starts.
@@ -68,6 +63,8 @@ class StrideSupervisor:
             [m].
     """
 
+    goal: StrideGoal
+    decision: Decision
     path: TemplatePath
 
     def __init__(
@@ -77,6 +74,7 @@ class StrideSupervisor:
         options: ReplanOptions,
         automaton: Automaton = AUTOMATON,
         curved: Set[str] = frozenset(),
+        recovery: Recovery | None = None,
     ) -> None:
         self.route = route
         self.planners = planners
@@ -84,27 +82,28 @@ class StrideSupervisor:
         self.automaton = automaton
         self.curved = curved
         self.parameters: SlipParameters = route.parameters
-        self.reports: list[SectionReport] = []
+        self.log: list[SectionReport] = []
         self.event_times = [np.inf] * NUM_EVENTS
         self.feet = (0, 1)
         self.without_touchdown = False
         self.arrived = False
+        self._begun: SectionReport | None = None  # the present stride, as it was decided first
         self._passed = 0  # so many of the path's events are over
         self._planned_at = 0.0
         self._viable = True  # the template completes the path's strides, and goes on
         self._recovering = False  # into the present stride
         self._knows_slopes = False  # the present stride's planner
+        # Speed at the stride's section less the wanted, and what came on top.
+        self._speed_excess = 0.0
+        self._recovery = recovery
+        self._planners = RoutePlanners(route, planners, automaton, recovery)
+        self._rollout = TemplateRollout(self._planners, automaton, curved)
+        self.height_error = self._rollout.height_error
         self._curved_kinds = {
             kind
             for kind, start in automaton.starts.items()
             if any(node.name in curved for node in automaton.stride(start))
         }
-        self._speed_excess = (
-            0.0  # speed at the stride's section less the wanted, and what came on top
-        )
-        self._planners = RoutePlanners(route, planners, automaton)
-        self._rollout = TemplateRollout(self._planners, automaton, curved)
-        self.height_error = HEIGHT_ERROR * self._rollout.scale.length
 
     def begin(self, section: Section) -> tuple[Planner, Node]:
         """Planner and first node of the stride that the route begins with, at ``section``.
@@ -116,7 +115,8 @@ class StrideSupervisor:
         """
         self._planners.reset()
         self._rollout.set_ground(self.parameters)
-        self.reports.clear()
+        self.log.clear()
+        self._begun = None
         self.arrived = False
         goal = self.first_goal()
         return self._planners.of(goal), self.automaton.start(goal.stride)
@@ -132,12 +132,36 @@ class StrideSupervisor:
     @property
     def planner(self) -> Planner:
         """The planner of the present stride."""
-        return self._planners.of(self.reports[-1].goal)
+        return self._planners.of(self.goal)
+
+    @property
+    def reports(self) -> list[SectionReport]:
+        """One report a section, the start's included and the present stride's last."""
+        if self._begun is None:
+            return []
+        target = self._planners.padded_target(self.goal)
+        now = replace(self._begun, goal=self.goal, target=target, decision=self.decision)
+        return [*self.log, now]
+
+    @property
+    def deciding(self) -> bool:
+        """Whether a stride has been decided in this run."""
+        return self._begun is not None
+
+    @property
+    def begun_at(self) -> float:
+        """Time at which the present stride was decided first [s]."""
+        return 0.0 if self._begun is None else self._begun.time
+
+    @property
+    def changes_kind(self) -> bool:
+        """Whether the present stride is of another kind than the one before."""
+        return bool(self.log) and self.log[-1].goal.stride != self.goal.stride
 
     @property
     def _along_curve(self) -> bool:
         """Whether a curve carries the present stride, at least in part."""
-        return self.reports[-1].goal.stride in self._curved_kinds
+        return self.goal.stride in self._curved_kinds
 
     # -- decisions ----
 
@@ -156,144 +180,118 @@ class StrideSupervisor:
             The node that the stride begins in.
         """
         z = section.of(sensed.state)
-        report, start, goes_on = self._planners.decide(section, z, now, estimators, self.reports)
+        ended = self.reports
+        last = ended[-1] if ended else None
+        report, start, goes_on = self._planners.decide(section, z, now, estimators, last)
+        self.log = ended
+        self._begun, self.goal, self.decision = report, report.goal, report.decision
         self.arrived = self.arrived or not goes_on
         self._recovering = False
         self._speed_excess = float(z[0] - report.goal.target[0])
-        self.reports.append(report)
         node = self.automaton.start(report.goal.stride)
         state = sensed.state.copy()
         if start is not z:
             state[:4] = section.state(start, state[0])
         node = self._follow(node, state, sensed, now)
         if not report.decision.lasting and not self.arrived:
-            return self._recover(node, sensed, 0.0, now) or node
+            return self._recover(self._situation(node, sensed), now) or node
         return node
 
-    def _recover(
-        self, node: Node, sensed: TemplateState, phase_time: float, now: float
-    ) -> Node | None:
-        """Break into another stride where the present one cannot go on.
+    def surprise(self, node: Node, deviation: float, phase_time: float, now: float) -> Cause | None:
+        """Why to plan again, if there is something.
 
-        Arguments as for :meth:`reconsider`.
-
-        Returns:
-            The node that the robot is in then, with the path from there; None where the route
-            knows no other stride, or the template does not complete it.
-        """
-        rollout, report = self._rollout, self.reports[-1]
-        turn = reachable_turn(rollout.scale, self.time_of(Event.TOUCHDOWN) - phase_time)
-        found = find_recovery(rollout, node, report, sensed, excess=self._speed_excess, turn=turn)
-        if found is None:
-            return None
-        node, self.reports[-1] = found
-        self._recovering = True
-        return self.follow(node, sensed, now)
-
-    def touchdown_overdue(self, node: Node, phase_time: float) -> bool:
-        """Whether the swing foot should have found the ground by now.
+        OVERDUE: the swing foot should have found the ground by now. DEVIATION: a disturbance has
+        carried the robot away from its path. NO_FUTURE: the path leads nowhere, and the robot has
+        broken into its stride, no stride went on, or the planner may find another way.
 
         Args:
             node: of the automaton, the robot's.
-            phase_time: time along the path [s].
-        """
-        late = phase_time > self.event_times[_TOUCHDOWN] + self.options.patience
-        return late and not self.without_touchdown and node.edge(Event.TOUCHDOWN) is not None
-
-    def continue_without_touchdown(self, node: Node, sensed: TemplateState, now: float) -> None:
-        """The ground is lower than was thought: the template goes on without a touchdown.
-
-        Arguments as for :meth:`follow`.
-        """
-        self.follow(node, sensed, now, _ANGLE_DROP)
-
-    def deviates(self, deviation: float, phase_time: float, now: float) -> bool:
-        """Whether a disturbance has carried the robot away from its path.
-
-        A path that leads nowhere is one as well, where the robot has broken into its stride, no
-        stride went on, or the planner may find another way.
-
-        Args:
             deviation: of the forward speed from the path's [m/s].
             phase_time: time along the path [s].
             now: time [s].
         """
         o = self.options
-        if self.without_touchdown or now - self._planned_at <= o.interval:
-            return False
+        if self.without_touchdown:
+            return None
+        late = phase_time > self.event_times[_TOUCHDOWN] + o.patience
+        if late and node.edge(Event.TOUCHDOWN) is not None:
+            return Cause.OVERDUE
+        if now - self._planned_at <= o.interval:
+            return None
         if abs(deviation) > o.speed and phase_time > o.interval:
             self._speed_excess += deviation
-            return True
-        return not self._viable and (self._recovering or self._retry_planning())
+            return Cause.DEVIATION
+        stuck = not self._viable and (self._recovering or self._retries())
+        return Cause.NO_FUTURE if stuck else None
 
-    def _retry_planning(self) -> bool:
+    def _retries(self) -> bool:
         """Whether the planner may find another way. One along a curve is left to it."""
         if self._along_curve:
             return False
-        return not self.reports[-1].decision.feasible or self.planner.retries
+        return not self.decision.feasible or self.planner.retries
 
-    def replan(self, node: Node, sensed: TemplateState, phase_time: float, now: float) -> Node:
-        """Plan again from here; until a leg lands, the stride's controls are still free.
-
-        From then on the stiffnesses of what is left are, to a planner that has ``land``.
+    def replan(
+        self,
+        cause: Cause,
+        node: Node,
+        sensed: TemplateState,
+        now: float,
+        *,
+        phase_time: float = 0.0,
+        height_error: float = 0.0,
+    ) -> Node:
+        """Plan again from here, as the table of causes says.
 
         Args:
+            cause: of the new plan.
             node: of the automaton, the robot's.
             sensed: the robot's state.
-            phase_time: time along the path [s].
             now: time [s].
+            phase_time: time along the path [s].
+            height_error: of the ground under a foot that has landed over the other foot's [m].
 
         Returns:
             The node that the robot is in then.
         """
-        rollout, report = self._rollout, self.reports[-1]
-        if self._recovering:
-            other = self._recover(node, sensed, phase_time, now)
+        rule, s = RULES[cause], self._situation(node, sensed, phase_time)
+        s = s._replace(cause=cause, height_error=height_error)
+        if self._recovering and rule.recovers:
+            other = self._recover(s, now)
             if other is not None:
                 return other
+            # A stride on the springs keeps what was chosen as the robot broke into it.
             if self._along_curve:
-                self.set_decision(
-                    choose_stiffnesses(rollout, node, sensed, report, Cause.DEVIATION)
-                )
+                self.set_decision(choose_stiffnesses(self._rollout, s))
             return self.follow(node, sensed, now)
-        lasting = True
-        if node.name != self.automaton.starts[report.goal.stride] or node.name in self.curved:
-            self.set_decision(choose_stiffnesses(rollout, node, sensed, report, Cause.DEVIATION))
-        else:
-            to_go = self.time_of(Event.TOUCHDOWN) - phase_time
-            angles = reachable_angles(rollout, node, sensed, report, to_go)
-            decision = choose_all_controls(rollout, node, sensed, report, angles, Cause.DEVIATION)
-            self.set_decision(decision)
-            lasting = decision is None or decision.lasting
-        node = self.follow(node, sensed, now)
-        if lasting and self._viable:
+        decision = rule.choose(self._rollout, s)
+        self.set_decision(decision)
+        node = self.follow(node, sensed, now, rule.angle_drop)
+        lasts = not s.whole or decision is None or decision.lasting
+        if not rule.recovers or (lasts and self._viable):
             return node
-        return self._recover(node, sensed, 0.0, now) or node
+        return self._recover(self._situation(node, sensed), now) or node
 
-    def replan_after_touchdown(
-        self, node: Node, sensed: TemplateState, now: float, height_error: float, *, choose: bool
-    ) -> Node:
-        """Plan from where a foot has landed.
+    def _situation(self, node: Node, sensed: TemplateState, phase_time: float = 0.0) -> Situation:
+        first = node.name == self.automaton.starts[self.goal.stride]
+        whole = first and node.name not in self.curved
+        to_go = self.time_of(Event.TOUCHDOWN) - phase_time
+        return Situation(node, sensed, self.goal, self.decision, whole, to_go)
 
-        Args:
-            node: of the automaton, the robot's.
-            sensed: the robot's state.
-            now: time [s].
-            height_error: height of the ground over the other foot's [m].
-            choose: whether the stiffnesses that are still free are chosen again in any case, and
-                not only where the ground is higher or lower than expected.
+    def _recover(self, s: Situation, now: float) -> Node | None:
+        """Break into another stride where the present one cannot go on.
 
         Returns:
-            As :meth:`follow`.
+            The node that the robot is in then, with the path from there; None where there is no
+            other stride, or the template does not complete it.
         """
-        rollout, report = self._rollout, self.reports[-1]
-        if choose:
-            self.set_decision(choose_after_touchdown(rollout, node, sensed, report))
-        elif abs(height_error) > self.height_error and node.name not in self.curved:
-            self.set_decision(
-                choose_on_unexpected_ground(rollout, node, sensed, report, height_error)
-            )
-        return self.follow(node, sensed, now)
+        if self._recovery is None:
+            return None
+        found = find_recovery(self._rollout, s, self._recovery, self._speed_excess)
+        if found is None:
+            return None
+        self.goal, self.decision = found.goal, found.decision
+        self._recovering = True
+        return self.follow(found.node, s.sensed, now)
 
     def set_decision(self, decision: Decision | None) -> None:
         """From now on this decision holds for the present stride, if it is one.
@@ -302,7 +300,7 @@ class StrideSupervisor:
             decision: for it; None: the one so far.
         """
         if decision is not None:
-            self.reports[-1] = replace(self.reports[-1], decision=decision)
+            self.decision = decision
 
     def on_slope(self, slope: float) -> float:
         """Plan for another slope from now on.
@@ -313,13 +311,12 @@ class StrideSupervisor:
         Returns:
             The slope that is planned for: 0 by a planner that knows none, or no gait there.
         """
-        report = self.reports[-1]
         # All of them: the strides ahead may be others' than the present one.
         answers = {
             kind: answered_or_none(SlipParameters, planner.on_slope, slope)
             for kind, planner in self.planners.items()
         }
-        answer = answers[report.goal.stride]
+        answer = answers[self.goal.stride]
         self._knows_slopes = answer is not None
         ground = answer or self.parameters
         if self._along_curve and ground.slope:
@@ -327,7 +324,7 @@ class StrideSupervisor:
             assists = (other.assist for other in answers.values() if other is not None)
             ground = replace(ground, assist=next(filter(None, assists), 0.0))
         if self._rollout.set_ground(ground):
-            self.set_decision(replace(report.decision, nominal=False))
+            self.set_decision(replace(self.decision, nominal=False))
         return ground.slope
 
     @property
@@ -341,7 +338,7 @@ class StrideSupervisor:
         Arguments as for :meth:`follow`. The assist is a slope's: it is left to planners of slopes.
         """
         if self._knows_slopes and not self._along_curve:
-            choose_assist(self._rollout, node, sensed, self.reports[-1])
+            choose_assist(self._rollout, self._situation(node, sensed))
 
     # -- the path ----
 
@@ -364,18 +361,18 @@ class StrideSupervisor:
     def _follow(
         self, node: Node, state: Array, sensed: TemplateState, now: float, angle_drop: float = 0.0
     ) -> Node:
-        report = self.reports[-1]
-        u = report.decision.controls
+        u = self.decision.controls
         if angle_drop:
             u = u.copy()
             u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
         self.without_touchdown = angle_drop > 0.0
         if node.name in self.curved:
-            self.reports[-1], first = curve_or_step(self._rollout, node.name, sensed, state, report)
+            s = Situation(node, sensed, self.goal, self.decision)
+            self.goal, self.decision, first = curve_or_step(self._rollout, s, state)
             node = self.automaton.node(first.start)
         else:
             first = self._rollout.forward(node.name, sensed, state, u)
-        strides, self._viable = self._rollout.strides(node, first, report.goal, now)
+        strides, self._viable = self._rollout.strides(node, first, self.goal, now)
         self.path, self.feet = join(strides, self._rollout.scale.time), sensed.feet
         self._look_ahead(0)
         self._planned_at = now

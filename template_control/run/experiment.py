@@ -73,7 +73,7 @@ class Experiment(Checked):
         motion: a gait to keep, or a scenario, which is put on the robot's template, or a route;
             None: the gait of the planner, or the robot's own walk. A walk breaks into another
             stride where it cannot go on, and walks again
-            (:class:`~template_control.slip.scenario.catching.CatchingRoute`).
+            (:class:`~template_control.embedding.recovery.Recovery`).
         planner: its options; or a planner; or one for each kind of stride of a route. None: ahead
             where a planar robot has a scenario that walks only, deadbeat for a run, else lqr, tuned
             for the kind of robot; for a route

@@ -35,9 +35,7 @@ from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.scenario.catching import CATCHING_STRIDES, CatchingRoute
 from template_control.slip.scenario.route import Route, SteadyRoute
-from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 Array = NDArray[np.float64]
 
@@ -180,19 +178,15 @@ def _backend(robot: Biped) -> RobotBackend:
 
 
 def _controller(backend: RobotBackend, o: PreparedExperiment) -> EmbeddingController:
-    """Follows a route or keeps a planner's gait; a walk may break into other strides."""
+    """Follows a route or keeps a planner's gait."""
     options, automaton, planner, motion = o.tuning, o.automaton, o.planner, o.motion
-    catches = options.catches and automaton is AUTOMATON
     if isinstance(planner, Mapping):
         assert isinstance(motion, Route)
-        if catches and isinstance(motion, ScenarioRoute) and planner.keys() >= CATCHING_STRIDES:
-            motion = CatchingRoute(motion)
         return backend.controller(planner, options, motion, automaton)
     steady = SteadyRoute.of(planner.gait, automaton)
-    if not catches or steady.section is not VLO:
-        return backend.controller(planner, options, steady, automaton)
-    caught = CatchingRoute(steady)
-    return backend.controller(default_planners(caught, planner), options, caught, automaton)
+    if options.catches and automaton is AUTOMATON and steady.section is VLO:
+        return backend.controller(default_planners(steady, planner), options, steady, automaton)
+    return backend.controller(planner, options, steady, automaton)
 
 
 def _last_step(controller: EmbeddingController, o: PreparedExperiment) -> float:
@@ -246,17 +240,17 @@ def _loop(
         seconds = time.perf_counter() - start
         failures.tick(solution.solved, now)
         senses.expect(solution.acceleration)
-        if len(begun) < len(controller.reports):
+        if len(begun) <= len(supervisor.log):
             # A step that changes into another stride keeps its pushes where they were.
-            begun.append((controller.reports[-1].time, controller.planner.gait.step_duration))
+            begun.append((supervisor.begun_at, controller.planner.gait.step_duration))
         along, lateral = _push(o.pushes, begun, now)
         size = copysign(hypot(along, lateral), along)
         recorder.tick(q, v, forces, solution, time=now, push=size, seconds=seconds)
         reason = _fallen(plant, controller, q, o, now)
         if reason:
             return f"{reason} at {now:.3f} s, in step {done + 1}"
-        if len(controller.reports) - 1 > done:
-            done = len(controller.reports) - 1
+        if len(supervisor.log) > done:
+            done = len(supervisor.log)
             _log_section(controller.reports[-1], done)
             if progress is not None:
                 progress(done)
@@ -321,7 +315,7 @@ def _fallen(
     if controller.robot.tilt(q) > falls.pitch:
         return f"the trunk tilted to {np.degrees(controller.robot.tilt(q)):.0f} degrees"
     patience = falls.patience * controller.planner.gait.step_duration
-    if now - controller.reports[-1].time > patience:
+    if now - controller.supervisor.begun_at > patience:
         return "the robot stopped walking"
     if plant.trunk_touches_ground():
         return "the trunk touched the ground"

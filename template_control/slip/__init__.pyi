@@ -74,9 +74,6 @@ from .maps.section import APEX as APEX
 from .maps.section import VLO as VLO
 from .maps.section import Section as Section
 from .parameters import SlipParameters as SlipParameters
-from .scenario.catching import BreakingRoute as BreakingRoute
-from .scenario.catching import CatchingRoute as CatchingRoute
-from .scenario.catching import CatchOptions as CatchOptions
 from .scenario.route import Route as Route
 from .scenario.route import SpeedCommand as SpeedCommand
 from .scenario.route import SpeedProfile as SpeedProfile

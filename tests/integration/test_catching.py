@@ -10,9 +10,10 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Cause, Decision, RestContext
+from template_control.embedding.recovery import CatchOptions, Recovery
 from template_control.embedding.replanning import free_controls
 from template_control.embedding.robot_route import robot_route
-from template_control.embedding.rollout import ReplanOptions
+from template_control.embedding.rollout import ReplanOptions, RoutePlanners
 from template_control.embedding.state import EstimatorState, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON, RUN_ON
@@ -22,7 +23,6 @@ from template_control.slip.gaits.running_gait import running_gait, running_speed
 from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.scenario.catching import BreakingRoute, CatchingRoute, CatchOptions
 from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
@@ -33,95 +33,99 @@ FAST, SLOW = np.array([2.0, 0.98]), np.array([1.3, 0.98])
 NOTHING = EstimatorState(load=1.0, trim=0.0, lean=0.0)
 
 
-def catching(**options):
-    return CatchingRoute(SteadyRoute.of(WALK), CatchOptions(**options))
+def recovering(**options):
+    """A recovery on the route's walk, and the walk."""
+    recovery = Recovery(P, CatchOptions(**options))
+    walk = SteadyRoute.of(WALK).next(VLO, WALK.vlo, 0.0)
+    recovery.follow(walk)
+    return recovery, walk
 
 
-def asked(route, *sections):
-    """Kinds of stride that the route asks for; what it says ahead is what it then asks for."""
+def asked(planners, *sections):
+    """Kinds of stride that are asked for; what is said ahead is what is then asked for."""
     kinds = []
     for section, z in sections:
-        ahead, goal = route.ahead(section, z, 0.0), route.next(section, z, 0.0)
+        ahead, goal = planners.ahead(section, z, 0.0), planners.next(section, z, 0.0)
         assert ahead.stride == goal.stride
         kinds.append(goal.stride)
     return kinds
 
 
-def test_undisturbed_it_asks_what_the_route_asks_that_it_follows():
-    route, steady = catching(), SteadyRoute.of(WALK)
-    assert isinstance(route, BreakingRoute)
-    assert not isinstance(steady, BreakingRoute)
-    assert (route.section, route.endless, route.parameters) == (VLO, True, P)
-    np.testing.assert_array_equal(route.start, steady.start)
-    assert asked(route, *[(VLO, WALK.vlo)] * 3) == ["w"] * 3
-    goal = route.next(VLO, WALK.vlo, 0.0)
+def on(route):
+    """The planners of a route that recovers."""
+    recovery = Recovery(P)
+    return RoutePlanners(route, default_planners(route), AUTOMATON, recovery), recovery
+
+
+def test_undisturbed_the_route_alone_is_asked():
+    route = SteadyRoute.of(WALK)
+    planners, recovery = on(route)
+    assert asked(planners, *[(VLO, WALK.vlo)] * 3) == ["w"] * 3
+    goal = planners.next(VLO, WALK.vlo, 0.0)
     np.testing.assert_array_equal(goal.target, WALK.vlo)
     assert goal.then is None, "no lean for a run that never comes"
+    assert recovery.goal(VLO, WALK.vlo) is None
 
 
 def test_it_runs_until_it_is_slow_and_walks_on():
-    route = catching(walkable=1.45, slow=1.35)
-    walk = route.next(VLO, WALK.vlo, 0.0)
-    (run,) = route.instead(walk, speed=2.0, excess=0.9)
+    recovery, walk = recovering(walkable=1.45, slow=1.35)
+    (run,) = recovery.ways(walk, speed=2.0, excess=0.9)
     assert (run.stride, run.then) == ("wr", "r")
     assert run.target[0] == 2.0
-    assert asked(route, (VLO, WALK.vlo)) == ["w"], "naming a way does not go it"
-    route.take(run)
-    assert route.next(APEX, FAST, 0.0).target[0] == 1.35
-    assert asked(route, (APEX, FAST), (APEX, np.array([1.46, 0.98]))) == ["r", "r"]
-    back = route.next(APEX, SLOW, 0.0)
+    assert recovery.goal(APEX, FAST) is None, "naming a way does not go it"
+    recovery.take(run)
+    assert recovery.goal(APEX, FAST).target[0] == 1.35
+    assert recovery.goal(APEX, FAST).stride == "r"
+    assert recovery.goal(APEX, np.array([1.46, 0.98])).stride == "r"
+    back = recovery.goal(APEX, SLOW)
     assert (back.stride, back.then) == ("rw", "w")
     np.testing.assert_array_equal(back.target, WALK.vlo)
-    assert asked(route, (VLO, WALK.vlo)) == ["w"]
-    route.take(*route.instead(walk, 2.0, 0.9))
-    route.reset()
-    assert asked(route, (VLO, WALK.vlo)) == ["w"]
+    assert recovery.goal(VLO, WALK.vlo) is None, "the route goes on"
+    recovery.reset()
+    assert recovery.goal(APEX, FAST) is None
 
 
 def test_only_a_walk_that_is_much_too_fast_is_caught():
-    route = catching(excess=0.42, fast=9.0)
-    walk = route.next(VLO, WALK.vlo, 0.0)
+    recovery, walk = recovering(excess=0.42, fast=9.0)
     slowest, fastest = running_speeds(P)
-    assert not route.instead(walk, 2.0, 0.41)
-    assert not route.instead(walk, slowest - 1e-6, 0.5), "no run is that slow"
-    assert route.instead(walk, 9.0, 8.0)[0].target[0] == fastest
+    assert not recovery.ways(walk, 2.0, 0.41)
+    assert not recovery.ways(walk, slowest - 1e-6, 0.5), "no run is that slow"
+    assert recovery.ways(walk, 9.0, 8.0)[0].target[0] == fastest
     changing = replace(walk, stride="wr")
-    assert not route.instead(changing, 2.0, 0.9), "a transition that was planned goes on"
-    route.take(*route.instead(walk, 2.0, 0.9))
-    assert route.instead(changing, 2.0, 0.0)[0].stride == "wr", "pushed again, it aims again"
-    assert not route.instead(replace(walk, stride="r"), 2.0, 0.9)
+    assert not recovery.ways(changing, 2.0, 0.9), "a transition that was planned goes on"
+    recovery.take(*recovery.ways(walk, 2.0, 0.9))
+    assert recovery.ways(changing, 2.0, 0.0)[0].stride == "wr", "pushed again, it aims again"
+    assert not recovery.ways(replace(walk, stride="r"), 2.0, 0.9)
 
 
 def test_a_walk_that_is_about_to_take_off_is_caught():
-    route = catching(excess=0.42, fast=1.49)
-    walk = route.next(VLO, WALK.vlo, 0.0)
+    recovery, walk = recovering(excess=0.42, fast=1.49)
     left = 1.49 - float(walk.target[0])
     assert 0.3 < left < 0.42
-    assert not route.instead(walk, 1.6, left - 0.01)
-    assert route.instead(walk, 1.6, left + 0.01)[0].stride == "wr"
+    assert not recovery.ways(walk, 1.6, left - 0.01)
+    assert recovery.ways(walk, 1.6, left + 0.01)[0].stride == "wr"
 
 
 def test_a_scenario_goes_on_after_the_catch():
     segments = (Segment("walk", 1.1, steps=2), Segment("run", 2.0, steps=1))
-    route = CatchingRoute(ScenarioRoute(Scenario(segments=segments)))
-    assert not route.endless
-    walk = route.next(VLO, WALK.vlo, 0.0)
-    route.take(*route.instead(walk, 2.0, 0.9))
-    assert asked(route, (APEX, FAST), (APEX, SLOW), (VLO, WALK.vlo)) == ["r", "rw", "w"]
-    assert asked(route, (VLO, WALK.vlo), (APEX, FAST)) == ["wr", "r"], "the scenario's own run"
-    assert route.next(APEX, SLOW, 9.0) is None
+    planners, recovery = on(ScenarioRoute(Scenario(segments=segments)))
+    walk = planners.next(VLO, WALK.vlo, 0.0)
+    recovery.take(*recovery.ways(walk, 2.0, 0.9))
+    assert asked(planners, (APEX, FAST), (APEX, SLOW), (VLO, WALK.vlo)) == ["r", "rw", "w"]
+    assert asked(planners, (VLO, WALK.vlo), (APEX, FAST)) == ["wr", "r"], "the scenario's own run"
+    assert planners.next(APEX, SLOW, 9.0) is None
 
 
 def test_a_catch_tells_no_duration_of_a_step():
     segments = (Segment("walk", 0.9, steps=1), Segment("walk", acceleration=0.1, duration=9.0))
-    route = CatchingRoute(ScenarioRoute(Scenario(segments=segments, start=(0.9, 0.98, 0.0))))
-    route.next(VLO, WALK.vlo, 0.0)
-    walk = route.next(VLO, WALK.vlo, 0.5)
-    (run,) = route.instead(walk, 2.0, 1.0)
+    planners, recovery = on(ScenarioRoute(Scenario(segments=segments, start=(0.9, 0.98, 0.0))))
+    planners.next(VLO, WALK.vlo, 0.0)
+    walk = planners.next(VLO, WALK.vlo, 0.5)
+    (run,) = recovery.ways(walk, 2.0, 1.0)
     assert (walk.segment, run.segment) == (1, 1)
-    route.take(run)
-    assert asked(route, (APEX, FAST), (APEX, SLOW)) == ["r", "rw"]
-    later = route.next(VLO, WALK.vlo, 4.5)
+    recovery.take(run)
+    assert asked(planners, (APEX, FAST), (APEX, SLOW)) == ["r", "rw"]
+    later = planners.next(VLO, WALK.vlo, 4.5)
     assert later.wanted_speed == pytest.approx(0.9 + 0.1 * 5.0, abs=0.06), "one step ahead"
 
 
@@ -149,8 +153,7 @@ def test_a_walker_that_takes_off_lands_on_the_other_foot_and_runs():
 
 @pytest.mark.parametrize("turn", [0.0, 0.05, 10.0])
 def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
-    route = catching()
-    planner = default_planners(route)["wr"]
+    planner = default_planners(SteadyRoute.of(WALK))["wr"]
     node, state = AUTOMATON.node("SS_av^wr"), VLO.state([1.9, 0.985, 0.1])
     u, target = WALK.controls, running_gait(P, 1.9).apex
 
@@ -160,7 +163,7 @@ def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
 
     free = [int(Slot.TOUCHDOWN_ANGLE), *free_controls(AUTOMATON, node)]
     left = Decision(u, WALK.vlo, True, True, True)
-    decision = planner.decide_rest(RestContext(ahead, left, target, free, turn, Cause.NO_FUTURE))
+    decision = planner.decide_rest(RestContext(ahead, left, target, free, turn, Cause.RECOVERY))
     assert decision.feasible
     assert not decision.nominal
     end, outcome = ahead(decision.controls)
@@ -174,24 +177,27 @@ def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
     np.testing.assert_array_equal(decision.controls[stays], u[stays])
 
 
-def pushed(speed, route):
+def pushed(speed, recovery):
     """Plan a walking step, push the robot 60 ms later, and plan again: planning and node then."""
-    supervisor = StrideSupervisor(route, default_planners(route), ReplanOptions())
+    route = SteadyRoute.of(WALK)
+    supervisor = StrideSupervisor(
+        route, default_planners(route), ReplanOptions(), recovery=recovery
+    )
     supervisor.begin(VLO)
     sensed = TemplateState(VLO.state(WALK.vlo), np.zeros(2))
     node = supervisor.decide(VLO, sensed, 0.0, NOTHING)
     u = supervisor.reports[0].decision.controls
     sensed.state[:] = simulate_stride(P, node.name, sensed.state, u).sample(0.06)[0, :4]
     sensed.state[2] += speed
-    assert supervisor.deviates(speed, 0.06, 0.06)
-    return supervisor, supervisor.replan(node, sensed, 0.06, 0.06)
+    assert supervisor.surprise(node, speed, 0.06, 0.06) is Cause.DEVIATION
+    return supervisor, supervisor.replan(Cause.DEVIATION, node, sensed, 0.06, phase_time=0.06)
 
 
 def test_a_push_within_a_step_is_answered_by_a_walk_or_by_a_run():
-    supervisor, node = pushed(0.2, catching())
+    supervisor, node = pushed(0.2, Recovery(P))
     assert node.name == "SS_av^w"
     assert supervisor.reports[0].goal.stride == "w"
-    supervisor, node = pushed(0.9, catching())
+    supervisor, node = pushed(0.9, Recovery(P))
     assert node.name == "SS_av^wr"
     report = supervisor.reports[0]
     assert (len(supervisor.reports), report.goal.stride) == (1, "wr")
@@ -200,8 +206,8 @@ def test_a_push_within_a_step_is_answered_by_a_walk_or_by_a_run():
     assert supervisor.path.outcome is Outcome.SECTION
     supervisor.choose_assist(node, TemplateState(VLO.state(WALK.vlo), np.zeros(2)))
     assert supervisor.ground.assist == 0.0, "a planner that knows no slopes has no assist"
-    _, node = pushed(0.9, SteadyRoute.of(WALK))
-    assert node.name == "SS_av^w", "this route knows no other way"
+    _, node = pushed(0.9, None)
+    assert node.name == "SS_av^w", "it knows no other way"
 
 
 def kinds(record):

@@ -7,15 +7,16 @@ import pytest
 
 import template_control as tc
 from template_control.embedding.planners.default import default_planners
+from template_control.embedding.planners.planner import Cause
+from template_control.embedding.recovery import EXITS, CatchOptions, Recovery
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.state import EstimatorState, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
-from template_control.slip.automaton.automaton import AUTOMATON, BREAKS
+from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.section import REST, VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.scenario.catching import CatchingRoute, CatchOptions
 from template_control.slip.scenario.route import SteadyRoute
 
 P = SlipParameters()
@@ -25,8 +26,12 @@ NOTHING = EstimatorState(load=1.0, trim=0.0, lean=0.0)
 CURVED = {"DS_bl^ww", "DS_br^ws", "SS_bt^sb", "DS_br^sb"}
 
 
-def catching(**options):
-    return CatchingRoute(SteadyRoute.of(WALK), CatchOptions(**options))
+def recovering(**options):
+    """A recovery on the route's walk, and the walk."""
+    recovery = Recovery(P, CatchOptions(**options))
+    walk = SteadyRoute.of(WALK).next(VLO, WALK.vlo, 0.0)
+    recovery.follow(walk)
+    return recovery, walk
 
 
 def kinds(goals):
@@ -34,65 +39,66 @@ def kinds(goals):
 
 
 def test_only_a_walk_that_lags_is_carried_or_steps_back():
-    route = catching(lag=0.25)
-    walk = route.next(VLO, WALK.vlo, 0.0)
+    recovery, walk = recovering(lag=0.25)
     limit = float(walk.target[0]) - 0.25
-    assert not route.instead(walk, limit + 1e-6, 0.0)
-    carried, stop, back = route.instead(walk, limit, 0.0)
+    assert not recovery.ways(walk, limit + 1e-6, 0.0)
+    carried, stop, back = recovery.ways(walk, limit, 0.0)
     assert (carried.stride, carried.then) == ("ww", "w")
     np.testing.assert_array_equal(carried.target, walk.target)
     assert [(goal.stride, goal.then) for goal in (stop, back)] == [("ws", "sw"), ("sb", "sw")]
     assert back.target[0] == back.target[2] == 0.0
     for kind in ("wr", "r", "rw", "ww"):
-        assert not route.instead(replace(walk, stride=kind), 0.1, 0.0), "it is no walk"
+        assert not recovery.ways(replace(walk, stride=kind), 0.1, 0.0), "it is no walk"
 
 
 def test_carried_on_it_walks_or_may_still_step_back():
-    route = catching()
-    walk = route.next(VLO, WALK.vlo, 0.0)
-    carried = route.instead(walk, 0.3, -0.8)[0]
-    route.take(carried)
-    assert kinds(route.instead(carried, 0.3, -0.8)) == ["ww", "ws", "sb"]
-    assert all(goal.then in ("w", "sw") for goal in route.instead(carried, 0.3, -0.8))
-    assert route.next(VLO, WALK.vlo, 1.0).stride == "w"
-    assert not route.instead(carried, 0.3, -0.8), "that is over"
+    recovery, walk = recovering()
+    carried = recovery.ways(walk, 0.3, -0.8)[0]
+    recovery.take(carried)
+    assert kinds(recovery.ways(carried, 0.3, -0.8)) == ["ww", "ws", "sb"]
+    assert all(goal.then in ("w", "sw") for goal in recovery.ways(carried, 0.3, -0.8))
+    assert recovery.goal(VLO, WALK.vlo) is None, "the route goes on"
+    recovery.follow(walk)
+    assert not recovery.ways(carried, 0.3, -0.8), "that is over"
 
 
 @pytest.mark.parametrize("way", [1, 2])
 def test_from_a_stand_it_starts_to_walk_again(way):
-    route = catching()
-    walk = route.next(VLO, WALK.vlo, 0.0)
-    stop = route.instead(walk, 0.3, -0.8)[way]
-    route.take(stop)
-    assert route.ahead(REST, STILL, 1.0).stride == "sw"
-    start = route.next(REST, STILL, 1.0)
+    recovery, walk = recovering()
+    stop = recovery.ways(walk, 0.3, -0.8)[way]
+    recovery.take(stop)
+    start = recovery.goal(REST, STILL)
     assert (start.stride, start.then) == ("sw", "w")
     np.testing.assert_array_equal(start.target, walk.target)
-    assert route.next(VLO, WALK.vlo, 2.0).stride == "w"
-    route.take(stop)
-    route.reset()
-    assert route.next(VLO, WALK.vlo, 0.0).stride == "w"
+    assert recovery.goal(VLO, WALK.vlo) is None, "the route goes on"
+    recovery.take(stop)
+    recovery.reset()
+    assert recovery.goal(REST, STILL) is None
 
 
-@pytest.mark.parametrize("kind", BREAKS)
-def test_the_same_legs_stand_where_a_walk_breaks_into_another_stride(kind):
-    for walks, other in BREAKS[kind].items():
-        before, after = AUTOMATON.node(walks), AUTOMATON.node(other)
-        assert before.stance == after.stance
-        assert after in AUTOMATON.stride(AUTOMATON.starts[kind])
+@pytest.mark.parametrize("way", EXITS, ids=lambda way: f"{way.node}-{way.stride}")
+def test_the_same_legs_stand_where_a_stride_breaks_into_another_one(way):
+    before, after = AUTOMATON.node(way.node), AUTOMATON.node(way.entry)
+    assert before.stance == after.stance
+    assert after in AUTOMATON.stride(AUTOMATON.starts[way.stride])
+
+
+def nodes(kind, phase):
+    """Where a stride breaks into another kind, in single (SS) or double stance (DS)."""
+    return [way.node for way in EXITS if way.stride == kind and way.node.startswith(phase)]
 
 
 def slow(node, place, toes, speed):
     """Plan a step, put the robot into a double or single stance, slow, and plan again."""
-    route = catching()
+    route = SteadyRoute.of(WALK)
     supervisor = StrideSupervisor(
-        route, default_planners(route), ReplanOptions(), AUTOMATON, frozenset(CURVED)
+        route, default_planners(route), ReplanOptions(), AUTOMATON, frozenset(CURVED), Recovery(P)
     )
     supervisor.begin(VLO)
     supervisor.decide(VLO, TemplateState(VLO.state(WALK.vlo), np.zeros(2)), 0.0, NOTHING)
-    assert supervisor.deviates(-0.5, 0.3, 0.3)
-    sensed = standing(place, toes, speed)
-    return supervisor, supervisor.replan(AUTOMATON.node(node), sensed, 0.3, 0.3)
+    there, sensed = AUTOMATON.node(node), standing(place, toes, speed)
+    assert supervisor.surprise(there, -0.5, 0.3, 0.3) is Cause.DEVIATION
+    return supervisor, supervisor.replan(Cause.DEVIATION, there, sensed, 0.3, phase_time=0.3)
 
 
 def standing(place, toes, speed):
@@ -102,7 +108,7 @@ def standing(place, toes, speed):
     )
 
 
-@pytest.mark.parametrize("node", BREAKS["ww"])
+@pytest.mark.parametrize("node", nodes("ww", "DS"))
 def test_a_slow_double_stance_is_carried_to_the_next_vlo(node):
     supervisor, after = slow(node, 0.3, (0.0, 0.5), 0.6)
     assert after.name == "DS_bl^ww"
@@ -115,7 +121,7 @@ def test_a_slow_double_stance_is_carried_to_the_next_vlo(node):
     assert after.name == node, "fast enough, it walks"
 
 
-@pytest.mark.parametrize("node", BREAKS["sb"])
+@pytest.mark.parametrize("node", nodes("sb", "SS"))
 def test_a_walk_that_falls_back_sets_its_foot_down_behind(node):
     supervisor, after = slow(node, -0.29, (0.0, -0.5), 0.7)
     assert after.name == "SS_bt^sb"
@@ -134,7 +140,7 @@ def test_a_double_stance_that_falls_back_comes_to_a_stand():
     assert supervisor.reports[-1].goal.stride == "ws"
     assert supervisor.reports[-1].decision.feasible
     pushed = standing(0.05, (0.0, 0.45), -0.5)
-    after = supervisor.replan(after, pushed, 0.1, 0.4)
+    after = supervisor.replan(Cause.DEVIATION, after, pushed, 0.4, phase_time=0.1)
     assert after.name == "DS_al^sb", "pushed on, it steps"
     assert supervisor.reports[-1].goal.stride == "sb"
 

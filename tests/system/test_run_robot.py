@@ -11,6 +11,7 @@ from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PHASES
 from template_control.embedding.planners.default import default_planners
+from template_control.embedding.planners.planner import Cause
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.state import TemplateState
 from template_control.errors import ParameterError
@@ -157,10 +158,10 @@ def test_stiffnesses_follow_from_where_the_foot_has_landed(supervisor, gait, ear
     x = -P.rest_length * np.cos(angle) - early * 3.0
     y = height + early * fall - 0.5 * P.gravity * early**2
     sensed = TemplateState(state=np.array([x, y, 3.0, -fall + P.gravity * early]))
-    before = supervisor.reports[-1].decision.controls
+    before = supervisor.decision.controls
     node = AUTOMATON.node("SS_sc^r")
-    supervisor.replan_after_touchdown(node, sensed, 0.05, 0.0, choose=True)
-    after = supervisor.reports[-1].decision.controls
+    supervisor.replan(Cause.TOUCHDOWN, node, sensed, 0.05)
+    after = supervisor.decision.controls
     assert after[Slot.TOUCHDOWN_ANGLE] == pytest.approx(angle, abs=1e-9)
     # From a flatter leg a stiffer one would throw the CoM over its apex.
     assert after[Slot.K_SC] < 0.97 * before[Slot.K_SC]

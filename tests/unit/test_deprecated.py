@@ -42,6 +42,7 @@ OLD_NAMES = {
     "template_control.run.GaitChoice",
     "template_control.run.RobotChoice",
     "template_control.run.RobotSpec",
+    "template_control.slip.CatchOptions",
     "template_control.whole_body.Wanted",
 }
 

@@ -129,10 +129,10 @@ class FreeController(EmbeddingController):
     # -- sections, touchdowns, liftoffs --------------------------------------------------
 
     def _decide(self, section: Section) -> None:
-        lateral, first = self.lateral, not self.reports
+        lateral, first = self.lateral, not self.supervisor.deciding
         stance = self.feet.foot_of_leg[Leg.REAR]
         if not first:
-            if self.reports[-1].decision.nominal:
+            if self.supervisor.decision.nominal:
                 lateral.end_step(SIDES[stance], self._foot_side(stance), self.lateral_state())
             if lateral.wish.turn:
                 self._turn(lateral.wish.turn, self.robot.space.foot[stance, :2].copy())
@@ -147,19 +147,19 @@ class FreeController(EmbeddingController):
     def _advance_touchdown(self, section: Section) -> None:
         """Let the step that begins at a section end sooner, where its foothold is out of reach."""
         supervisor, sensed = self.supervisor, self.observer.now
-        report, z, planner = supervisor.reports[-1], section.of(sensed.state), self.planner
+        target, z, planner = supervisor.goal.target, section.of(sensed.state), self.planner
 
         def decide(least: float) -> Decision:
-            return decided(planner.decide, Context(z, report.goal.target, (least, inf)))
+            return decided(planner.decide, Context(z, target, (least, inf)))
 
         def look(decision: Decision) -> LateralForecast:
-            if decision is not supervisor.reports[-1].decision:
+            if decision is not supervisor.decision:
                 self._follow(decision)
             feet = np.array([self._foot_side(foot) for foot in supervisor.feet])
             return self.lateral.forecast(supervisor.path, 0.0, self.lateral_state(), feet)
 
-        best = early_touchdown(report.decision, decide, look, self._reach)
-        if best is not supervisor.reports[-1].decision:
+        best = early_touchdown(supervisor.decision, decide, look, self._reach)
+        if best is not supervisor.decision:
             self._follow(best)
 
     def _follow(self, decision: Decision) -> None:
@@ -170,7 +170,7 @@ class FreeController(EmbeddingController):
         self.path_clock.restart()
 
     def _touch_down(self, leg: Leg) -> None:
-        self.lateral.touch_down(self.time - self.reports[-1].time)
+        self.lateral.touch_down(self.time - self.supervisor.begun_at)
         super()._touch_down(leg)
 
     def _lift(self, foot: int, swung: float = 0.0) -> None:

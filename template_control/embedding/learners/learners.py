@@ -67,9 +67,8 @@ class Learners:
             supervisor: which has decided it.
             trimmed: whether the momentum trim acts somewhere in it.
         """
-        reports = supervisor.reports
-        if len({report.goal.stride for report in reports[-2:]}) > 1:
+        if supervisor.changes_kind:
             # A walk after a run stands up; one that leant had other drifts.
             self.trim.forget()
-        self.lean.aim(reports[-1].goal)
+        self.lean.aim(supervisor.goal)
         self.trim.expect(supervisor.path if trimmed else None, supervisor.planner.gait)

@@ -27,7 +27,6 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.section import APEX
-from template_control.slip.scenario.catching import CatchingRoute
 from template_control.slip.scenario.route import Route, SpeedRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
@@ -57,15 +56,9 @@ def _keeping_up(scenario: Scenario) -> RunningOptions:
 
 def first_speed(route: Route) -> float:
     """dx/dt that the gait has with which a route begins, after a stand where it has one [m/s]."""
-    followed = _followed(route)
-    if isinstance(followed, ScenarioRoute):
-        return followed.scenario.walking_speed
+    if isinstance(route, ScenarioRoute):
+        return route.scenario.walking_speed
     return float(route.start[0])
-
-
-def _followed(route: Route) -> Route:
-    """The route itself, without the run that catches its walks."""
-    return route.followed if isinstance(route, CatchingRoute) else route
 
 
 def _standing(route: Route) -> Planners:
@@ -100,12 +93,9 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
 
     if route.section == APEX:
         return {StrideKind.RUN: RunningPlanner(runs(speed))}
-    followed = _followed(route)
-    scenario = followed.scenario if isinstance(followed, ScenarioRoute) else None
-    standing = _standing(followed)
-    if isinstance(followed, SpeedRoute) or (
-        isinstance(followed, ScenarioRoute) and followed.pushes_off
-    ):
+    scenario = route.scenario if isinstance(route, ScenarioRoute) else None
+    standing = _standing(route)
+    if isinstance(route, SpeedRoute) or (isinstance(route, ScenarioRoute) and route.pushes_off):
         ahead = walking or AheadPlanner(p, speed=speed)
         return {ahead.gait.stride: ahead, **standing}
     walk = walking or LqrPlanner(walking_gait(p, speed))
@@ -113,7 +103,7 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
 
     def walks(speed: float) -> Gait:
         # A walk that is kept is walked again after a run, whatever family it is of.
-        return walk.gait if isinstance(followed, SteadyRoute) else walking_gait(p, speed)
+        return walk.gait if isinstance(route, SteadyRoute) else walking_gait(p, speed)
 
     run = RunningPlanner(runs(slowest), options)
     return {

@@ -393,7 +393,7 @@ class LqrPlanner(Planner):
         step: its prediction moves by as much as the choice does.
         """
         decision = context.decision
-        if context.cause is Cause.NO_FUTURE:
+        if context.cause is Cause.RECOVERY:
             return None
         if not self._pushes:
             return decision

@@ -66,8 +66,12 @@ class Cause(Enum):
     """A foot has landed on ground that is higher or lower than expected."""
     DEVIATION = auto()
     """A disturbance has carried the robot away from its path."""
+    OVERDUE = auto()
+    """A touchdown has not come; no planner is asked."""
     NO_FUTURE = auto()
     """The present stride, or the one after it, cannot be completed."""
+    RECOVERY = auto()
+    """The stride before cannot go on: the robot would break into this one."""
 
 
 class Context(NamedTuple):
@@ -100,11 +104,11 @@ class RestContext(NamedTuple):
 
     Attributes:
         ahead: where it leads.
-        decision: what holds so far; of the stride that is left, where ``cause`` is NO_FUTURE.
+        decision: what holds so far; of the stride that is left, where ``cause`` is RECOVERY.
         target: (m,) state wanted at the section where the stride ends.
         free: slots that the rest depends on and that can still be chosen.
         turn: how far the touchdown angle can still be changed [rad], where it is free.
-        cause: of the question. NO_FUTURE: the robot would break into this stride from another one.
+        cause: of the question.
     """
 
     ahead: EndOfStride

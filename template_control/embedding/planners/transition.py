@@ -143,7 +143,7 @@ class TransitionPlanner(Planner):
 
     def decide_rest(self, context: RestContext) -> Decision:
         """See :meth:`~.planner.Planner.decide_rest`."""
-        if context.cause is Cause.NO_FUTURE:
+        if context.cause is Cause.RECOVERY:
             return self._break_into(context)
         ahead, target, controls = context.ahead, context.target, context.decision.controls
         stiff = [slot for slot in context.free if slot != Slot.TOUCHDOWN_ANGLE]

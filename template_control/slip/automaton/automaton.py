@@ -436,25 +436,3 @@ RUN_ON: Mapping[str, str] = {
 
 In single stance the other foot lands next, whether VLO is past or not.
 """
-
-_BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
-_BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
-
-BREAKS: Mapping[str, Mapping[str, str]] = {
-    StrideKind.WALK_TO_RUN: RUN_ON,
-    StrideKind.CHANGE_SPEED: dict.fromkeys(_BOTH_STAND, "DS_bl^ww"),
-    StrideKind.WALK_TO_STAND: dict.fromkeys(_BOTH_STAND, "DS_br^ws"),
-    StrideKind.STEP_BACK: dict.fromkeys(_BEFORE_VLO, "SS_bt^sb"),
-}
-"""By the kind of a stride that a walk can break into: from which nodes, and where it goes on.
-
-The last three are of a slow walk, whose springs would throw it back. A curve in time carries the
-CoM while both feet stand, on or to rest; the foot that is up is set down behind again.
-"""
-
-STEP_OUT: Mapping[str, tuple[str, ...]] = {
-    "DS_ar^s": (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK),
-    "DS_br^ws": (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK),
-    "DS_br^sf": (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK),
-}
-"""By a node in which both feet stand: strides with a step, where the CoM cannot come to rest."""

@@ -14,7 +14,7 @@ from template_control.embedding.learners.momentum import (
 )
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
-from template_control.embedding.planners.planner import Context, RestContext
+from template_control.embedding.planners.planner import Cause, Context, RestContext
 from template_control.embedding.replanning import (
     AGILITY,
     SOONEST,
@@ -149,11 +149,11 @@ def test_a_walk_after_a_run_forgets_what_its_steps_added_to_the_speed(gait, befo
     planner = LqrPlanner(gait)
     route = SteadyRoute.of(gait)
     planners = RoutePlanners(route, {"w": planner, "rw": planner}, AUTOMATON)
-    report, *_ = planners.decide(VLO, gait.vlo, 0.0, NOTHING, [])
+    report, *_ = planners.decide(VLO, gait.vlo, 0.0, NOTHING, None)
     planner.offset = np.array([0.02, -0.002, -0.05])
     goal = replace(report.goal, stride=before)
     off_law = replace(report, goal=goal, decision=replace(report.decision, nominal=False))
-    there, *_ = planners.decide(VLO, gait.vlo, 0.5, NOTHING, [off_law])
+    there, *_ = planners.decide(VLO, gait.vlo, 0.5, NOTHING, off_law)
     kept = [0.02 if speed_kept else 0.0, -0.002, -0.05]
     np.testing.assert_array_equal(there.offset, kept)
     if not speed_kept:
@@ -171,15 +171,15 @@ def test_overdue_ground_keeps_the_template_in_single_stance(gait):
     node = AUTOMATON.node(STRIDE_START["w"])
     supervisor.decide(VLO, sensed, 0.0, NOTHING)
     touchdown = supervisor.time_of(Event.TOUCHDOWN)
-    assert not supervisor.touchdown_overdue(node, touchdown + 0.009)
-    assert supervisor.touchdown_overdue(node, touchdown + 0.011)
-    stride = simulate_stride(P, node.name, sensed.state, supervisor.reports[0].decision.controls)
+    assert supervisor.surprise(node, 0.0, touchdown + 0.009, 10.0) is None
+    assert supervisor.surprise(node, 0.0, touchdown + 0.011, 10.0) is Cause.OVERDUE
+    stride = simulate_stride(P, node.name, sensed.state, supervisor.decision.controls)
     sensed.state[:] = stride.sample(touchdown - 1e-6)[0][:4]
-    supervisor.continue_without_touchdown(node, sensed, touchdown)
+    supervisor.replan(Cause.OVERDUE, node, sensed, touchdown)
     assert supervisor.without_touchdown
     assert supervisor.time_of(Event.TOUCHDOWN) > 0.03, "not at once"
-    assert not supervisor.touchdown_overdue(node, 1.0), "once is enough"
-    assert not supervisor.deviates(1.0, 1.0, 10.0)
+    assert supervisor.surprise(node, 0.0, 1.0, 10.0) is None, "once is enough"
+    assert supervisor.surprise(node, 1.0, 1.0, 10.0) is None
 
 
 def test_a_template_that_would_take_off_is_planned_from_the_ground(gait):
@@ -203,7 +203,7 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
     supervisor = planned(gait)
     sensed = TemplateState(np.array([0.0, gait.vlo[1], gait.vlo[0], gait.vlo[2]]), np.zeros(2))
     supervisor.decide(VLO, sensed, 0.0, NOTHING)
-    u = supervisor.reports[0].decision.controls
+    u = supervisor.decision.controls
     z = gait.vlo + [faster, higher, 0.0]
     disturbed = simulate_stride(P, node.name, VLO.state(z), u)
     assume(later < disturbed.time_of(Event.TOUCHDOWN))
@@ -213,9 +213,9 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
     # The foot needs some time until it is down, if it had so much.
     soonest = max(min(left, SOONEST, SOONEST_SHARE * gait.step_duration), 0.002)
     most = min(u[0] + change, touchdown_angle_after(sensed, P, u[Slot.K_SC], soonest))
-    supervisor.replan(node, sensed, later, later)
+    supervisor.replan(Cause.DEVIATION, node, sensed, later, phase_time=later)
     expected = LqrPlanner(gait).decide(Context(z, angles=(min(u[0] - change, most), most))).controls
-    np.testing.assert_allclose(supervisor.reports[0].decision.controls, expected, rtol=1e-6)
+    np.testing.assert_allclose(supervisor.decision.controls, expected, rtol=1e-6)
     assert supervisor.time_of(Event.TOUCHDOWN) >= 0.9 * soonest
     assert len(supervisor.reports) == 1
 
@@ -236,33 +236,34 @@ def test_a_step_is_not_planned_anew_with_a_touchdown_that_is_over(gait):
     sensed = TemplateState(VLO.state(gait.vlo), np.zeros(2))
     supervisor.decide(VLO, sensed, 0.0, NOTHING)
     touchdown = supervisor.time_of(Event.TOUCHDOWN)
-    u = supervisor.reports[0].decision.controls
+    u = supervisor.decision.controls
     landing = simulate_stride(P, node.name, sensed.state, u).sample(touchdown - 1e-6)[0][:4]
     sensed.state[:] = landing + [0.0, -0.004, 0.15, 0.0]
-    supervisor.replan(node, sensed, touchdown, touchdown)
+    supervisor.replan(Cause.DEVIATION, node, sensed, touchdown, phase_time=touchdown)
     assert 0.0 <= supervisor.time_of(Event.TOUCHDOWN) < 0.005
 
 
 def test_surprise_is_a_large_deviation_some_time_after_the_last_plan(gait):
     supervisor = planned(gait, ReplanOptions(speed=0.05, interval=0.02))
-    assert supervisor.deviates(-0.06, phase_time=0.1, now=0.1)
-    assert not supervisor.deviates(0.04, phase_time=0.1, now=0.1)
-    assert not supervisor.deviates(0.06, phase_time=0.01, now=0.1)
-    assert not supervisor.deviates(0.06, phase_time=0.1, now=0.01)
+    node = AUTOMATON.node(STRIDE_START["w"])
+    assert supervisor.surprise(node, -0.06, phase_time=0.1, now=0.1) is Cause.DEVIATION
+    assert supervisor.surprise(node, 0.04, phase_time=0.1, now=0.1) is None
+    assert supervisor.surprise(node, 0.06, phase_time=0.01, now=0.1) is None
+    assert supervisor.surprise(node, 0.06, phase_time=0.1, now=0.01) is None
 
 
 def test_a_step_that_does_not_go_on_is_tried_again_and_again(gait):
     supervisor = planned(gait)
     sensed = TemplateState(VLO.state(np.array([0.2, 0.85, 0.0])), np.zeros(2))  # it falls back
     node = supervisor.decide(VLO, sensed, 0.0, NOTHING)
-    assert not supervisor.reports[0].decision.feasible
-    assert not supervisor.deviates(0.0, phase_time=0.01, now=0.01), "this was just planned"
-    assert supervisor.deviates(0.0, phase_time=0.03, now=0.03)
+    assert not supervisor.decision.feasible
+    assert supervisor.surprise(node, 0.0, 0.01, 0.01) is None, "this was just planned"
+    assert supervisor.surprise(node, 0.0, 0.03, 0.03) is Cause.NO_FUTURE
     stride = simulate_stride(P, node.name, VLO.state(gait.vlo), gait.controls)
     sensed.state[:] = stride.sample(0.05)[0][:4]
-    supervisor.replan(node, sensed, 0.03, 0.03)
-    assert supervisor.reports[0].decision.feasible
-    assert not supervisor.deviates(0.0, phase_time=0.03, now=0.06)
+    supervisor.replan(Cause.DEVIATION, node, sensed, 0.03, phase_time=0.03)
+    assert supervisor.decision.feasible
+    assert supervisor.surprise(node, 0.0, 0.03, 0.06) is None
 
 
 def test_a_stride_may_have_come_here_on_the_legs_of_the_gait(gait):
@@ -270,13 +271,13 @@ def test_a_stride_may_have_come_here_on_the_legs_of_the_gait(gait):
     node, supervisor = AUTOMATON.node(STRIDE_START["w"]), planned(gait)
     sensed = TemplateState(VLO.state(gait.vlo), np.zeros(2))
     supervisor.decide(VLO, sensed, 0.0, NOTHING)
-    stiff = supervisor.reports[0].decision.controls.copy()
+    stiff = supervisor.decision.controls.copy()
     stiff[Slot.K_SC] *= 4.0
-    supervisor.set_decision(replace(supervisor.reports[0].decision, controls=stiff))
+    supervisor.set_decision(replace(supervisor.decision, controls=stiff))
     stride = simulate_stride(P, node.name, VLO.state(gait.vlo), gait.controls)
     sensed.state[:] = stride.sample(0.1)[0][:4]
-    supervisor.replan(node, sensed, 0.1, 0.1)
-    decision = supervisor.reports[0].decision
+    supervisor.replan(Cause.DEVIATION, node, sensed, 0.1, phase_time=0.1)
+    decision = supervisor.decision
     assert decision.feasible
     np.testing.assert_allclose(decision.predicted, gait.vlo, atol=1e-3)
 

@@ -6,10 +6,11 @@ import pytest
 import template_control as tc
 from template_control.embedding import gaits_by_speed, standing_planners, standing_pose
 from template_control.embedding.planners.planner import Context
+from template_control.embedding.recovery import steps_from
 from template_control.embedding.standing.passes import CLOSING
 from template_control.run.options import Push
 from template_control.slip import Event
-from template_control.slip.automaton.automaton import AUTOMATON, STEP_OUT
+from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.maps.section import REST
 from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
@@ -86,7 +87,7 @@ def test_a_step_is_made_where_the_feet_do_not_hold(planners, speed, holds, kind)
     assert stand.feasible == holds
     fit = [
         other
-        for other in STEP_OUT[node]
+        for other in steps_from(node)
         if planners[other]
         .curve(AUTOMATON.starts[other], start, toes, planners[other].decide(Context(z)))[0]
         .feasible

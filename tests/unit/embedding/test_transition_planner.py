@@ -9,7 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
+from template_control.embedding.planners.planner import (
+    Cause,
+    Context,
+    Decision,
+    Planner,
+    RestContext,
+)
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.planners.transition import (
     RUN_TO_WALK,
@@ -228,13 +234,13 @@ def test_a_push_within_a_transition_gets_other_stiffnesses():
     speed, height, vertical = WALK.vlo
     start = TemplateState(np.array([0.0, height, speed, vertical]), np.zeros(2))
     supervisor.decide(VLO, start, 0.0, EstimatorState(load=1.0, trim=0.0, lean=0.0))
-    before = supervisor.reports[-1].decision.controls.copy()
+    before = supervisor.decision.controls.copy()
     node, state, toes = middle("wr", WALK.vlo, VLO, before, Event.REAR_LIFTOFF)
     pushed = TemplateState(state - [0.0, 0.0, 0.2, 0.0], np.array(toes))
     as_before = StrideSimulator(P).run(node, pushed.state, before, tuple(toes))
     assert as_before.outcome is not Outcome.SECTION, "it does not leave the ground"
-    supervisor.replan(AUTOMATON.node(node), pushed, 0.1, 0.5)
-    after = supervisor.reports[-1].decision.controls
+    supervisor.replan(Cause.DEVIATION, AUTOMATON.node(node), pushed, 0.5, phase_time=0.1)
+    after = supervisor.decision.controls
     # The energy that the push took comes back from a leg that becomes stiffer at its bottom.
     assert (
         after[Slot.K_SD_WR] / after[Slot.K_SC_WR]

@@ -58,11 +58,11 @@ def test_what_was_measured_stays_so_where_planning_fails(robot):
     controller.observer.pre_impact_velocity[:] = 7.0, -3.0
     seen = []
 
-    def fail(node, sensed, now, height, *, choose):
+    def fail(cause, node, sensed, now, *, height_error):
         seen.append(sensed.state[2:].copy())
         raise RuntimeError
 
-    controller.supervisor.replan_after_touchdown = fail
+    controller.supervisor.replan = fail
     controller._enter("DS_sc^wp")
     assert controller.mode.control.use_pre_impact_velocity
     with pytest.raises(RuntimeError):

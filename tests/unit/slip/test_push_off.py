@@ -167,6 +167,6 @@ def test_three_controls_leave_the_rest_of_a_step(gait):
     decision = planner.decide(Context(gait.vlo))
     rest = RestContext(lambda u: (gait.vlo, Outcome.SECTION), decision, gait.vlo, [])
     assert planner.decide_rest(rest) is decision
-    assert planner.decide_rest(rest._replace(cause=Cause.NO_FUTURE)) is None, (
+    assert planner.decide_rest(rest._replace(cause=Cause.RECOVERY)) is None, (
         "nothing breaks into it"
     )
