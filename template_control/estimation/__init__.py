@@ -1,4 +1,4 @@
-"""The robot's state from what a real robot measures: encoders, an IMU, contacts of the feet."""
+"""State estimation from the sensors of a real robot: encoders, an IMU, foot contacts."""
 
 from template_control.deprecated import attach_stub
 

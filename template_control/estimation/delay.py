@@ -1,4 +1,4 @@
-"""Delay of the robot's torques: estimated from their effect, and compensated."""
+"""Estimation and compensation of the torques' delay."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ Array = NDArray[np.float64]
 _LOG = logging.getLogger(__name__)
 
 _BLOCK = 64  # ticks whose accelerations are compared at once
-# Another delay is believed when its squared errors are less than those of the present one by this
-# share. Neighbours differ by 1 % at a noise of 0.5 mrad.
+# The estimate changes to another delay whose squared errors are smaller than those of the present
+# one by this share. Neighbours differ by 1 % at a noise of 0.5 mrad.
 _MARGIN = 0.01
 
 
 @dataclass(frozen=True)
 class DelayOptions(Checked):
-    """Delays that are looked for, and how soon one is believed.
+    """Range of delays of :class:`DelayCompensation`, and how fast its estimate changes.
 
     Attributes:
-        longest: delay that is looked for; 0: none is, and none compensated [s].
-        memory: over which the errors of each delay are remembered [s]. A swing and a stance of each
-            leg tell delays apart; a shorter memory follows the noise.
-        most: error of a joint's acceleration that counts at most [rad/s^2]. Impacts say nothing
-            of delays.
+        longest: largest delay considered [s]; 0 switches estimate and compensation off.
+        memory: time constant of the sum of each delay's errors [s]. Delays differ clearly over a
+            swing and a stance of each leg; a shorter memory follows the noise.
+        most: bound at which errors of a joint's acceleration are clipped [rad/s^2]: impacts
+            carry no information on delays.
 
     Raises:
         ParameterError: if a value is of a wrong type or out of its range.
@@ -57,7 +57,7 @@ class DelayCompensation:
         q + d dt v + dt^2 ((d - 1/2) a_{k-d} + ... + 1/2 a_{k-1}).
 
     Args:
-        options: what is looked for.
+        options: delays that are considered.
         robot: whose state.
         dt: control period [s].
     """
@@ -72,15 +72,15 @@ class DelayCompensation:
         self._first = 0  # tick of the block
         self._tick = 0
         self.ticks = 0
-        """Of delay, as believed now."""
+        """Estimated delay in ticks."""
 
     @property
     def delay(self) -> float:
-        """As believed now [s]."""
+        """Estimated delay [s]."""
         return self.ticks * self._dt
 
     def foresee(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """The state when this tick's torques will act; without delay the arrays that are given.
+        """Predicted state at which this tick's torques will act; without delay the arguments.
 
         Args:
             q: (nq,) measured configuration.
@@ -102,7 +102,7 @@ class DelayCompensation:
         return self._robot.moved(q, step), v + dt * pending.sum(axis=0)
 
     def expect(self, acceleration: Array) -> None:
-        """Hear what this tick's torques are expected to do.
+        """Store the acceleration that this tick's torques should cause.
 
         Args:
             acceleration: (nv,) while they act [m/s^2, rad/s^2].
@@ -112,7 +112,7 @@ class DelayCompensation:
             self._tick += 1
 
     def _compare(self) -> None:
-        """Take the block's errors for each delay, believe the likeliest one, and begin anew."""
+        """Add the block's errors to each delay's sum, update the estimate, start a new block."""
         o, joints = self._options, slice(self._robot.base_dof, None)
         if self._first >= self._most:  # before, the first torques have no history
             found = np.diff(self._measured[:, joints], axis=0) / self._dt

@@ -26,7 +26,7 @@ class JointFilterOptions(Checked):
 
     Attributes:
         angle_noise: standard deviation of an encoder's reading [rad]; the sensor's own.
-        acceleration_noise: standard deviation of what the whole-body QP's accelerations lack
+        acceleration_noise: standard deviation of the error of the whole-body QP's accelerations
             in a tick [rad/s^2]. Less, and speeds are late after an impact; more, and they are
             as noisy as the encoders' differences.
     """
@@ -36,8 +36,9 @@ class JointFilterOptions(Checked):
 
 
 class JointFilter:
-    """Steady Kalman filter of each joint: q'' is known but for white noise, q is measured.
+    """Steady-state Kalman filter of each joint, driven by the expected acceleration.
 
+    Model: q'' is the expected acceleration plus white noise, and q is measured.
     With the tracking index L = s_a dt^2 / s_q, r = (4 + L - sqrt(8 L + L^2)) / 4 the gains are
     a = 1 - r^2 and b = 2 (2 - a) - 4 sqrt(1 - a) (Kalata 1984):
 
@@ -53,7 +54,7 @@ class JointFilter:
         self.speed: Array = np.zeros(0)
 
     def reset(self, angle: Array, speed: Array) -> None:
-        """Begin with a known state.
+        """Reset to a known state.
 
         Args:
             angle: (nu,) [rad].
@@ -62,7 +63,7 @@ class JointFilter:
         self.angle, self.speed = angle.copy(), speed.copy()
 
     def update(self, measured: Array, acceleration: Array, dt: float) -> None:
-        """Go on by a tick.
+        """Advance the estimate by one tick.
 
         Args:
             measured: (nu,) the encoders' angles [rad].
@@ -91,7 +92,7 @@ class BaseFilterOptions(Checked):
     Attributes:
         gyro_noise: of a reading [rad/s]; the sensor's own, whatever the robot's size.
         force_noise: of a reading of the accelerometer [m/s^2]; likewise.
-        foot_noise: of a foot's place beside the trunk, by encoders and model [m].
+        foot_noise: of a foot's position relative to the trunk, from encoders and model [m].
         creep: of a standing foot in a second, by slip and by a ground that gives way [m/s].
     """
 
@@ -104,12 +105,12 @@ class BaseFilterOptions(Checked):
 class BaseFilter:
     """Extended Kalman filter of (x, y, pitch, x', y', p_left, p_right).
 
-    The IMU moves the state on, with R the trunk's rotation and f the specific force:
+    The IMU predicts the state, with R the trunk's rotation and f the specific force:
 
         pitch' = gyro,    v' = R(pitch) f - (0, g),    x' = v,
 
-    and a foot that stands stays where it landed. Measured is p_i less the place at which the
-    leg's angles put the foot; a round foot rolls, so that p_i is its contact point less the
+    and a foot in stance stays where it landed. The measurement is p_i minus the foot's position
+    by forward kinematics; a round foot rolls, so that p_i is its contact point less the
     radius times its angle, which keeps its value while it rolls. Along the world's x and y
     nothing is measured: the estimate drifts there as a real robot's does. (Bloesch et al. 2012,
     in the plane.)
@@ -128,7 +129,7 @@ class BaseFilter:
         self._stands = np.zeros(2, dtype=bool)
 
     def reset(self, q: Array, v: Array) -> None:
-        """Begin with a known state, no foot standing yet.
+        """Reset to a known state, with no foot in stance.
 
         Args:
             q: (nv,) configuration [m, rad].
@@ -140,7 +141,7 @@ class BaseFilter:
         self._stands[:] = False
 
     def predict(self, pitch_rate: float, specific_force: Array, dt: float) -> None:
-        """Go on by a tick.
+        """Advance the estimate by one tick.
 
         Args:
             pitch_rate: read now [rad/s].
@@ -168,7 +169,7 @@ class BaseFilter:
         self._covariance = flow @ self._covariance @ flow.T + np.diag(noise)
 
     def correct(self, joints: Array, contact: NDArray[np.bool_]) -> None:
-        """Take in where the legs put the feet.
+        """Correct the estimate with the leg kinematics of the feet in contact.
 
         Args:
             joints: (nu,) angles [rad].
@@ -190,7 +191,7 @@ class BaseFilter:
         noise = self.options.foot_noise**2 * np.eye(2)
         p = self._covariance
         if not self._stands[foot]:
-            # It has just landed: where it stands is what the rest of the state says.
+            # It has just landed: the rest of the state determines its position.
             p[here, :] = slope @ p
             p[:, here] = p[here, :].T
             p[here, here] = slope @ p @ slope.T + noise
@@ -208,7 +209,7 @@ class NoiseFilterOptions(Checked):
     """Confidence in the accelerations that the whole-body QP expects.
 
     Attributes:
-        acceleration_noise: standard deviation of what they lack in a tick [rad/s^2]; of the base's
+        acceleration_noise: standard deviation of their error in a tick [rad/s^2]; of the base's
             x, y and z it is this times the template's rest length [m/s^2]. Less, and the estimate
             is late after a push and with another mass; more, and it is as noisy as the sensors.
         landing_noise: the same of the joints after a touchdown [rad/s^2]. A foot lands with a
@@ -222,9 +223,9 @@ class NoiseFilterOptions(Checked):
 
 
 class NoiseFilter:
-    """Kalman filter of the whole state, each coordinate for itself.
+    """Kalman filter of the whole state, decoupled by coordinate.
 
-    The QP's accelerations a move the state on; what they lack is white noise. Measured are q
+    The state is predicted with the QP's accelerations a; their error is white noise. Measured are q
     and v. With the errors e taken along the configuration space, and gains K that all coordinates
     of the base share, and all joints:
 
@@ -258,7 +259,7 @@ class NoiseFilter:
         contact: NDArray[np.bool_],
         dt: float,
     ) -> tuple[Array, Array]:
-        """Take in the measurement of a tick; the first one is believed as it is.
+        """Update the estimate with one tick's measurement; the first one sets it.
 
         Args:
             measured: (nq,) configuration and (nv,) velocity.
@@ -291,7 +292,7 @@ class NoiseFilter:
 
 
 class _Pair:
-    """Covariance of a position and its speed, both of which are measured at every tick.
+    """Covariance of a position and its speed, both measured at every tick.
 
     Args:
         deviation: (2,) standard deviations of the measurements.

@@ -1,4 +1,4 @@
-"""Simulated encoders, IMU and contacts, and the estimator of the whole state from them."""
+"""Simulated encoders, IMU and contact sensors, and the state estimator that uses them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PITCH = 2
 
 
 class Readings(NamedTuple):
-    """Readings of one tick; no position in the world is among them.
+    """Sensor readings of one tick; the position in the world is not measured.
 
     Attributes:
         joints: (nu,) angles that the encoders tell [rad].
@@ -55,7 +55,7 @@ class EstimatorOptions(Checked):
 
 
 class StateEstimator:
-    """Estimates (q, v) from :class:`Readings`.
+    """Estimator of (q, v) from :class:`Readings`.
 
     Args:
         robot: model; its last update is overwritten.
@@ -67,7 +67,7 @@ class StateEstimator:
         self._base = BaseFilter(robot, options.base)
 
     def reset(self, q: Array, v: Array) -> None:
-        """Begin with a known state.
+        """Reset to a known state.
 
         Args:
             q: (nv,) configuration [m, rad].
@@ -77,7 +77,7 @@ class StateEstimator:
         self._base.reset(q, v)
 
     def update(self, readings: Readings, acceleration: Array, dt: float) -> tuple[Array, Array]:
-        """Take in the readings of a tick.
+        """Update the estimate with one tick's readings.
 
         Args:
             readings: of this tick.
@@ -98,7 +98,7 @@ class StateEstimator:
 
 @dataclass(frozen=True)
 class ImuOptions(Checked):
-    """Encoders, an IMU in the trunk and contacts; the controller gets an estimate of the state.
+    """Sensing by encoders, a trunk IMU and contacts: the controller gets a state estimate.
 
     The IMU sits where the legs hang. Noise is white and Gaussian, drawn anew at every tick.
 
@@ -126,7 +126,7 @@ class ImuOptions(Checked):
 
 
 class ImuSensors:
-    """Reads a robot's sensors and estimates its state; the state it starts in is known.
+    """Simulated sensors of a robot and its state estimate, which starts at the true state.
 
     Args:
         options: the noise.

@@ -1,4 +1,4 @@
-"""The paper's tables and figures, computed again: ours beside the paper's."""
+"""Reproduction of the paper's tables and figures, compared with the published numbers."""
 
 from template_control.deprecated import attach_stub
 

@@ -24,7 +24,7 @@ _MAPS = (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)
 
 
 def summary(record: ScenarioRecord) -> dict[str, Any]:
-    """Figures of a run of Example I, SI units."""
+    """Summary figures of a run of Example I, SI units."""
     kinds = np.array(record.strides)
     error = record.section_state[1:, 0] - record.wanted_speed
     running, walking = kinds == StrideKind.RUN, kinds == StrideKind.WALK
@@ -53,7 +53,7 @@ def summary(record: ScenarioRecord) -> dict[str, Any]:
 
 
 def fig10() -> Reproduction:
-    """Example I on the paper's map, and what the maps cost in tracking."""
+    """Example I on the paper's map, and the tracking error with each map."""
     records = {kind: simulate_scenario(example_one(kind)) for kind in _MAPS}
     data = {kind.name.lower(): summary(record) for kind, record in records.items()}
 
@@ -104,15 +104,15 @@ def fig10() -> Reproduction:
             " controllers compute with.",
             "Energy phase: correlation of forward kinetic and gravitational energy over a"
             " stride, -1 out of phase, +1 in phase.",
-            "Walking starts at 1.125 m/s at VLO, which is 1.17 m/s on average as Section V-A"
-            " tells it; Table IV's 1.1 m/s would be 1.13 m/s.",
+            "Walking starts at 1.125 m/s at VLO, which is 1.17 m/s on average as in Section"
+            " V-A; Table IV's 1.1 m/s would be 1.13 m/s.",
         ),
         figures={"fig10": scenario_figure(record), "fig10_energies": energy_figure(record)},
     )
 
 
 def fig10_on(robot_name: str) -> Reproduction:
-    """Example I on a robot, its template beside it.
+    """Example I on a robot, compared with its template.
 
     Args:
         robot_name: a shipped robot, or the path of a URDF.

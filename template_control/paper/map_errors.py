@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Grid:
-    """Numbers of points over Table II's ranges, ends included.
+    """Grid over Table II's ranges, ends included.
 
     Attributes:
         stiffness: of k0 from 10 to 25 kN/m.
@@ -55,7 +55,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class MapErrors:
-    """Errors of one map over the valid runs; NaN where the map says the step fails.
+    """Errors of one map over the valid runs; NaN where the step fails on the map.
 
     Attributes:
         position: (n,) e of (31) at the next VLO [%].
@@ -131,7 +131,7 @@ def study(grid: Grid | None = None, parameters: SlipParameters | None = None) ->
 
 
 def _may_touch_down(p: SlipParameters, z: Array, u: Array) -> NDArray[np.bool_]:
-    """(29) and (30): the energy is enough for the next touchdown."""
+    """Conditions (29) and (30): the energy suffices for the next touchdown."""
     k, low = u[:, Slot.K_SC], p.rest_length * np.sin(u[:, Slot.TOUCHDOWN_ANGLE])
     at_rest = np.column_stack((np.zeros_like(low), low, np.zeros_like(low)))
     return np.asarray(VLO.energy(p, z, k) >= VLO.energy(p, at_rest, k))
@@ -221,7 +221,7 @@ def _grid_note(result: ErrorStudy, grid: Grid) -> str:
 
 
 def table3() -> Reproduction:
-    """Mean, sd and max of (31) and (32)."""
+    """Table III: mean, standard deviation and maximum of (31) and (32)."""
     grid = Grid()
     result = study(grid)
     rows = []
@@ -264,7 +264,7 @@ def _binned(errors: Array, bins: NDArray[np.signedinteger], count: int) -> Array
 
 
 def fig5() -> Reproduction:
-    """Errors binned over d_v."""
+    """Fig. 5: errors of the maps binned over d_v."""
     grid = Grid()
     result = study(grid)
     bins = np.digitize(result.distance, _BINS) - 1

@@ -72,13 +72,13 @@ def _wrt_row(name: str, u: Array, reached: str) -> tuple[str, ...]:
 
 
 def _ends(stride: str, z: Array, u: Array) -> tuple[str, list[float]]:
-    """Where the exact stride ends, in words and numbers."""
+    """Final state of the exact stride, as text and as numbers."""
     mapped = ReturnMap(P, stride)(z, u)
     return "  ".join(f"{value:.4f}" for value in mapped.state), mapped.state.tolist()
 
 
 def table4() -> Reproduction:
-    """Controls of both transitions from Table IV's states."""
+    """Table IV: controls of both transitions from the published states."""
     rows, data = [], {}
     text, end = _ends(StrideKind.RUN_TO_WALK, RWT_STATE, RWT_CONTROLS)
     rows.append(_rwt_row("Table IV", RWT_CONTROLS, text))
@@ -179,7 +179,7 @@ def _stride_data(strides: list[tuple[str, Stride]]) -> dict[str, Any]:
 
 
 def fig6() -> Reproduction:
-    """The WRT stride on the exact model, with Table IV's gains and with ours."""
+    """Fig. 6: the WRT stride on the exact model, with Table IV's gains and with ours."""
     start = VLO.state(WRT_STATE)
     published = simulate_stride(P, STRIDE_START[StrideKind.WALK_TO_RUN], start, WRT_CONTROLS)
     target = np.array([published.state[2], APEX_HEIGHT])
@@ -199,7 +199,7 @@ def fig6() -> Reproduction:
 
 
 def fig7() -> Reproduction:
-    """The RWT stride on the exact model, with Table IV's gains and with ours."""
+    """Fig. 7: the RWT stride on the exact model, with Table IV's gains and with ours."""
     start = APEX.state(RWT_STATE)
     ours = run_to_walk()[MapKind.IMPROVED].controls
     strides = [

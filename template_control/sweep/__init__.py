@@ -1,4 +1,4 @@
-"""Any function over a grid or a sample of its arguments, on many processes."""
+"""Sweeps of any function over a grid or a sample of its arguments, on many processes."""
 
 from template_control.deprecated import attach_stub
 

@@ -1,4 +1,4 @@
-"""Calls of one function on any executor that has ``submit`` like ``concurrent.futures``."""
+"""Calls of one function on an executor with the ``submit`` of ``concurrent.futures``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _GRACE = 0.5  # [s] in which calls may end that Ctrl-C found running
 
 
 class ExecutorLostError(Exception):
-    """The executor, not a call, failed."""
+    """Failure of the executor, as opposed to a failure of a call."""
 
 
 def check_pickles(function: Callable[..., Any], executor: Executor | None) -> None:
@@ -59,7 +59,7 @@ def run_calls(
     keep: Callable[[int, Outcome], None],
     refresh: Callable[[], None],
 ) -> None:
-    """Feed the executor and keep what comes back; at an error, what had finished by then too.
+    """Submit calls to the executor and keep each outcome, also those finished before an error.
 
     Args:
         function: what to call.
@@ -120,7 +120,7 @@ def _submit(
 
 
 def _call(_: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Outcome:
-    """In the worker: one call, whatever comes of it."""
+    """Outcome of one call, in the worker; exceptions are caught."""
     with _no_interrupt():
         try:
             return Outcome(to_jsonable(function(**arguments)), None)
@@ -130,7 +130,7 @@ def _call(_: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Ou
 
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """Ctrl-C reaches worker processes too, where a robot's run would end early, as if whole."""
+    """Ignore Ctrl-C in a worker, where it would end a robot's run early without a trace."""
     if (
         multiprocessing.parent_process() is None
         or threading.current_thread() is not threading.main_thread()
@@ -162,11 +162,11 @@ def _outcome(future: Future[Outcome]) -> Outcome:
 
 
 class _Workers(ProcessPoolExecutor):
-    """Processes of :func:`workers`, told apart from a user's: who ends them cancels their calls."""
+    """Process pool of :func:`workers`, a type of its own: its pending calls are cancelled."""
 
 
 def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
-    """Give up what has not begun.
+    """Cancel the calls that have not started.
 
     Where a worker dies meanwhile, its executor fails at a future that somebody else has cancelled:
     so calls of our own, which are ended next, are left to it.
@@ -178,7 +178,7 @@ def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
 
 @contextmanager
 def _workers(executor: Executor | None) -> Iterator[Executor]:
-    """The user's executor as it is, or our own, ended with the sweep."""
+    """The user's executor, or a pool of our own that ends with the sweep."""
     if executor is not None:
         yield executor
         return
@@ -210,7 +210,7 @@ def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
 
 
 def _obey_parent_only() -> None:
-    """In a worker: leave Ctrl-C to the parent, and end with it, once compiled code returns."""
+    """Leave Ctrl-C to the parent, and end with it once compiled code returns (in a worker)."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # A command line handles these in the parent; the executor ends its processes with the first.
     for number in (signal.SIGTERM, signal.SIGHUP):

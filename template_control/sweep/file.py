@@ -1,6 +1,6 @@
 """Results of a sweep on disk: JSON lines, one appended as each item finishes.
 
-The first line says which sweep it is; every other one is an item that finished. A process
+The first line identifies the sweep; each further line is a finished item. A process
 killed while it writes leaves at most a torn last line, which the next one drops.
 """
 
@@ -24,7 +24,7 @@ _FORMAT = "template-control sweep 1"
 
 
 class Outcome(NamedTuple):
-    """How an item ended.
+    """Outcome of an item: result or error.
 
     Attributes:
         result: as :func:`~template_control.storage.to_jsonable` makes it; None where it failed.
@@ -52,7 +52,7 @@ def name_of(function: Callable[..., Any]) -> str:
 def header(
     function: Callable[..., Any], seed: int, items: Iterable[Any], whole: bool = True
 ) -> dict[str, Any]:
-    """What identifies a sweep: format, function, seed, number and SHA-256 of its plain items.
+    """Identity of a sweep: format, function, seed, number and SHA-256 of its plain items.
 
     Args:
         function: what the sweep calls; its name counts, not its code.
@@ -71,7 +71,7 @@ def header(
             digest.update(json.dumps(to_jsonable(item), sort_keys=True).encode() + b"\n")
             count += 1
     except TypeError as error:
-        raise SweepError(f"{what} cannot be told in a file: {error}") from None
+        raise SweepError(f"{what} cannot be written to a file: {error}") from None
     head = {"format": _FORMAT, "function": name, "seed": seed}
     return {**head, "items": count, "sha256": digest.hexdigest()} if whole else head
 
@@ -82,8 +82,8 @@ class SweepFile:
     Args:
         path: of the file; a new one is begun where there is none.
         head: of :func:`header`.
-        items: of a sweep that may have fewer or more of them in the file; None: the header tells
-            that they are these.
+        items: of a sweep that may have fewer or more of them in the file; None: the header
+            identifies them.
 
     Attributes:
         finished: outcome by item index, as the file had them; the last of an item counts.
@@ -118,12 +118,12 @@ class SweepFile:
 
     def _close(self) -> None:
         free_lock(self._file.fileno())
-        # What a full disk refused is told by then; closing tries it once more.
+        # A full disk was reported before; closing would try the write once more.
         with suppress(OSError):
             self._file.close()
 
     def _read(self, head: dict[str, Any]) -> None:
-        """Take over what is there, cut a torn end off, begin an empty file."""
+        """Read existing outcomes, truncate a torn last line, write the header of an empty file."""
         first = json.dumps(head).encode() + b"\n"
         self._file.seek(0)
         end = 0
@@ -176,7 +176,7 @@ class SweepFile:
         self.finished[index] = Outcome(entry.get("result"), error)
 
     def append(self, index: int, item: Mapping[str, Any], seed: int, outcome: Outcome) -> None:
-        """Write an item that finished; it is with the operating system when this returns.
+        """Append a finished item; the line is flushed to the operating system before this returns.
 
         Args:
             index: place of the item in the sweep, from 0.

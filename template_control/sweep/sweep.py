@@ -37,7 +37,7 @@ _MOST_DRAWS = 10_000_000
 
 @dataclass(frozen=True)
 class SweepResult:
-    """What a sweep found, in the order of its items.
+    """Results of a sweep, in the order of its items.
 
     Attributes:
         items: arguments of each call.
@@ -88,13 +88,13 @@ class SweepResult:
 
 @dataclass(frozen=True)
 class SweepOptions(Checked):
-    """How a sweep goes about its items.
+    """Options of :func:`sweep`.
 
     Attributes:
         progress: show a bar on stderr.
-        label: of the bar, and of what goes wrong.
-        retry_failed: run items again that the file has as failed.
-        in_flight: how many items are with the executor at a time; at least its workers.
+        label: of the bar and of error messages.
+        retry_failed: repeat the items that failed according to the file.
+        in_flight: number of items submitted at a time; at least the number of workers.
         grows: the file may be of a sweep of fewer or more items, where these begin alike.
 
     Raises:
@@ -111,7 +111,7 @@ class SweepOptions(Checked):
 
 
 def grid(**axes: Iterable[Any]) -> list[Item]:
-    """Every combination of the axes' values, the last axis changing fastest.
+    """All combinations of the axes' values, the last axis changing fastest.
 
     Raises:
         SweepError: if an axis is no list of values.
@@ -168,7 +168,7 @@ def sweep(
     seed: int = 0,
     options: SweepOptions = SweepOptions(),
 ) -> SweepResult:
-    """Call ``function(**item)`` for every item; one that fails is recorded and ends nothing.
+    """Call ``function(**item)`` for every item; failures are recorded and do not end the sweep.
 
     A function with a parameter ``seed`` gets :func:`item_seed`. It returns plain data (see
     :func:`~template_control.storage.to_jsonable`), and for worker processes it is defined at the
@@ -182,8 +182,8 @@ def sweep(
         items: keyword arguments of each call, as of :func:`grid` or :func:`sample`.
         path: of the results file (JSON lines); None keeps the results in memory only.
         executor: where to run; None for one process a core, for the sweep's time.
-        seed: what the items' seeds come from, not negative.
-        options: bar, label, whether to retry, how many items at a time.
+        seed: from which the items' seeds are derived, not negative.
+        options: bar, label, retries, number of items at a time.
 
     Raises:
         SweepError: if function and items do not fit, the file is another's or cannot be
@@ -235,7 +235,7 @@ def sweep(
 def _checked(
     function: Callable[..., Any], items: Iterable[Mapping[str, Any]], seed: int
 ) -> tuple[bool, list[Item]]:
-    """Whether the function takes a seed; the items, each of which it can be called with."""
+    """Whether the function has a parameter ``seed``, and the items after a check of their names."""
     if seed < 0:
         raise SweepError(f"seed is {seed}: give at least 0")
     try:

@@ -143,8 +143,8 @@ def test_an_executor_that_was_shut_down_is_told():
         (square, [], {"in_flight": 0}, "in_flight is 0"),
         (lambda x: x, [{"x": 1}], {}, "define it at the top level of a module"),
         (3, [{"x": 1}], {}, "3 shows no parameters: give a function"),
-        (square, [{"x": P}], {"path": "s"}, "item 0 cannot be told in a file: a SlipParameters"),
-        (partial(other, P), [{}], {"path": "s"}, "the function cannot be told in a file"),
+        (square, [{"x": P}], {"path": "s"}, "item 0 cannot be written to a file: a SlipParameters"),
+        (partial(other, P), [{}], {"path": "s"}, "the function cannot be written to a file"),
     ],
 )
 def test_bad_input_is_named(tmp_path, monkeypatch, function, items, options, culprit):
