@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import Console
 
 if TYPE_CHECKING:
     from rich.progress import Progress
+
+T = TypeVar("T")
 
 
 def plain_console(stderr: bool = False) -> Console:
@@ -49,3 +52,15 @@ def bar(console: Console, note: str = "", **options: Any) -> Progress:
         console=console,
         **options,
     )
+
+
+def counted(items: Iterable[T], total: int, text: str) -> Iterator[T]:
+    """The items, with a progress bar on standard error for as long as they last.
+
+    Args:
+        items: to go through, once.
+        total: how many they are.
+        text: in front of the bar.
+    """
+    with bar(plain_console(stderr=True), transient=True) as progress:
+        yield from progress.track(items, total=total, description=text)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from rich.table import Table
 
 from template_control.checks import option_types as values
 from template_control.errors import ParameterError
-from template_control.paper.reproduction import REPRODUCTIONS, Reproduction
+from template_control.paper.reproduction import LONG, REPRODUCTIONS, Reproduction
 from template_control.storage import Files, writing
 from template_control.terminal import plain_console
 from template_control.view.style import save_figure
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
         raise ParameterError(f"--robot goes with {_ON_A_ROBOT} only: leave it out")
     files, paths = Files(), []
     with nullcontext() if options.no_figures else writing(options.output) as folder:
-        with plain_console(stderr=True).status(f"computing {options.name}"):
+        with _announced(options.name):
             result = REPRODUCTIONS[options.name]() if options.robot is None else _on(options.robot)
         if folder is not None:
             paths = files.write(lambda: _save(result, folder)) or []
@@ -62,6 +62,15 @@ def run(options: argparse.Namespace) -> int:
         _print(result, paths)
     files.raise_pending()
     return 0
+
+
+def _announced(name: str) -> AbstractContextManager[object]:
+    """A line or a spinner on standard error; what lasts long has progress bars of its own."""
+    console = plain_console(stderr=True)
+    if name not in LONG:
+        return console.status(f"computing {name}")
+    console.print(f"computing {name}: about {LONG[name]} s on two cores", highlight=False)
+    return nullcontext()
 
 
 def _on(robot: str) -> Reproduction:

@@ -30,6 +30,7 @@ from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.sweep.executor import workers
+from template_control.terminal import counted
 from template_control.view.figures import stick_diagram
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, Look, shade
 
@@ -343,7 +344,8 @@ def fig12() -> Reproduction:
         if plant != FULL_GRIP or planner == first
     ]
     with workers() as pool:
-        walks = dict(zip(cases, pool.map(_walk, cases), strict=True))
+        done = counted(pool.map(_walk, cases), len(cases), "walks")
+        walks = dict(zip(cases, done, strict=True))
     _, record = robot_walk("LQR", "PyBullet", steps=6)
     sticks = stick_diagram(beginning(record, 2.2), Look(titled=False))
     sticks.axes[0].set_title("five-link from z_0: LQR, PyBullet")
@@ -408,7 +410,8 @@ def fig13() -> Reproduction:
     """Torques with the template's liftoff and with predefined ones."""
     cases = [(rule, plant) for plant in ("PyBullet", "ideal") for rule in _LIFTOFFS]
     with workers() as pool:
-        results = dict(zip(cases, pool.map(_liftoffs, cases), strict=True))
+        done = counted(pool.map(_liftoffs, cases), len(cases), "walks")
+        results = dict(zip(cases, done, strict=True))
     rows: list[tuple[str, ...]] = []
     for (rule, plant), (event, _, walk, _) in results.items():
         rows.append(

@@ -56,3 +56,6 @@ REPRODUCTIONS: dict[str, Callable[[], Reproduction]] = {
     name: partial(_reproduce, module, name) for name, module in _MODULES.items()
 }
 """By the name ``template-control reproduce`` knows them by."""
+
+LONG = {"fig8": 20, "fig9": 60, "fig12": 60, "fig13": 20}
+"""Seconds on two cores of those that need more than ten, in tens."""

@@ -28,6 +28,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.sweep.executor import workers
+from template_control.terminal import counted
 from template_control.view.stability_figures import basin_figure, deadbeat_figure
 
 Array = NDArray[np.float64]
@@ -69,7 +70,8 @@ def backward_set(
     forward = ReturnMap(p)
     walk = StrideSimulator(p)
     states, controls = [], []
-    for kappa in np.linspace(*stiffness_range, counts[0]) * p.leg_stiffness:
+    kappas = np.linspace(*stiffness_range, counts[0]) * p.leg_stiffness
+    for kappa in counted(kappas, counts[0], "set of states"):
         for angle in np.radians(np.linspace(0.0, 90.0, counts[1] + 2)[1:-1]):
             u = np.zeros(NUM_SLOTS)
             u[[Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]] = angle, kappa, p.leg_stiffness
@@ -106,12 +108,9 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
         slots, np.array([0.0, 0.5 * k0]), np.array([0.5 * np.pi, 1.5 * k0]), np.array([1.0, k0])
     )
     problem = StepProblem(ReturnMap(p, StrideKind.WALK, kind), unknowns, evaluations=100)
-    controls = np.array(
-        [
-            problem.solve(z, gait.vlo, [u]).controls
-            for z, u in zip(found.state, found.controls, strict=True)
-        ]
-    )
+    pairs = zip(found.state, found.controls, strict=True)
+    shown = counted(pairs, len(found.state), f"controls by the {kind.name.lower()} map")
+    controls = np.array([problem.solve(z, gait.vlo, [u]).controls for z, u in shown])
     return ReturnMap(p)(found.state, controls).state
 
 
@@ -226,7 +225,8 @@ def fig8() -> Reproduction:
     torus = next(p for p in points if p.special is Special.NEIMARK_SACKER)
     low = lower_limit()
     with workers() as pool:
-        slices = list(pool.map(basin_slice, _ENERGIES))
+        results = pool.map(basin_slice, _ENERGIES)
+        slices = list(counted(results, len(_ENERGIES), "slices of the basin"))
     steps, converges = (np.array([s[i] for s in slices]) for i in range(2))
     rows: list[tuple[str, ...]] = [
         (

@@ -57,6 +57,24 @@ def test_links_lead_somewhere(page):
             assert place in anchors(target), link
 
 
+# Words that have to be read twice, and what the field says: reports, next to, assume, lateral,
+# accepts, floating base.
+AVOIDED = (
+    *("told", "tells?", "beside", "reckon(?:s|ed)?", "whoever", "aside", "how sure", "has it"),
+    *("comes? to a stand", "free robots?", "nothing holds", "nobody"),
+)
+
+
+@pytest.mark.parametrize(
+    "page", [*PAGES, *OTHERS[:2]], ids=lambda p: p.relative_to(ROOT).as_posix()
+)
+def test_plain_words(page):
+    """Names of code, in backquotes, may be what they are."""
+    text = re.sub(r"`[^`]*`", "", prose(page.read_text()))
+    found = re.findall(rf"\b(?:{'|'.join(AVOIDED)})\b.*", text, re.IGNORECASE)
+    assert not found
+
+
 @each_page
 def test_named_sources_are_there(page):
     """``room/file.py``, and with ``: `name``` a function or class of it."""

@@ -66,8 +66,10 @@ def commands(text=README):
 
 
 def test_the_two_commands_are_there():
-    installing = [line for line in commands() if "venv" in line]
+    installing = [line for line in commands() if "python3 -m venv" in line]
     assert len(installing) == 2
+    # What follows needs no path of a program.
+    assert commands()[2] == ACTIVATE
     walking, testing = installing
     assert walking.endswith(".venv/bin/template-control walk")
     assert testing.endswith(".venv/bin/pytest")
@@ -88,9 +90,17 @@ def walked(short_walk, tmp_path_factory):
 # Of the pages whose commands are short, those that the README does not have.
 SHORT = [
     commands((DOCS / page).read_text())
-    for page in ("guides/choosing_a_gait.md", "lab/example_two.md")
+    for page in (
+        "guides/choosing_a_gait.md",
+        "guides/paper.md",
+        "guides/scenarios.md",
+        "guides/standing.md",
+        "lab/example_two.md",
+    )
 ]
-ALL = dict.fromkeys([*(c for c in commands() if "venv" not in c), *(c for p in SHORT for c in p)])
+ACTIVATE = ". .venv/bin/activate"
+PRINTED = [*(c for c in commands() if "python3 -m venv" not in c), *(c for p in SHORT for c in p)]
+ALL = dict.fromkeys(c for c in PRINTED if c != ACTIVATE)
 REPRODUCED = [line for line in ALL if line.startswith("template-control reproduce ")]
 ELSEWHERE = [*REPRODUCED, EXAMPLE_ONE, ZERO_FIVE_ZERO]
 
@@ -102,12 +112,12 @@ def test_every_command_is_understood(page, understood):
             understood(re.sub(r"\$\w+|\"\$\w+\"", "x", line))
 
 
-def test_every_reproduction_is_in_the_readme():
+def test_every_reproduction_is_printed():
     """``test_reproduce_command`` runs each as printed here."""
     assert sorted(line.split(maxsplit=2)[2] for line in REPRODUCED) == sorted(REPRODUCTIONS)
 
 
-def test_what_is_run_elsewhere_as_the_readme_prints_it_is_in_the_readme():
+def test_what_is_run_elsewhere_as_printed_is_printed():
     assert set(ELSEWHERE) <= set(ALL)
 
 
@@ -188,3 +198,16 @@ def test_a_wheel_finds_its_robots_elsewhere(tmp_path):
         env={**os.environ, "PYTHONPATH": str(target)},
     )
     assert done.stdout.strip() == str(target / "template_control/robots/five_link.urdf")
+
+
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= 150
+
+
+def test_what_is_printed_leaves_nothing_that_git_sees():
+    """Files that commands and snippets write into the clone are ignored."""
+    written = ["runs/walk/run.npz", "run.npz", "stick_diagram.png", "eight.png"]
+    listed = subprocess.run(
+        ["git", "check-ignore", *written], cwd=ROOT, capture_output=True, text=True
+    )
+    assert listed.stdout.split() == written
