@@ -7,6 +7,7 @@ from places import ROOT
 from template_control.cli.main import main
 from template_control.run.record import Record
 
+WALK_SPEEDS = "template-control walk --scenario examples/walk_speeds.toml --no-figures"
 EXAMPLE_ONE = "template-control go examples/example_one.toml --robot runner"
 ZERO_FIVE_ZERO = "template-control go examples/zero_five_zero.toml --robot runner --no-figures"
 
@@ -19,5 +20,6 @@ def words(line):
 def go(line, folder, monkeypatch):
     """The record that such a command leaves in a folder."""
     monkeypatch.chdir(folder)
-    assert main(words(line)[1:]) == 0
-    return Record.load(folder / "runs" / "go" / "run.npz")
+    _, command, *more = words(line)
+    assert main([command, *more]) == 0
+    return Record.load(folder / "runs" / command / "run.npz")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
@@ -131,7 +131,7 @@ def states_figure(
     for row, plant in zip(panels, plants, strict=True):
         for j, axes in enumerate(row):
             axes.axhline(target[j] * unit[j], color="0.75", linewidth=2.5, zorder=0)
-            for planner, color in zip(planners, _COLORS, strict=True):
+            for planner, color in zip(planners, _COLORS, strict=False):
                 if (planner, plant) not in states:
                     continue
                 z = states[planner, plant] * unit
@@ -305,9 +305,9 @@ def template_walk(planner: str, steps: int = STEPS) -> Walk:
     return Walk(sections(gait, np.array(states)), fall)
 
 
-def _walk(case: tuple[str, str]) -> Walk:
+def _walk(case: tuple[str, str], steps: int = STEPS) -> Walk:
     planner, plant = case
-    return template_walk(planner) if plant == ALONE else robot_walk(planner, plant)[0]
+    return template_walk(planner, steps) if plant == ALONE else robot_walk(planner, plant, steps)[0]
 
 
 def _texts(walk: Walk) -> tuple[str, ...]:
@@ -333,18 +333,23 @@ def _numbers(walk: Walk) -> dict[str, Any]:
     }
 
 
-def fig12() -> Reproduction:
-    """From z_0: where the robot settles, by planner and by plant."""
-    plants, first = (ALONE, *PLANTS), next(iter(PLANNERS))
+def fig12(planners: Sequence[str] = tuple(PLANNERS), steps: int = STEPS) -> Reproduction:
+    """Where the robot settles from z_0, by planner and by plant.
+
+    Args:
+        planners: keys of :data:`PLANNERS`.
+        steps: of each walk; the last 20 are what it settles on.
+    """
+    plants, first = (ALONE, *PLANTS), planners[0]
     # What full grip changes is the robot's, whatever its planner.
     cases = [
         (planner, plant)
-        for planner in PLANNERS
+        for planner in planners
         for plant in plants
         if plant != FULL_GRIP or planner == first
     ]
     with workers() as pool:
-        done = counted(pool.map(_walk, cases), len(cases), "walks")
+        done = counted(pool.map(partial(_walk, steps=steps), cases), len(cases), "walks")
         walks = dict(zip(cases, done, strict=True))
     _, record = robot_walk("LQR", "PyBullet", steps=6)
     sticks = stick_diagram(beginning(record, 2.2), Look(titled=False))
@@ -353,7 +358,7 @@ def fig12() -> Reproduction:
     target = sections(gait, gait.vlo[None])[0]
     return Reproduction(
         title=(
-            f"Fig. 12: Example II, last {LAST} of {STEPS} steps from"
+            f"Fig. 12: Example II, last {LAST} of {steps} steps from"
             " z_0 = [0.9695 m, 1.9 deg, 821.55 J]"
         ),
         columns=("planner", "plant", "y_v [m]", "phi_v [deg]", "E [J]", "falls in"),
@@ -365,7 +370,7 @@ def fig12() -> Reproduction:
             "target": target.tolist(),
             "walks": {
                 planner: {plant: _numbers(w) for (by, plant), w in walks.items() if by == planner}
-                for planner in PLANNERS
+                for planner in planners
             },
         },
         notes=(
@@ -384,13 +389,15 @@ def fig12() -> Reproduction:
         figures={
             "fig12": sticks,
             "fig12_states": states_figure(
-                {key: walk.states for key, walk in walks.items()}, tuple(PLANNERS), plants, target
+                {key: walk.states for key, walk in walks.items()}, tuple(planners), plants, target
             ),
         },
     )
 
 
-def _liftoffs(case: tuple[str, str]) -> tuple[Liftoff, Record, Walk, Record]:
+def _liftoffs(
+    case: tuple[str, str], steps: int = _LIFTOFF_STEPS
+) -> tuple[Liftoff, Record, Walk, Record]:
     """One step from the equilibrium with a liftoff rule on a plant; and the walk from z_0."""
     rule, plant = case
     gait, beta = _gait(), _LIFTOFFS[rule]
@@ -403,14 +410,18 @@ def _liftoffs(case: tuple[str, str]) -> tuple[Liftoff, Record, Walk, Record]:
             controller=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
         )
     )
-    return liftoff(record), record, *robot_walk("LQR", plant, _LIFTOFF_STEPS, beta)
+    return liftoff(record), record, *robot_walk("LQR", plant, steps, beta)
 
 
-def fig13() -> Reproduction:
-    """Torques with the template's liftoff and with predefined ones."""
+def fig13(steps: int = _LIFTOFF_STEPS) -> Reproduction:
+    """Torques with the template's liftoff and with predefined ones.
+
+    Args:
+        steps: of each walk from z_0.
+    """
     cases = [(rule, plant) for plant in ("PyBullet", "ideal") for rule in _LIFTOFFS]
     with workers() as pool:
-        done = counted(pool.map(_liftoffs, cases), len(cases), "walks")
+        done = counted(pool.map(partial(_liftoffs, steps=steps), cases), len(cases), "walks")
         results = dict(zip(cases, done, strict=True))
     rows: list[tuple[str, ...]] = []
     for (rule, plant), (event, _, walk, _) in results.items():
@@ -422,7 +433,7 @@ def fig13() -> Reproduction:
                 f"{event.load:.0f}",
                 "  ".join(f"{x:.0f}" for x in event.jump),
                 "  ".join(f"{x:.0f}" for x in event.peak),
-                f"{_LIFTOFF_STEPS} steps" if not walk.fall else f"falls in step {len(walk.states)}",
+                f"{steps} steps" if not walk.fall else f"falls in step {len(walk.states)}",
             )
         )
     return Reproduction(

@@ -33,9 +33,10 @@ class Reproduction:
     figures: dict[str, Figure] = field(default_factory=dict)
 
 
-def _reproduce(module: str, name: str) -> Reproduction:
+def _reproduce(module: str, name: str, **less: Any) -> Reproduction:
     """Call function ``name`` of ``module``, imported only now: the list itself costs nothing."""
-    found: Reproduction = getattr(importlib.import_module(f"{__package__}.{module}"), name)()
+    function = getattr(importlib.import_module(f"{__package__}.{module}"), name)
+    found: Reproduction = function(**less)
     return found
 
 
@@ -52,7 +53,7 @@ _MODULES = {
     "fig13": "example_two",
 }
 
-REPRODUCTIONS: dict[str, Callable[[], Reproduction]] = {
+REPRODUCTIONS: dict[str, Callable[..., Reproduction]] = {
     name: partial(_reproduce, module, name) for name, module in _MODULES.items()
 }
 """By the name ``template-control reproduce`` knows them by."""

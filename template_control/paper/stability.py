@@ -217,16 +217,20 @@ def basin_slice(energy: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     return result.steps.reshape(y.shape), result.converges.reshape(y.shape)
 
 
-def fig8() -> Reproduction:
-    """The self-stable basin of the equilibria at 0.9818 m."""
+def fig8(energies: Array = _ENERGIES) -> Reproduction:
+    """The self-stable basin of the equilibria at 0.9818 m.
+
+    Args:
+        energies: (n,) whose slices are computed [J].
+    """
     points = branch()
     fold = next(p for p in points if p.special is Special.FOLD)
     lost = next(p for p in points if p.special is Special.SADDLE_NODE)
     torus = next(p for p in points if p.special is Special.NEIMARK_SACKER)
     low = lower_limit()
     with workers() as pool:
-        results = pool.map(basin_slice, _ENERGIES)
-        slices = list(counted(results, len(_ENERGIES), "slices of the basin"))
+        results = pool.map(basin_slice, energies)
+        slices = list(counted(results, len(energies), "slices of the basin"))
     steps, converges = (np.array([s[i] for s in slices]) for i in range(2))
     rows: list[tuple[str, ...]] = [
         (
@@ -243,7 +247,7 @@ def fig8() -> Reproduction:
             f"steps to fall; eigenvalue through +1 at {lost.energy:.4f}",
         ),
     ]
-    for energy, good in zip(_ENERGIES, converges, strict=True):
+    for energy, good in zip(energies, converges, strict=True):
         rows.append((f"share of the slice at {energy:.2f} J", "", f"{good.mean():.3f}", ""))
     return Reproduction(
         title="Fig. 8: self-stable basin of the equilibria at y = 0.9818 m",
@@ -255,7 +259,7 @@ def fig8() -> Reproduction:
             "neimark_sacker": torus.energy,
             "eigenvalue_one": lost.energy,
             "lower_by_steps_to_fall": low,
-            "energies": _ENERGIES.tolist(),
+            "energies": energies.tolist(),
             "shares": converges.mean(axis=(1, 2)).tolist(),
             "states": int(converges.size),
         },
@@ -267,15 +271,19 @@ def fig8() -> Reproduction:
             " equilibrium to come back; the closer one starts, the closer it is to the"
             " eigenvalue's.",
         ),
-        figures={"fig8": basin_figure(_ENERGIES, _HEIGHTS, _ANGLES, steps, converges)},
+        figures={"fig8": basin_figure(energies, _HEIGHTS, _ANGLES, steps, converges)},
     )
 
 
-def fig9() -> Reproduction:
-    """The one-step deadbeat set, and the share of it that each map's controller saves."""
+def fig9(counts: tuple[int, int] = (100, 400)) -> Reproduction:
+    """The one-step deadbeat set, and the share of it that each map's controller saves.
+
+    Args:
+        counts: numbers of kappa_2 and of angles, as for :func:`backward_set`.
+    """
     gait = equilibrium()
     stable = [p for p in branch(_FINE) if p.kind is Kind.STABLE]
-    found = backward_set(gait, counts=(100, 400))
+    found = backward_set(gait, counts=counts)
     settled, shares, full = {}, {}, {}
     for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT):
         name = f"{kind.name.lower()} map"

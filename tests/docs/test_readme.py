@@ -11,7 +11,7 @@ import zipfile
 
 import pytest
 from places import DOCS, ROOT
-from printed import EXAMPLE_ONE, ZERO_FIVE_ZERO
+from printed import EXAMPLE_ONE, WALK_SPEEDS, ZERO_FIVE_ZERO
 from printed import words as words_of
 
 import template_control as tc
@@ -29,19 +29,11 @@ def blocks(language, text=README):
 
 
 @pytest.mark.slow(seconds=10)
-def test_python_snippets_run_as_printed(tmp_path):
+def test_python_snippets_run_as_printed(run_block):
     snippets = blocks("python")
     assert snippets
     for snippet in snippets:
-        done = subprocess.run(
-            [sys.executable, "-c", snippet],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=300,
-            env=ENVIRONMENT,
-        )
-        assert done.returncode == 0, done.stderr
+        run_block("python", snippet)
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -102,7 +94,7 @@ ACTIVATE = ". .venv/bin/activate"
 PRINTED = [*(c for c in commands() if "python3 -m venv" not in c), *(c for p in SHORT for c in p)]
 ALL = dict.fromkeys(c for c in PRINTED if c != ACTIVATE)
 REPRODUCED = [line for line in ALL if line.startswith("template-control reproduce ")]
-ELSEWHERE = [*REPRODUCED, EXAMPLE_ONE, ZERO_FIVE_ZERO]
+ELSEWHERE = [*REPRODUCED, EXAMPLE_ONE, WALK_SPEEDS, ZERO_FIVE_ZERO]
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -143,33 +135,26 @@ def test_other_commands_run_as_printed(line, tmp_path, walked, monkeypatch, capf
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.slow
-def test_the_replay_page_runs_as_printed(tmp_path):
+@pytest.mark.slow(seconds=15)
+def test_the_replay_page_runs_as_printed(tmp_path, run_block, on_path):
     lines = [line for block in blocks("sh", REPLAY) for line in block.strip().splitlines()]
     assert lines[0].startswith("template-control walk")
     for line in lines:
-        if "--video" in line and shutil.which("ffmpeg") is None:
+        words = line.split()
+        if "--video" in words and shutil.which("ffmpeg") is None:
             continue
-        words = [sys.executable, "-m", "template_control.cli.main", *line.split()[1:]]
-        served = "replay" in words and not {"--html", "--gif", "--video"} & set(words)
-        process = subprocess.Popen(
-            words,
-            cwd=tmp_path,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=ENVIRONMENT,
-        )
-        if served:
+        if "replay" in words and not {"--html", "--gif", "--video"} & set(words):
+            process = subprocess.Popen(
+                words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=on_path
+            )
             assert "http://" in process.stdout.readline()
             process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=300)
-        assert process.returncode == 0, f"{line}: {errors}"
+            _, errors = process.communicate(timeout=300)
+            assert process.returncode == 0, f"{line}: {errors}"
+        else:
+            run_block("sh", line)
     for snippet in blocks("python", REPLAY):
-        done = subprocess.run(
-            [sys.executable, "-c", snippet], cwd=tmp_path, capture_output=True, env=ENVIRONMENT
-        )
-        assert done.returncode == 0, done.stderr
+        run_block("python", snippet)
     assert (tmp_path / "slow.html").is_file()
     assert (tmp_path / "figures" / "energies.png").is_file()
 

@@ -167,7 +167,14 @@ def test_slip_command(tmp_path, capfd):
 
 
 # About so many seconds on two cores.
-LONG = {"fig12": 90, "fig8": 40, "fig13": 20, "fig9": 30, "fig10": 3, "fig5": 3}
+LONG = {"fig12": 30, "fig8": 10, "fig13": 8, "fig9": 8, "fig10": 3, "fig5": 3}
+# What is enough here. The planners that are missing walk in the tests of the README's commands.
+LESS = {
+    "fig8": {"energies": np.array([824.0, 826.0])},
+    "fig9": {"counts": (50, 200)},
+    "fig12": {"planners": ("LQR", "modified, exact map"), "steps": 40},
+    "fig13": {"steps": 8},
+}
 
 
 @pytest.mark.slow(seconds=30)
@@ -197,7 +204,7 @@ def test_a_robot_goes_with_example_one_only(capfd):
 )
 def test_reproduce_command(name, tmp_path, monkeypatch, capfd):
     """Computed once, told twice: as the README prints the command, and as JSON."""
-    result = REPRODUCTIONS[name]()
+    result = REPRODUCTIONS[name](**LESS.get(name, {}))
     monkeypatch.setitem(REPRODUCTIONS, name, lambda: result)
     monkeypatch.chdir(tmp_path)
     assert main(["reproduce", name]) == 0
@@ -217,7 +224,7 @@ def test_reproduce_command(name, tmp_path, monkeypatch, capfd):
     if name == "fig8":
         assert data["fold"] == pytest.approx(827.62, abs=0.02)
         assert data["lower_by_steps_to_fall"] == pytest.approx(822.06, abs=0.3)
-        assert data["states"] >= 200_000
+        assert data["shares"] == pytest.approx([0.303, 0.491], abs=0.001)
     if name == "fig9":
         assert data["paper map"]["failing"] > 100 > data["improved map"]["failing"]
     if name == "fig12":
@@ -228,7 +235,7 @@ def test_reproduce_command(name, tmp_path, monkeypatch, capfd):
         assert all(walk["spread"][0] < 0.0015 for walk in walks["LQR"].values())
         for planner, by_plant in walks.items():
             for plant, walk in by_plant.items():
-                assert (walk["fall"], walk["steps"]) == (None, 60), (planner, plant)
+                assert (walk["fall"], walk["steps"]) == (None, 40), (planner, plant)
                 # The bound of a walk's settling, 0.1 m/s upward, is 5 degrees here.
                 off = np.abs(np.subtract(walk["mean"], data["target"]))
                 assert np.all(off < (0.008, np.radians(4.98), 2.0)), (planner, plant)

@@ -283,7 +283,7 @@ def test_treads_that_fell_the_robot_before_are_walked(default_gait):
         tc.Experiment(
             tc.load_robot("five-link"),
             planner=tc.LqrPlanner(default_gait),
-            steps=30,
+            steps=22,
             world=plant,
             record_every=5,
         )

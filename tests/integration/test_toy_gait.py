@@ -228,4 +228,4 @@ def test_a_table_that_does_not_fit_the_automaton_is_refused():
 
 @pytest.mark.slow
 def test_the_toy_s_figures_are_drawn(record, tmp_path):
-    assert {path.stem for path in save_figures(record, tmp_path)} == set(FIGURES)
+    assert {path.stem for path in save_figures(record, tmp_path, dpi=40)} == set(FIGURES)

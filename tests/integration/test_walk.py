@@ -100,10 +100,10 @@ def test_walk_is_deterministic(record, short_walk):
 @pytest.mark.slow
 def test_a_disturbed_walk_is_the_same_wherever_its_memory_lies(gait):
     """The last digits of ProxQP's harder solves depend on where its workspace lies."""
-    pushed = {"steps": 14, "pushes": (Push(25.0, step=10),)}
+    pushed = {"steps": 6, "pushes": (Push(25.0, step=2),)}
     first = walk(gait, **pushed)
     moved = []
-    for n in range(1, 6):
+    for n in range(1, 4):
         moved.append([np.zeros(3 * n) for _ in range(1000)])
         again = walk(gait, **pushed)
         np.testing.assert_array_equal(again.torque, first.torque)
@@ -157,30 +157,14 @@ def test_bad_options_are_named():
         Experiment(record_every=0)
 
 
-def settled(record, gait, steps):
-    """Mean error of the fifty sections up to this one."""
-    return record.section_state[steps - 49 : steps + 1].mean(axis=0) - gait.vlo
-
-
-@pytest.mark.slow(seconds=10)
-def test_settles_on_the_papers_equilibrium(paper_gait):
-    record = walk(paper_gait, steps=100)
-    error = np.abs(settled(record, paper_gait, 100))
-    assert not record.fell
-    assert error[0] <= 0.03 * paper_gait.vlo[0]
-    assert error[1] <= 0.01
-    assert error[2] <= 0.1
-
-
-@pytest.mark.slow(seconds=40)
-def test_two_hundred_steps_settle_on_the_default_gait(default_gait):
-    record = walk(default_gait, steps=200, record_every=10)
+@pytest.mark.slow(seconds=20)
+def test_a_hundred_steps_settle_on_the_default_gait(default_gait):
+    record = walk(default_gait, steps=100, record_every=10)
     figures = summarise(record, "")
-    assert record.steps == 200
+    assert record.steps == 100
     assert not record.fell
-    for steps in (100, 200):
-        error = np.abs(settled(record, default_gait, steps))
-        assert np.all(error <= (0.01 * default_gait.vlo[0], 0.005, 0.03))
+    error = np.abs(record.section_state[-50:].mean(axis=0) - default_gait.vlo)
+    assert np.all(error <= (0.01 * default_gait.vlo[0], 0.005, 0.03))
     assert 1.1 <= figures["mean_speed"] <= 1.3
     assert figures["com_error_rms"]["x"] <= 0.01
     assert figures["com_error_rms"]["y"] <= 0.005
@@ -188,31 +172,31 @@ def test_two_hundred_steps_settle_on_the_default_gait(default_gait):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("speed", [0.9, 1.0, 1.3])
+@pytest.mark.parametrize("speed", [0.9, 1.3])
 def test_other_speeds(speed):
-    record = walk(gait_for_speed(P, speed), steps=25)
+    record = walk(gait_for_speed(P, speed), steps=15)
     assert not record.fell
     walked = (record.com[-1, 0] - record.com[0, 0]) / record.time[-1]
     assert walked == pytest.approx(speed, rel=0.05)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_perturbed_starts(gait, seed):
-    assert not walk(gait, steps=12, start=perturbed_start(gait, seed)).fell
+    assert not walk(gait, steps=10, start=perturbed_start(gait, seed)).fell
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.9, 1.1])
 def test_unknown_mass(gait, scale):
-    assert not walk(gait, steps=30, world=PlantOptions(mass_scale=scale)).fell
+    assert not walk(gait, steps=15, world=PlantOptions(mass_scale=scale)).fell
 
 
 @pytest.mark.slow
 def test_slippery_ground(gait):
     record = walk(
         gait,
-        steps=30,
+        steps=12,
         world=PlantOptions(friction=0.5),
         controller=EmbeddingOptions(friction=0.5),
     )
@@ -220,8 +204,10 @@ def test_slippery_ground(gait):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("impulse", [-20.0, 25.0])
-@pytest.mark.parametrize("phase", np.arange(10) / 10)
+@pytest.mark.parametrize(  # in turn, so that every phase of the step has one
+    ("impulse", "phase"),
+    [(-20.0, 0.0), (25.0, 0.2), (-20.0, 0.4), (25.0, 0.5), (-20.0, 0.7), (25.0, 0.9)],
+)
 def test_pushes(default_gait, impulse, phase):
     record = walk(default_gait, steps=13, pushes=(Push(impulse, 2, phase),))
     assert not record.fell
@@ -236,11 +222,11 @@ def footholds(default_gait):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("height", [-0.03, 0.03])
-@pytest.mark.parametrize("share", [0.3, 0.7])  # in between it is the same walk but for rounding
+# Elsewhere between the footholds it is the same walk but for rounding.
+@pytest.mark.parametrize(("height", "share"), [(-0.03, 0.3), (0.03, 0.7)])
 def test_a_step_of_the_ground_that_it_does_not_see(default_gait, footholds, height, share):
     before, beyond = footholds
     edge = GroundStep(height, before + share * (beyond - before))
-    record = walk(default_gait, steps=15, world=PlantOptions(ground_step=edge))
+    record = walk(default_gait, steps=13, world=PlantOptions(ground_step=edge))
     assert not record.fell
     assert max(map(abs, gait_errors(record, default_gait))) < 0.02, "back within 10 steps"

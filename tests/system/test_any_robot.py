@@ -82,9 +82,9 @@ def test_shipped_robots_walk(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
-def test_shipped_robots_walk_thirty_steps(name):
-    record, gait = walk(load_robot(name), 30)
-    check(record, gait, 30)
+def test_shipped_robots_walk_twenty_steps(name):
+    record, gait = walk(load_robot(name), 20)
+    check(record, gait, 20)
     if name == "bolt":
         torques = record.summary.joint_torque.values()
         # [N m], of the real robot's motors; the URDF's limits are placeholders.
@@ -103,13 +103,13 @@ def walk_unseen(tmp_path, build, steps):
 
 
 @pytest.mark.slow(seconds=5)
-def test_a_robot_never_seen_runs_a_hundred_steps(tmp_path):
+def test_a_robot_never_seen_runs_sixty_steps(tmp_path):
     path = tmp_path / "unseen.urdf"
     path.write_text(random_five_link(*CORNERS[0]).urdf())
     robot = PlanarBiped.from_urdf(path)
     template = template_for(robot)
     gait = running_gait(template, 2.0 * np.sqrt(template.rest_length * template.gravity / 9.81))
-    record = simulate(Experiment(robot, planner=RunningPlanner(gait), steps=100, record_every=5))
+    record = simulate(Experiment(robot, planner=RunningPlanner(gait), steps=60, record_every=5))
     assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(gait.apex[0], rel=0.01)
     assert record.summary.qp_failures == 0
@@ -122,7 +122,7 @@ def test_a_robot_never_seen_walks(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("build", UNSEEN)
 def test_robots_never_seen_walk_on(tmp_path, build):
-    walk_unseen(tmp_path, build, 20)
+    walk_unseen(tmp_path, build, 12)
 
 
 @pytest.mark.slow(seconds=2)

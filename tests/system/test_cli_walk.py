@@ -7,7 +7,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from places import ROOT
+from places import EXAMPLES
+from printed import WALK_SPEEDS, go
 
 from template_control.cli import report as kept
 from template_control.cli.main import main
@@ -84,14 +85,13 @@ def test_a_scenario_that_walks_is_walked(tmp_path, capfd):
 
 
 @pytest.mark.slow
-def test_the_example_walks_at_several_speeds(tmp_path, capfd):
-    example = str(ROOT / "examples" / "walk_speeds.toml")
-    assert main(["walk", "--scenario", example, "--json", "--output", str(tmp_path)]) == 0
-    figures = json.loads(capfd.readouterr().out)
-    assert figures["qp_failures"] == 0
-    speed = Record.load(figures["record"]).section_state[:, 0]
+def test_the_example_walks_at_several_speeds_as_the_readme_prints_it(tmp_path, monkeypatch):
+    record = go(WALK_SPEEDS, tmp_path, monkeypatch)
+    assert record.metadata["summary"]["qp_failures"] == 0
+    speed = record.section_state[:, 0]
     assert speed.min() < 0.97
     assert speed[-1] > 1.05
+    example = str(EXAMPLES / "walk_speeds.toml")
     assert main(["slip", example, "--json", "--no-figures", "--output", str(tmp_path)]) == 0
 
 

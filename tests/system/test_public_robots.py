@@ -102,7 +102,7 @@ def test_each_robot_has_its_outcome():
 def test_it_walks(name):
     robot = load(name)
     gait = tc.robot_gait_for_speed(robot, WALK[name])
-    record = tc.simulate(tc.Experiment(robot, planner=tc.LqrPlanner(gait), steps=20))
+    record = tc.simulate(tc.Experiment(robot, planner=tc.LqrPlanner(gait), steps=10))
     assert not record.fell, record.fall_reason
     assert record.summary.qp_failures == 0
 

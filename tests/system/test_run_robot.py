@@ -170,9 +170,9 @@ def test_stiffnesses_follow_from_where_the_foot_has_landed(supervisor, gait, ear
 
 
 @pytest.mark.slow(seconds=11)
-@pytest.mark.parametrize("speed", [1.3, 2.0, 2.5, 3.5, 4.0])
+@pytest.mark.parametrize("speed", [1.3, 2.0, 4.0])
 def test_robot_runs_at_other_speeds(speed):
-    record = run(speed, 60)
+    record = run(speed, 40)
     assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(speed, rel=0.01)
     assert record.solved.all()
@@ -180,14 +180,13 @@ def test_robot_runs_at_other_speeds(speed):
 
 @pytest.mark.slow(seconds=7)
 def test_robot_runs_at_five_metres_a_second_with_stronger_motors():
-    record = run(5.0, 60, controller=EmbeddingOptions(torque_scale=1.3))
+    record = run(5.0, 40, controller=EmbeddingOptions(torque_scale=1.3))
     assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(5.0, rel=0.01)
 
 
 @pytest.mark.slow(seconds=3)
-@pytest.mark.parametrize("impulse", [20.0, -20.0])
-@pytest.mark.parametrize("phase", [0.1, 0.6])
+@pytest.mark.parametrize(("impulse", "phase"), [(20.0, 0.1), (-20.0, 0.6)])
 def test_robot_runs_on_after_a_push(impulse, phase):
     record = run(3.0, 20, pushes=(tc.Push(impulse, 8, phase),))
     assert record.fall_reason == ""
@@ -229,7 +228,7 @@ def test_robot_runs_on_over_a_step_that_it_does_not_see(robot, gait, height):
 
 
 @pytest.mark.slow(seconds=5)
-@pytest.mark.parametrize(("name", "steps"), [("human", 30), ("bolt", 100)])
+@pytest.mark.parametrize(("name", "steps"), [("human", 30), ("bolt", 60)])
 def test_other_robots_run_by_similarity(name, steps):
     record = run(2.0, steps, name)
     assert record.fall_reason == ""

@@ -180,7 +180,7 @@ COMMANDS = {
     "fig12": ["reproduce", "fig12"],
 }
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
-LATEST = 7.0  # [s] after a command has begun that it is stopped
+LATEST = 5.0  # [s] after a command has begun that it is stopped
 
 
 def moments(seed):

@@ -150,7 +150,7 @@ def test_table_names_every_node_guard_and_failure(tmp_path, monkeypatch, capsys)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("suffix", ["png", "PNG", "svg", "pdf"])
+@pytest.mark.parametrize("suffix", ["PNG", "svg", "pdf"])
 def test_figure_is_written_into_a_new_folder(suffix, tmp_path, capsys):
     path = tmp_path / "new" / "deep" / f"fig.{suffix}"
     assert main(["automaton", "--json", "--output", str(path)]) == 0

@@ -180,7 +180,7 @@ def test_pushed_walks_go_on(robot, default_gait, impulse):
         tc.Experiment(
             robot,
             planner=tc.LqrPlanner(default_gait),
-            steps=30,
+            steps=18,
             world=tc.MujocoOptions(),
             pushes=(push,),
         )
@@ -191,17 +191,14 @@ def test_pushed_walks_go_on(robot, default_gait, impulse):
 
 
 @pytest.mark.slow(seconds=20)
-@pytest.mark.parametrize(
-    ("name", "example"), [("five-link", "walk_run_walk"), ("runner", "example_one")]
-)
-def test_scenarios_of_walking_and_running_go_through(name, example):
-    scenario = tc.load_scenario(EXAMPLES / f"{example}.toml")
-    record = tc.simulate(
-        tc.Experiment(tc.load_robot(name), scenario, world=tc.MujocoOptions(), record_every=4)
-    )
+def test_a_scenario_of_walking_and_running_goes_through():
+    """As ``runner`` goes through one to 5 m/s in test_stand_to_run.py."""
+    scenario = tc.load_scenario(EXAMPLES / "walk_run_walk.toml")
+    robot = tc.load_robot("five-link")
+    record = tc.simulate(tc.Experiment(robot, scenario, world=tc.MujocoOptions(), record_every=4))
     assert not record.fell
     assert record.arrived
     error = record.section_state[1:, 0] - record.section_target[:-1, 0]
-    assert np.sqrt(np.mean(error**2)) < 0.2, "0.03 and 0.15 m/s were measured"
+    assert np.sqrt(np.mean(error**2)) < 0.2, "0.03 m/s was measured"
     limit = record.torque_limit
     assert np.all(np.abs(record.torque) <= limit)

@@ -110,9 +110,10 @@ def test_a_robot_of_ones_own_is_understood_as_walk_understands_it(
     assert found[0].robot.locked == {"FL_HAA": 0.0}
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=8)
+@pytest.mark.usefixtures("brief")
 def test_a_shipped_robot_given_by_its_urdf_takes_as_much(tmp_path, capfd):
-    words = ["--disturbance", "delay", "--quick", "--json"]
+    words = ["--disturbance", "delay", "--quick", "--json", "--workers", "1"]
     found = []
     for name, own in (("bolt", []), (str(robot_path("bolt")), OWN)):
         folder = str(tmp_path / f"trials-{len(found)}")

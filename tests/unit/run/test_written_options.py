@@ -21,8 +21,7 @@ from template_control.run.specs import GaitSpec
 from template_control.slip.similarity import Scale, scaled
 
 LINES = {
-    "walk": "walk --steps 2",
-    "own tuning": "walk --steps 2 --torque-scale 0.9 --friction 0.6 --no-catch",
+    "own, estimate": "walk --estimate --steps 2 --torque-scale 0.9 --friction 0.6 --no-catch",
     "paper": "walk --gait paper --planner modified --map improved --steps 1",
     "ahead": "walk --planner ahead --speed 0.9 --steps 2",
     "run": "run --speed 3 --steps 2",
@@ -31,14 +30,10 @@ LINES = {
     "walk of a scenario": f"walk --scenario {EXAMPLES / 'walk_speeds.toml'} --steps 2",
     "stand": "walk --from-stand --steps 1",
     "free bolt": "walk --robot bolt --free --speed 0.6 --steps 2 --turn 0.2",
-    "free five-link-3d": "walk --robot five-link-3d --free --steps 1",
-    "free, named planner": "walk --robot bolt --free --planner lqr --steps 1 --friction 0.6",
+    "free, own": "walk --robot five-link-3d --free --planner lqr --steps 1 --friction 0.6",
     "free in MuJoCo": "walk --robot bolt --free --steps 1 --plant mujoco --noise 0.0005",
-    "estimate": "walk --estimate --steps 2",
-    "push": "walk --push 25@1:0.3 --steps 2 --delay 0.002",
-    "mujoco": "walk --plant mujoco --steps 1",
-    "ideal": "walk --plant ideal --steps 1 --mass-scale 1.05",
-    "terrain": "walk --terrain slope:angle=4 --steps 2",
+    "mujoco, push": "walk --plant mujoco --push 25@1:0.3 --steps 2 --delay 0.002",
+    "ideal, terrain": "walk --plant ideal --steps 1 --mass-scale 1.05 --terrain slope:angle=4",
 }
 
 

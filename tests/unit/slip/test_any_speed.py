@@ -75,5 +75,5 @@ def test_the_command_tells_the_same_range(capsys, tmp_path):
 def test_the_robot_walks_at_speeds_that_had_no_gait(name, speed):
     robot = tc.load_robot(name)
     planner = tc.LqrPlanner(tc.gait_for_speed(tc.template_for(robot), speed))
-    record = tc.simulate(tc.Experiment(robot, planner=planner, steps=25, record_every=5))
-    assert (record.steps, record.fell) == (25, False)
+    record = tc.simulate(tc.Experiment(robot, planner=planner, steps=15, record_every=5))
+    assert (record.steps, record.fell) == (15, False)

@@ -246,7 +246,7 @@ def drawn(kind, random):
 
 
 @pytest.mark.slow(seconds=20)
-@pytest.mark.parametrize("draws", [1000])
+@pytest.mark.parametrize("draws", [300])
 def test_random_strides_end_as_they_do_by_dop853(draws):
     """Every kind of stride: outcome, number of events and the state where it ends or fails."""
     simulator, undecided = StrideSimulator(P), 0
