@@ -5,12 +5,15 @@ import shlex
 import signal
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
 import template_control as tc
 from template_control.cli.main import build_parser, main
+
+NEEDED = "needs the package pybullet"
 
 
 def pytest_configure():
@@ -28,6 +31,16 @@ def pytest_collection_modifyitems(items):
         return mark.kwargs.get("seconds", 0.0) if mark else 0.0
 
     items.sort(key=seconds, reverse=True)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    """Skip what needs PyBullet where it is not installed."""
+    if call.excinfo and find_spec("pybullet") is None and NEEDED in str(call.excinfo.value):
+        with pytest.raises(pytest.skip.Exception) as skipped:
+            pytest.skip("needs PyBullet")
+        call.excinfo = skipped
+    return (yield)
 
 
 @pytest.fixture

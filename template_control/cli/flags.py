@@ -20,6 +20,7 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
+from template_control.plant.plant import default_plant
 from template_control.plant.terrain_spec import terrain_from
 from template_control.robot.library import FLOATING_ROBOTS, ROBOTS
 from template_control.robot.spec import RobotSpec
@@ -264,7 +265,7 @@ WORLD = (
     Flag(
         "--plant",
         "world.kind",
-        "pybullet if not given; mujoco: the other physics engine, if it is installed; ideal: rigid"
+        f"{default_plant().kind} if not given; pybullet and mujoco: physics engines; ideal: rigid"
         " contacts that stick, no friction; --friction is then the controller's cone only",
         {"choices": _PLANTS},
     ),

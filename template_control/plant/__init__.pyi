@@ -5,6 +5,7 @@ from .ideal import IdealPlant as IdealPlant
 from .mujoco import MujocoOptions as MujocoOptions
 from .mujoco import MujocoPlant as MujocoPlant
 from .plant import Plant as Plant
+from .plant import default_plant as default_plant
 from .plant import open_plant as open_plant
 from .terrain import GroundStep as GroundStep
 from .terrain import Terrain as Terrain

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree import ElementTree
@@ -26,13 +26,8 @@ from template_control.robot.spec import RobotSpec
 from template_control.robot.terms import FLOATING_DOF, PLANAR_DOF
 from template_control.robot.urdf import link_masses
 
-with silenced():  # PyBullet announces its build time on standard output or stderr
-    import pybullet
-
 Array = NDArray[np.float64]
 
-# By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
-_FLAGS = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_IGNORE_VISUAL_SHAPES
 _CLOSE = 1e-6  # of the robot's mass
 _BASE = -1  # PyBullet's index of the base link
 _POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
@@ -90,6 +85,24 @@ class PlantOptions(Checked):
         return self.ground.height_at(x)
 
 
+@cache
+def pybullet() -> Any:
+    """The module, imported where a world of it is made.
+
+    Raises:
+        ParameterError: if it is not installed.
+    """
+    try:
+        with silenced():  # it announces its build time on standard output or stderr
+            import pybullet as module
+    except ImportError:
+        raise ParameterError(
+            "plant pybullet needs the package pybullet: pip install 'template-control[pybullet]'"
+            " (which compiles it on Python 3.12 and later), or take another plant, such as mujoco"
+        ) from None
+    return module
+
+
 class BulletPlant:
     """A PyBullet world in DIRECT mode with its ground and one robot.
 
@@ -109,8 +122,8 @@ class BulletPlant:
     def __init__(self, robot: Biped, options: PlantOptions) -> None:
         self.robot = robot
         self.options = options
-        self.client = pybullet.connect(pybullet.DIRECT)
-        p, c = pybullet, self.client
+        p = pybullet()
+        self.client = c = p.connect(p.DIRECT)
         p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
         p.setTimeStep(options.time_step, physicsClientId=c)
         self._ground = _ground_bodies(options.ground, c)
@@ -141,7 +154,7 @@ class BulletPlant:
         return self.joints[PLANAR_DOF - 1]
 
     def _info(self) -> list[tuple[Any, ...]]:
-        p, c = pybullet, self.client
+        p, c = pybullet(), self.client
         count = p.getNumJoints(self.body, physicsClientId=c)
         return [p.getJointInfo(self.body, i, physicsClientId=c) for i in range(count)]
 
@@ -154,7 +167,7 @@ class BulletPlant:
         told = link_masses(self.robot.urdf)
         for row in info:
             link = row[12].decode()
-            mass = pybullet.getDynamicsInfo(self.body, row[0], physicsClientId=self.client)[0]
+            mass = pybullet().getDynamicsInfo(self.body, row[0], physicsClientId=self.client)[0]
             if abs(mass - told[link]) > _CLOSE * self.robot.mass:
                 raise RobotError(
                     f"{self.robot.path}: link {link!r} weighs {mass:g} kg in PyBullet and"
@@ -172,11 +185,11 @@ class BulletPlant:
         """The same in PyBullet's own coordinates; ``q`` holds the joints in its own order."""
         angles = q.tolist()
         return np.array(
-            pybullet.calculateMassMatrix(self.body, angles, physicsClientId=self.client)
+            pybullet().calculateMassMatrix(self.body, angles, physicsClientId=self.client)
         )
 
     def _configure(self, joints: int) -> None:
-        p, c, body = pybullet, self.client, self.body
+        p, c, body = pybullet(), self.client, self.body
         friction = self.options.friction
         damping = dict(zip(self._actuated, self.robot.joint_damping, strict=True))
         # One property a call: a combined call silently drops some of them.
@@ -225,13 +238,13 @@ class BulletPlant:
         """See :meth:`~.plant.Plant.reset`."""
         self._contacts = None
         for joint, position, velocity in zip(self.joints, q, v, strict=True):
-            pybullet.resetJointState(
+            pybullet().resetJointState(
                 self.body, joint, position, velocity, physicsClientId=self.client
             )
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
-        states = pybullet.getJointStates(self.body, self.joints, physicsClientId=self.client)
+        states = pybullet().getJointStates(self.body, self.joints, physicsClientId=self.client)
         for i, state in enumerate(states):
             q[i] = state[0]
             v[i] = state[1]
@@ -271,7 +284,7 @@ class BulletPlant:
         all. Whatever touches the robot is ground: it does not collide with itself.
         """
         if self._contacts is None:
-            self._contacts = pybullet.getContactPoints(physicsClientId=self.client)
+            self._contacts = pybullet().getContactPoints(physicsClientId=self.client)
         return self._contacts
 
     def step(self, torque: Array, push: float = 0.0) -> None:
@@ -285,7 +298,7 @@ class BulletPlant:
 
     def _advance(self, torque: Array, push: float, aside: float) -> None:
         """One physics step with a push along the world's x and y [N]."""
-        p, c = pybullet, self.client
+        p, c = pybullet(), self.client
         self._contacts = None
         forces = np.asarray(torque).tolist()  # Python's numbers: PyBullet is slow with others
         p.setJointMotorControlArray(
@@ -303,11 +316,11 @@ class BulletPlant:
         p.stepSimulation(physicsClientId=c)
 
     def _trunk_com(self) -> Any:
-        return pybullet.getLinkState(self.body, self._trunk, physicsClientId=self.client)[0]
+        return pybullet().getLinkState(self.body, self._trunk, physicsClientId=self.client)[0]
 
     def close(self) -> None:
         """Disconnect; the plant is unusable afterwards."""
-        pybullet.disconnect(self.client)
+        pybullet().disconnect(self.client)
 
     def __enter__(self) -> BulletPlant:
         return self
@@ -336,7 +349,7 @@ class FloatingBaseBulletPlant(BulletPlant):
 
     def _load(self) -> int:
         body = _load_body(self.robot, self.client, held=False)
-        found = pybullet.getDynamicsInfo(body, _BASE, physicsClientId=self.client)
+        found = pybullet().getDynamicsInfo(body, _BASE, physicsClientId=self.client)
         self._inertial = _pose(found[3], found[4])
         return body
 
@@ -353,7 +366,7 @@ class FloatingBaseBulletPlant(BulletPlant):
         return _BASE
 
     def _trunk_com(self) -> Any:
-        return pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
+        return pybullet().getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
 
     def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`.
@@ -366,7 +379,7 @@ class FloatingBaseBulletPlant(BulletPlant):
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
-        p, c = pybullet, self.client
+        p, c = pybullet(), self.client
         super().reset(q[_POSITION:], v[FLOATING_DOF:])
         trunk = _pose(q[:3], q[3:_POSITION])
         place = trunk * self._inertial
@@ -381,7 +394,7 @@ class FloatingBaseBulletPlant(BulletPlant):
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
         super().read(q[_POSITION:], v[FLOATING_DOF:])
-        p, c = pybullet, self.client
+        p, c = pybullet(), self.client
         position, quaternion = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
         linear, angular = p.getBaseVelocity(self.body, physicsClientId=c)
         place = _pose(position, quaternion)
@@ -406,6 +419,9 @@ def _load_body(robot: Biped, client: int, held: bool = True) -> int:
     Raises:
         RobotError: if PyBullet does not read it.
     """
+    engine = pybullet()
+    # By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
+    flags = engine.URDF_USE_INERTIA_FROM_FILE | engine.URDF_IGNORE_VISUAL_SHAPES
     tree = ElementTree.fromstring(robot.urdf)
     for link in tree.findall("link"):
         for visual in link.findall("visual"):
@@ -415,10 +431,10 @@ def _load_body(robot: Biped, client: int, held: bool = True) -> int:
         path.write_bytes(ElementTree.tostring(tree, encoding="utf-8"))
         try:
             with decimal_points():
-                body = pybullet.loadURDF(
-                    str(path), useFixedBase=held, flags=_FLAGS, physicsClientId=client
+                body = engine.loadURDF(
+                    str(path), useFixedBase=held, flags=flags, physicsClientId=client
                 )
-        except pybullet.error as error:
+        except engine.error as error:
             raise RobotError(f"PyBullet does not read {robot.path} ({error}): change it") from None
     return int(body)
 
@@ -433,7 +449,7 @@ def _ground_bodies(terrain: Terrain, client: int) -> dict[int, float | None]:
     Returns:
         The friction of each body; None: that of the plant's options.
     """
-    p = pybullet
+    p = pybullet()
 
     def body(shape: int, position: tuple[float, float, float], pitch: float = 0.0) -> int:
         turn = p.getQuaternionFromEuler((0.0, pitch, 0.0))

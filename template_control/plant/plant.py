@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
+from importlib.util import find_spec
 from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -85,6 +86,11 @@ _MEMBERS = (
     "step",
     "close",
 )
+
+
+def default_plant() -> PlantOptions:
+    """Options of the physics engine that is installed: PyBullet, or else MuJoCo."""
+    return PlantOptions() if find_spec("pybullet") else MujocoOptions()
 
 
 def check_world(world: World) -> None:

@@ -35,7 +35,7 @@ from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
-from template_control.plant.plant import Plant, check_world
+from template_control.plant.plant import Plant, check_world, default_plant
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.spec import RobotSpec
@@ -110,7 +110,9 @@ class Experiment(Checked):
     motion: GaitSpec | Scenario | Gait | Route | None = None
     planner: PlannerSpec | Planner | Planners | None = None
     controller: EmbeddingOptions | FreeOptions | None = None
-    world: PlantOptions | MujocoOptions | IdealOptions | Plant = field(default_factory=PlantOptions)
+    world: PlantOptions | MujocoOptions | IdealOptions | Plant = field(
+        default_factory=default_plant
+    )
     pushes: tuple[Push, ...] = ()
     sensors: SensorOptions | ImuOptions = field(default_factory=SensorOptions)
     delay: NotNegative = 0.0

@@ -12,6 +12,7 @@ from template_control.embedding.planners.planner import Planner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
+from template_control.plant.plant import default_plant
 from template_control.robot.biped import Biped
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment
@@ -76,7 +77,7 @@ def Situation(robot: Any, gait: Any, planner: Any, plant: Any = None) -> Any:
         planner: of the experiment.
         plant: its world.
     """
-    return Experiment(robot, planner=planner, world=plant or PlantOptions()).prepare()
+    return Experiment(robot, planner=planner, world=plant or default_plant()).prepare()
 
 
 def accepts_old_call(simulate: Callable[P, Record]) -> Callable[P, Record]:

@@ -132,9 +132,9 @@ def test_a_frame_without_inertial_weighs_nothing_in_pybullet_too(tmp_path):
     robot = tc.load_robot(path)
     assert robot.mass == pytest.approx(80.0)
     with BulletPlant(robot, tc.PlantOptions()) as plant:
-        links = range(-1, pybullet.getNumJoints(plant.body, physicsClientId=plant.client))
+        links = range(-1, pybullet().getNumJoints(plant.body, physicsClientId=plant.client))
         mass = sum(
-            pybullet.getDynamicsInfo(plant.body, link, physicsClientId=plant.client)[0]
+            pybullet().getDynamicsInfo(plant.body, link, physicsClientId=plant.client)[0]
             for link in links
         )
     assert mass == pytest.approx(80.0)

@@ -3,14 +3,13 @@
 from functools import cache
 
 import numpy as np
-import pybullet
 import pytest
 
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
-from template_control.plant.bullet import BulletPlant, PlantOptions
+from template_control.plant.bullet import BulletPlant, PlantOptions, pybullet
 from template_control.plant.terrain import GroundStep
 from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
@@ -45,7 +44,7 @@ def test_rays_meet_the_ground_where_it_is_said_to_be(robot, height, edge):
     options = PlantOptions(ground_step=GroundStep(height, edge))
     with BulletPlant(robot, options) as plant:
         for x in (-20.0, edge - 1e-3, edge + 1e-3, edge + 500.0):
-            ((_, _, _, hit, _),) = pybullet.rayTest(
+            ((_, _, _, hit, _),) = pybullet().rayTest(
                 [x, 0.4, 3.0], [x, 0.4, -3.0], physicsClientId=plant.client
             )
             assert hit[2] == pytest.approx(height if x > edge else 0.0, abs=1e-6)

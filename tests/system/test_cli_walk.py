@@ -87,7 +87,7 @@ def test_a_scenario_that_walks_is_walked(tmp_path, capfd):
 @pytest.mark.slow
 def test_the_example_walks_at_several_speeds_as_the_readme_prints_it(tmp_path, monkeypatch):
     record = go(WALK_SPEEDS, tmp_path, monkeypatch)
-    assert record.metadata["summary"]["qp_failures"] == 0
+    assert record.summary.qp_failures == 0
     speed = record.section_state[:, 0]
     assert speed.min() < 0.97
     assert speed[-1] > 1.05

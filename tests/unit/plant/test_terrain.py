@@ -6,7 +6,6 @@ import tomllib
 
 import mujoco
 import numpy as np
-import pybullet
 import pytest
 
 import template_control as tc
@@ -21,6 +20,7 @@ from template_control.plant import (
     read_terrain,
     terrain_from,
 )
+from template_control.plant.bullet import pybullet
 from template_control.plant.terrain import pieces
 
 SLOPE = Terrain.slope(np.radians(4.0))
@@ -88,19 +88,19 @@ def test_a_ball_in_pybullet_is_as_far_from_the_ground_as_is_told(robot, name):
     ground, radius = GROUNDS[name], 0.01
     with BulletPlant(robot, tc.PlantOptions(terrain=ground)) as plant:
         c = plant.client
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_SPHERE, radius=radius, physicsClientId=c
+        shape = pybullet().createCollisionShape(
+            pybullet().GEOM_SPHERE, radius=radius, physicsClientId=c
         )
-        ball = pybullet.createMultiBody(1.0, shape, physicsClientId=c)
+        ball = pybullet().createMultiBody(1.0, shape, physicsClientId=c)
         bodies = range(1 + len(pieces(ground)[1]))
         for x, y in balls(ground, radius):
-            pybullet.resetBasePositionAndOrientation(
+            pybullet().resetBasePositionAndOrientation(
                 ball, (x, 0.0, y), (0.0, 0.0, 0.0, 1.0), physicsClientId=c
             )
             found = [
                 point
                 for body in bodies
-                for point in pybullet.getClosestPoints(ball, body, 0.1, physicsClientId=c)
+                for point in pybullet().getClosestPoints(ball, body, 0.1, physicsClientId=c)
             ]
             nearest = min(found, key=lambda point: point[8])
             expected = ground.closest(x, y)

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-import pybullet
 import pytest
 
 from template_control.errors import ParameterError, RobotError
-from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions
+from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions, pybullet
 from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
 from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
@@ -39,7 +38,7 @@ def integrated(plant):
     """(3,) the point of the trunk whose velocity the engine integrates, in its frame [m]."""
     if isinstance(plant, FloatingBaseMujocoPlant):
         return np.zeros(3)
-    told = pybullet.getDynamicsInfo(plant.body, -1, physicsClientId=plant.client)
+    told = pybullet().getDynamicsInfo(plant.body, -1, physicsClientId=plant.client)
     return np.array(told[3])
 
 

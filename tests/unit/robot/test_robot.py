@@ -4,11 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-import pybullet
 import pytest
 
 from template_control.errors import ParameterError, RobotError
-from template_control.plant.bullet import BulletPlant, PlantOptions
+from template_control.plant.bullet import BulletPlant, PlantOptions, pybullet
 from template_control.robot.library import ROBOTS, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
 
@@ -107,8 +106,8 @@ def test_mass_matrix_and_bias_forces_agree_with_pybullet(any_robot, random_state
         for q, v in random_states:
             any_robot.update(q, v)
             file_q, file_v = q[order].tolist(), v[order].tolist()
-            mass = pybullet.calculateMassMatrix(body, file_q, physicsClientId=client)
-            bias = pybullet.calculateInverseDynamics(
+            mass = pybullet().calculateMassMatrix(body, file_q, physicsClientId=client)
+            bias = pybullet().calculateInverseDynamics(
                 body, file_q, file_v, [0.0] * 7, physicsClientId=client
             )
             np.testing.assert_allclose(
