@@ -19,6 +19,7 @@ from template_control.run.sensing import ContactSensors, SensorOptions, Sensors
 from template_control.run.simulation import simulate
 from template_control.slip.parameters import SlipParameters
 from template_control.view.figures import stick_diagram
+from template_control.view.style import Look
 
 
 def walk(robot, gait, **options):
@@ -114,7 +115,7 @@ def test_the_hip_is_measured_from_the_ground_below_it(robot, gait, monkeypatch):
 def test_the_stick_diagram_draws_the_step(on_step, short_walk, tmp_path):
     step, record = on_step(0.005)
     record = Record.load(record.save(tmp_path / "run.npz"))
-    (axes,) = stick_diagram(record, seconds=4.0).axes
+    (axes,) = stick_diagram(record, Look(start=-4.0)).axes
     ground = axes.lines[-1].get_xydata()
     np.testing.assert_allclose(ground[:, 1], [0.0, 0.0, 0.005, 0.005])
     np.testing.assert_allclose(ground[1:3, 0], step.x)
