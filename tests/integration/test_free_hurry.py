@@ -82,7 +82,7 @@ def test_a_push_towards_the_foot_that_lands_is_taken():
     record = tc.simulate(tc.Experiment(robot, planner=planner, steps=10, pushes=(push,)))
     assert not record.fell, record.fall_reason
     figures = record.summary
-    assert figures["qp_failures"] == 0
+    assert figures.qp_failures == 0
     for angle in figures.joint_angle.values():
         assert angle.lower < angle.least < angle.most < angle.upper
     assert abs(np.diff(record.section_time)[-1] - np.diff(record.section_time)[2]) < 0.05

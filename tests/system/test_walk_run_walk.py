@@ -85,7 +85,7 @@ SHORT = Scenario(
     ],
 )
 def test_five_link_holds_pushes_within_both_transitions(pushes):
-    record = tc.simulate(tc.Experiment(tc.load_robot("five-link"), planner=SHORT, pushes=pushes))
+    record = tc.simulate(tc.Experiment(tc.load_robot("five-link"), motion=SHORT, pushes=pushes))
     check(record)
     kinds = strides(record)
     for push, kind in zip(pushes, ("wr", "rw"), strict=True):
