@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from typing import Any, ParamSpec
 
@@ -111,4 +112,4 @@ def _experiment(
     kept = isinstance(route, Planner)
     planner, motion = (route, None) if kept else (planners, route)
     new = {"robot": robot, "motion": motion, "planner": planner, **automaton}
-    return (options or Experiment()).with_(new), progress
+    return replace(options or Experiment(), **new), progress

@@ -6,6 +6,8 @@ import pytest
 
 import template_control as tc
 from template_control.deprecated import ADAPTED, DEPRECATED
+from template_control.embedding.standing.planners import standing_planners
+from template_control.slip.scenario.route import SteadyRoute
 
 OLD_NAMES = {
     "template_control.Course",
@@ -138,3 +140,12 @@ def test_an_unknown_name_is_no_attribute():
 
     with pytest.raises(AttributeError, match="no_such_name"):
         _ = template_control.no_such_name
+
+
+def test_the_old_call_takes_planners_by_kind_of_stride(robot):
+    planners = standing_planners(tc.template_for(robot))
+    route = SteadyRoute(tc.template_for(robot), "s", planners["s"].gait.state)
+    new = tc.simulate(tc.Experiment(robot, route, planner=planners, steps=1))
+    with pytest.warns(DeprecationWarning, match="use simulate"):
+        old = tc.simulate(robot, route, tc.Experiment(steps=1), planners=planners)
+    assert (old.q == new.q).all()
