@@ -122,7 +122,7 @@ class BulletPlant:
     def __init__(self, robot: Biped, options: PlantOptions) -> None:
         self.robot = robot
         self.options = options
-        p = pybullet()
+        p = self._engine = pybullet()
         self.client = c = p.connect(p.DIRECT)
         p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
         p.setTimeStep(options.time_step, physicsClientId=c)
@@ -154,7 +154,7 @@ class BulletPlant:
         return self.joints[PLANAR_DOF - 1]
 
     def _info(self) -> list[tuple[Any, ...]]:
-        p, c = pybullet(), self.client
+        p, c = self._engine, self.client
         count = p.getNumJoints(self.body, physicsClientId=c)
         return [p.getJointInfo(self.body, i, physicsClientId=c) for i in range(count)]
 
@@ -167,7 +167,7 @@ class BulletPlant:
         told = link_masses(self.robot.urdf)
         for row in info:
             link = row[12].decode()
-            mass = pybullet().getDynamicsInfo(self.body, row[0], physicsClientId=self.client)[0]
+            mass = self._engine.getDynamicsInfo(self.body, row[0], physicsClientId=self.client)[0]
             if abs(mass - told[link]) > _CLOSE * self.robot.mass:
                 raise RobotError(
                     f"{self.robot.path}: link {link!r} weighs {mass:g} kg in PyBullet and"
@@ -185,11 +185,11 @@ class BulletPlant:
         """The same in PyBullet's own coordinates; ``q`` holds the joints in its own order."""
         angles = q.tolist()
         return np.array(
-            pybullet().calculateMassMatrix(self.body, angles, physicsClientId=self.client)
+            self._engine.calculateMassMatrix(self.body, angles, physicsClientId=self.client)
         )
 
     def _configure(self, joints: int) -> None:
-        p, c, body = pybullet(), self.client, self.body
+        p, c, body = self._engine, self.client, self.body
         friction = self.options.friction
         damping = dict(zip(self._actuated, self.robot.joint_damping, strict=True))
         # One property a call: a combined call silently drops some of them.
@@ -238,13 +238,13 @@ class BulletPlant:
         """See :meth:`~.plant.Plant.reset`."""
         self._contacts = None
         for joint, position, velocity in zip(self.joints, q, v, strict=True):
-            pybullet().resetJointState(
+            self._engine.resetJointState(
                 self.body, joint, position, velocity, physicsClientId=self.client
             )
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
-        states = pybullet().getJointStates(self.body, self.joints, physicsClientId=self.client)
+        states = self._engine.getJointStates(self.body, self.joints, physicsClientId=self.client)
         for i, state in enumerate(states):
             q[i] = state[0]
             v[i] = state[1]
@@ -284,7 +284,7 @@ class BulletPlant:
         all. Whatever touches the robot is ground: it does not collide with itself.
         """
         if self._contacts is None:
-            self._contacts = pybullet().getContactPoints(physicsClientId=self.client)
+            self._contacts = self._engine.getContactPoints(physicsClientId=self.client)
         return self._contacts
 
     def step(self, torque: Array, push: float = 0.0) -> None:
@@ -298,7 +298,7 @@ class BulletPlant:
 
     def _advance(self, torque: Array, push: float, aside: float) -> None:
         """One physics step with a push along the world's x and y [N]."""
-        p, c = pybullet(), self.client
+        p, c = self._engine, self.client
         self._contacts = None
         forces = np.asarray(torque).tolist()  # Python's numbers: PyBullet is slow with others
         p.setJointMotorControlArray(
@@ -316,11 +316,11 @@ class BulletPlant:
         p.stepSimulation(physicsClientId=c)
 
     def _trunk_com(self) -> Any:
-        return pybullet().getLinkState(self.body, self._trunk, physicsClientId=self.client)[0]
+        return self._engine.getLinkState(self.body, self._trunk, physicsClientId=self.client)[0]
 
     def close(self) -> None:
         """Disconnect; the plant is unusable afterwards."""
-        pybullet().disconnect(self.client)
+        self._engine.disconnect(self.client)
 
     def __enter__(self) -> BulletPlant:
         return self
@@ -349,7 +349,7 @@ class FloatingBaseBulletPlant(BulletPlant):
 
     def _load(self) -> int:
         body = _load_body(self.robot, self.client, held=False)
-        found = pybullet().getDynamicsInfo(body, _BASE, physicsClientId=self.client)
+        found = self._engine.getDynamicsInfo(body, _BASE, physicsClientId=self.client)
         self._inertial = _pose(found[3], found[4])
         return body
 
@@ -366,7 +366,7 @@ class FloatingBaseBulletPlant(BulletPlant):
         return _BASE
 
     def _trunk_com(self) -> Any:
-        return pybullet().getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
+        return self._engine.getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
 
     def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`.
@@ -379,7 +379,7 @@ class FloatingBaseBulletPlant(BulletPlant):
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
-        p, c = pybullet(), self.client
+        p, c = self._engine, self.client
         super().reset(q[_POSITION:], v[FLOATING_DOF:])
         trunk = _pose(q[:3], q[3:_POSITION])
         place = trunk * self._inertial
@@ -394,7 +394,7 @@ class FloatingBaseBulletPlant(BulletPlant):
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
         super().read(q[_POSITION:], v[FLOATING_DOF:])
-        p, c = pybullet(), self.client
+        p, c = self._engine, self.client
         position, quaternion = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
         linear, angular = p.getBaseVelocity(self.body, physicsClientId=c)
         place = _pose(position, quaternion)
