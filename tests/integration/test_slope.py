@@ -253,20 +253,21 @@ def test_a_planner_that_knows_no_slope_keeps_the_axes(level_gait, standing):
     assert standing(level).supervisor.on_slope(0.05) == 0.0
 
 
+def walked(gait, ground, steps):
+    """A record of five-link's walk over a ground."""
+    robot, planner, world = tc.load_robot("five-link"), tc.LqrPlanner(gait), tc.PlantOptions
+    return tc.simulate(
+        tc.Experiment(
+            robot, planner=planner, steps=steps, world=world(terrain=ground), record_every=5
+        )
+    )
+
+
 @pytest.mark.slow(seconds=25)
 @pytest.mark.parametrize("slope", STEEP)
 def test_a_slope_is_walked_at_the_speed_of_level_ground(default_gait, slope):
     ground = tc.Terrain.slope(slope, start=default_gait.parameters.rest_length)
-    plant = tc.PlantOptions(terrain=ground)
-    record = tc.simulate(
-        tc.Experiment(
-            tc.load_robot("five-link"),
-            planner=tc.LqrPlanner(default_gait),
-            steps=20,
-            world=plant,
-            record_every=5,
-        )
-    )
+    record = walked(default_gait, ground, 20)
     assert not record.fell
     last = record.section_state[-4:]
     assert last[:, 0] == pytest.approx(default_gait.vlo[0], rel=0.02)
@@ -278,15 +279,6 @@ def test_a_slope_is_walked_at_the_speed_of_level_ground(default_gait, slope):
 def test_treads_that_fell_the_robot_before_are_walked(default_gait):
     """Its foothold heights are drawn from +-2 cm; with stiffnesses alone it fell in step 19."""
     ground = tc.Terrain.random_steps(0.02, (0.3, 0.6), 1, start=1.0, end=25.0)
-    plant = tc.PlantOptions(terrain=ground)
-    record = tc.simulate(
-        tc.Experiment(
-            tc.load_robot("five-link"),
-            planner=tc.LqrPlanner(default_gait),
-            steps=22,
-            world=plant,
-            record_every=5,
-        )
-    )
+    record = walked(default_gait, ground, 22)
     assert not record.fell
     assert np.abs(record.section_state[:, 0] - default_gait.vlo[0]).max() < 0.25

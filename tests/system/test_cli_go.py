@@ -1,13 +1,11 @@
 """``template-control go`` as a user meets it, and the figures of a scenario."""
 
 import json
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from template_control.cli import report as kept
 from template_control.cli.go import print_route_table, summarise_route
 from template_control.cli.main import main
 from template_control.run.record import Record
@@ -157,16 +155,7 @@ def test_a_file_that_is_no_scenario_is_refused(arguments, told, tmp_path, monkey
     assert told in refused(["go", *arguments, "--output", "out"])
 
 
-def test_ctrl_c_keeps_the_run_and_its_template(scenario, tmp_path, capfd, monkeypatch):
-    @contextmanager
-    def impatient(*_):
-        def advance(done):
-            if done == 2:
-                raise KeyboardInterrupt
-
-        yield advance
-
-    monkeypatch.setattr(kept, "progress_bar", impatient)
+def test_ctrl_c_keeps_the_run_and_its_template(scenario, tmp_path, capfd, interrupted):
     assert main(["go", str(scenario), "--json", "--no-figures", "--output", str(tmp_path)]) == 130
     told = capfd.readouterr()
     assert not json.loads(told.out)["completed"]

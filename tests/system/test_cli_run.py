@@ -2,7 +2,6 @@
 
 import json
 import re
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from matplotlib.image import imread
 from places import EXAMPLES
 
 import template_control as tc
-from template_control.cli import report as kept
 from template_control.cli.main import main
 from template_control.run.record import Record
 from template_control.run.summary import summarise
@@ -135,16 +133,7 @@ def test_a_fall_exits_with_one_and_keeps_the_run(tmp_path, capfd):
     assert Record.load(tmp_path / "run.npz").fell
 
 
-def test_ctrl_c_keeps_what_was_run(tmp_path, capfd, monkeypatch):
-    @contextmanager
-    def impatient(*_):
-        def advance(done):
-            if done == 2:
-                raise KeyboardInterrupt
-
-        yield advance
-
-    monkeypatch.setattr(kept, "progress_bar", impatient)
+def test_ctrl_c_keeps_what_was_run(tmp_path, capfd, interrupted):
     words = ["run", "--steps", "100000", "--no-figures", "--output", str(tmp_path)]
     assert main(words) == 130
     told = capfd.readouterr()

@@ -3,14 +3,12 @@
 import json
 import subprocess
 import sys
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from places import EXAMPLES
 from printed import WALK_SPEEDS, go
 
-from template_control.cli import report as kept
 from template_control.cli.main import main
 from template_control.errors import RecordError
 from template_control.robot.library import robot_path
@@ -126,16 +124,7 @@ def test_a_fall_exits_with_one_and_keeps_the_run(tmp_path, capfd):
     assert Record.load(tmp_path / "run.npz").fell
 
 
-def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, monkeypatch):
-    @contextmanager
-    def impatient(*_):
-        def advance(done):
-            if done == 2:
-                raise KeyboardInterrupt
-
-        yield advance
-
-    monkeypatch.setattr(kept, "progress_bar", impatient)
+def test_ctrl_c_keeps_what_was_walked(tmp_path, capfd, interrupted):
     arguments = ["walk", "--steps", "100000", "--no-figures", "--output", str(tmp_path)]
     assert main(arguments) == 130
     told = capfd.readouterr()
