@@ -6,6 +6,7 @@ import argparse
 import json
 
 from template_control import settings
+from template_control.errors import ParameterError
 from template_control.run.experiment import Experiment
 from template_control.storage import to_jsonable
 
@@ -21,8 +22,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the keys; returns 0."""
+    """Print the keys; returns 0.
+
+    Raises:
+        ParameterError: if no key has the word in it.
+    """
     found = [leaf for leaf in settings.leaves(Experiment) if options.word in leaf.path]
+    if not found:
+        raise ParameterError(f"no key has {options.word!r} in it: keys alone lists all of them")
     if options.json:
         print(json.dumps({leaf.path: to_jsonable(leaf.default, str) for leaf in found}))
         return 0

@@ -59,7 +59,9 @@ def run(options: argparse.Namespace) -> int:
     names = known if options.figures is None else options.figures.split(",")
     for name in names:
         if name not in known:
-            raise ParameterError(f"there is no figure {name!r} of this run: give some of {known}")
+            raise ParameterError(
+                f"there is no figure {name!r} of this run: give some of {', '.join(known)}"
+            )
     drawn = {"dpi": options.dpi, "look": look, "file_format": options.format}
     with writing(folder):
         own = [name for name in names if name not in ROUTE_FIGURES]

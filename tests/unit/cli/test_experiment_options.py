@@ -261,3 +261,7 @@ def test_objects_cannot_be_written(robot, default_gait, tmp_path):
     ):
         with pytest.raises(ParameterError, match=f"^{name}, which TOML cannot say$"):
             experiment.save(tmp_path / "run.toml")
+
+
+def test_a_word_that_is_in_no_key_is_refused(refused):
+    assert "no key has 'frictoin' in it" in refused(["keys", "frictoin"])
