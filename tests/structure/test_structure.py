@@ -306,9 +306,9 @@ def gait_branches(tree):
 # ---- what is written down
 
 
-def public(tree):
-    """Public classes, functions and methods of ``tree`` with whether they have self or cls."""
-    for node in tree.body:
+def public(body):
+    """Public classes, functions and methods of ``body`` with whether they have self or cls."""
+    for node in body:
         if isinstance(node, Function | ast.ClassDef) and not node.name.startswith("_"):
             yield node, False
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
@@ -318,7 +318,7 @@ def public(tree):
 
 
 def undocumented(tree):
-    for node, _ in public(tree):
+    for node, _ in public(tree.body):
         if not ast.get_docstring(node):
             yield f"{node.lineno}: {node.name} has no docstring"
 
@@ -335,17 +335,21 @@ def exported_names():
     }
 
 
-def inner_checks(tree):
-    """Functions that check their arguments and are called by the library alone."""
+def exported(tree):
+    """Functions and classes of ``tree`` that a stub names, and the bases of these classes."""
     bases = {
         ast.unparse(base)
         for node in tree.body
         if isinstance(node, ast.ClassDef) and node.name in exported_names()
         for base in node.bases
     }
-    for owner in tree.body:
-        if getattr(owner, "name", None) in exported_names() | bases:
-            continue
+    names = exported_names() | bases
+    return [node for node in tree.body if getattr(node, "name", None) in names]
+
+
+def inner_checks(tree):
+    """Functions that check their arguments and are called by the library alone."""
+    for owner in set(tree.body).difference(exported(tree)):
         for node in ast.walk(owner):
             if isinstance(node, Function) and "checked" in map(ast.unparse, node.decorator_list):
                 yield f"{node.lineno}: {node.name} is not exported: let its callers check"
@@ -373,8 +377,8 @@ def constructor(node):
 
 
 def without_arguments(tree):
-    """Public functions and classes with two or more parameters that tell not all of them."""
-    for node, bound in public(tree):
+    """Exported functions and classes with two or more parameters that tell not all of them."""
+    for node, bound in public(exported(tree)):
         names = parameters(node, bound) if isinstance(node, Function) else constructor(node)
         text = (ast.get_docstring(node) or "") + "\n"
         entries = ENTRY.findall("".join(SECTION.findall(text)))
@@ -451,21 +455,26 @@ def test_everything_public_is_documented(rule):
         (inner_checks, "class A:\n @checked\n def __init__(self): ...", 1),
         (undocumented, "def f(): ...\nclass A:\n def g(self): ...\n def _h(self): ...", 3),
         (undocumented, "class _A:\n def g(self): ...", 0),
-        (without_arguments, "def f(a, b):\n '''Do.'''", 1),
-        (without_arguments, "def f(a, b):\n '''Do.\n\n Args:\n     a: one.\n '''", 1),
-        (without_arguments, "def f(a, b):\n '''Do.\n\n Args:\n     a, b: two.\n '''", 0),
-        (without_arguments, "def f(a, *b):\n '''Do.\n\n Args:\n     a: 1.\n     b: 2.\n '''", 0),
-        (without_arguments, "def f(a, b):\n '''Do.\n\n Returns:\n     a, b: two.\n '''", 1),
-        (without_arguments, "def f(a, b):\n '''See :meth:`.planner.Planner.decide`.'''", 0),
-        (without_arguments, "def f(a, b):\n '''As ``decide``, but quicker.'''", 0),
-        (without_arguments, "def f(a, b):\n '''Do as :meth:`decide` does.'''", 1),
-        (without_arguments, "def f(a, b):\n '''See :func:`nowhere_to_be_found`.'''", 1),
-        (without_arguments, "class A:\n '''A.'''\n def f(self, b):\n  '''Do.'''", 0),
-        (without_arguments, "class A:\n '''A.'''\n def __init__(self, a, b): ...", 1),
-        (without_arguments, "class A:\n '''A.'''\n a: int\n b: int", 1),
+        (without_arguments, "def simulate(a, b):\n '''Do.'''", 1),
+        (without_arguments, "def simulate(a, b):\n '''Do.\n\n Args:\n     a: one.\n '''", 1),
+        (without_arguments, "def simulate(a, b):\n '''Do.\n\n Args:\n     a, b: two.\n '''", 0),
         (
             without_arguments,
-            "class A:\n '''A.\n\n Attributes:\n     a, b: two.\n '''\n a: int\n b: int",
+            "def simulate(a, *b):\n '''Do.\n\n Args:\n     a: 1.\n     b: 2.\n '''",
+            0,
+        ),
+        (without_arguments, "def simulate(a, b):\n '''Do.\n\n Returns:\n     a, b: two.\n '''", 1),
+        (without_arguments, "def simulate(a, b):\n '''See :meth:`.planner.Planner.decide`.'''", 0),
+        (without_arguments, "def simulate(a, b):\n '''As ``decide``, but quicker.'''", 0),
+        (without_arguments, "def simulate(a, b):\n '''Do as :meth:`decide` does.'''", 1),
+        (without_arguments, "def simulate(a, b):\n '''See :func:`nowhere_to_be_found`.'''", 1),
+        (without_arguments, "class Record:\n '''A.'''\n def f(self, b):\n  '''Do.'''", 0),
+        (without_arguments, "class Record:\n '''A.'''\n def __init__(self, a, b): ...", 1),
+        (without_arguments, "class Record:\n '''A.'''\n a: int\n b: int", 1),
+        (without_arguments, "class Inner:\n '''A.'''\n a: int\n b: int", 0),
+        (
+            without_arguments,
+            "class Record:\n '''A.\n\n Attributes:\n     a, b: two.\n '''\n a: int\n b: int",
             0,
         ),
     ],
