@@ -174,25 +174,14 @@ class FiveLink(Checked):
 
 
 def urdf_of(name: str, parts: Iterable[str]) -> str:
-    """A URDF's text.
-
-    Args:
-        name: of the robot.
-        parts: links and joints.
-    """
+    """A URDF's text from the robot's name and its links and joints."""
     colours = (f'<material name="{n}"><color rgba="{c}"/></material>' for n, c in _COLOURS.items())
     head = ('<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>")
     return "\n".join([*head, *colours, *parts, "</robot>", ""])
 
 
 def inertial(height: float, mass: float, moments: tuple[float, float, float]) -> str:
-    """A link's masses as URDF text.
-
-    Args:
-        height: of its centre of mass in its frame [m].
-        mass: [kg].
-        moments: about x, y and z through the centre of mass [kg m^2].
-    """
+    """``<inertial>`` of a link: height of its CoM [m], mass [kg], moments about x, y, z."""
     xx, yy, zz = moments
     return (
         f'\n  <inertial><origin xyz="0 0 {height:.8g}"/><mass value="{mass:.8g}"/>'
@@ -232,16 +221,7 @@ def joint(
     origin: str = "0 0 0",
     limit: tuple[float, float, float, float] | None = None,
 ) -> str:
-    """A joint as URDF text.
-
-    Args:
-        name: of the joint.
-        kind: revolute, prismatic or fixed.
-        parent, child: its links.
-        axis: that it turns about; "" for none.
-        origin: in the parent.
-        limit: lower, upper [rad], effort [N m], velocity [rad/s]; None for none.
-    """
+    """A joint as URDF text; ``limit``: lower, upper [rad], effort [N m], velocity [rad/s]."""
     text = (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
         f'\n  <origin xyz="{origin}"/>'

@@ -42,14 +42,11 @@ class StraightLegs:
 def straight_legs(
     model: pin.Model, legs: Sequence[Sequence[int]], feet: Sequence[int]
 ) -> StraightLegs:
-    """Find the configuration with straight legs.
+    """The configuration with straight legs, from a model whose neutral trunk is upright.
 
+    ``legs`` are Pinocchio's joints from the trunk on, the last two hip and knee; ``feet`` are
+    frames.
     Joints above the hip are turned until its axis is lateral, if they can.
-
-    Args:
-        model: of the robot; its neutral configuration has an upright trunk.
-        legs: Pinocchio's joints of each, from the trunk on; the last two are hip and knee.
-        feet: frame of each foot.
     """
     data, q = model.createData(), pin.neutral(model)
     for leg in legs:
@@ -71,12 +68,7 @@ def straight_legs(
 
 
 def middle(model: pin.Model, joint: int) -> float:
-    """Middle of a hinge's range [rad], 0 if it has none.
-
-    Args:
-        model: of the robot.
-        joint: Pinocchio's index.
-    """
+    """Middle of a hinge's range [rad], 0 if it has none."""
     place = model.idx_qs[joint]
     half = 0.5 * model.lowerPositionLimit[place] + 0.5 * model.upperPositionLimit[place]
     return float(half) if np.isfinite(half) else 0.0
@@ -120,12 +112,7 @@ def _turn_lateral(model: pin.Model, data: pin.Data, q: Array, leg: Sequence[int]
 
 
 def foot_frame(model: pin.Model, foot: str) -> int:
-    """Pinocchio's frame at the centre of a foot's sphere, or of its link where none was added.
-
-    Args:
-        model: of the robot.
-        foot: name of the link; a joint may have the same.
-    """
+    """Pinocchio's frame at the centre of a foot's sphere, or of its link where none was added."""
     centre = foot + _CENTRE
     if model.existFrame(centre, pin.FrameType.OP_FRAME):
         return int(model.getFrameId(centre, pin.FrameType.OP_FRAME))
@@ -133,13 +120,7 @@ def foot_frame(model: pin.Model, foot: str) -> int:
 
 
 def add_foot_frame(model: pin.Model, foot: str, placement: pin.SE3) -> None:
-    """Add the frame that :func:`foot_frame` finds.
-
-    Args:
-        model: of the robot; changed.
-        foot: name of the link.
-        placement: of the sphere, in the frame of the joint that moves it.
-    """
+    """Add the frame that :func:`foot_frame` finds, placed in its moving joint's frame."""
     frame = foot_frame(model, foot)
     joint = model.frames[frame].parentJoint
     kind = pin.FrameType.OP_FRAME
@@ -147,24 +128,13 @@ def add_foot_frame(model: pin.Model, foot: str, placement: pin.SE3) -> None:
 
 
 def leg_joints(model: pin.Model, feet: Sequence[str], base_joints: int) -> list[list[int]]:
-    """Pinocchio's joints that move each foot and not the base, from the hip on.
-
-    Args:
-        model: of the robot.
-        feet: names of the two foot frames.
-        base_joints: the first joints, which move the base.
-    """
+    """Pinocchio's joints that move each foot and not the base, from the hip on."""
     parents = (model.frames[foot_frame(model, foot)].parentJoint for foot in feet)
     return [[j for j in model.supports[parent] if j > base_joints] for parent in parents]
 
 
 def carrying(model: pin.Model, frames: Sequence[int]) -> Array:
-    """Which velocities move each foot: (2, nv), 1 where one does, else 0.
-
-    Args:
-        model: of the robot.
-        frames: of the two feet.
-    """
+    """(2, nv) of the feet: 1 where a velocity moves the foot, else 0."""
     carries = np.zeros((len(frames), model.nv))
     for row, frame in zip(carries, frames, strict=True):
         for joint in model.supports[model.frames[frame].parentJoint]:

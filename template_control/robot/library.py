@@ -121,11 +121,7 @@ def _files(entry: _Entry) -> list[Path]:
 
 
 def _name(name: str | Path) -> str:
-    """A robot's name or path as text.
-
-    Raises:
-        RobotError: if it is the text of a URDF.
-    """
+    """A robot's name or path as text; a RobotError if it is the text of a URDF."""
     text = str(name)
     if text.lstrip("\ufeff \n").startswith("<"):
         raise RobotError(

@@ -50,7 +50,7 @@ def planarise(
     foot_radius: float | None,
     foot_offset: Sequence[float] | None = None,
 ) -> None:
-    """Make a 3D URDF a planar one.
+    """Make a 3D URDF a planar one, in place.
 
     Args:
         path: of the 3D URDF, for messages.
@@ -60,9 +60,6 @@ def planarise(
         locked: angles [rad] at which other joints are held; 0 for those not named.
         foot_radius: of spheres to put into the feet [m]; None to keep the feet's own.
         foot_offset: of their centres from the feet's origins [m].
-
-    Raises:
-        RobotError: if a joint is missing or named twice, or a sagittal joint's axis is not lateral.
     """
     if len(set(sagittal_joints)) != _SAGITTAL:
         raise RobotError(

@@ -48,15 +48,7 @@ def _check_legs_apart(path: Path, feet: Sequence[str], legs: Sequence[Sequence[i
 
 
 def check_planar(path: Path, model: pin.Model) -> None:
-    """Check that base and legs are those of a planar biped with hips and knees.
-
-    Args:
-        path: of the URDF, for the message.
-        model: of the robot.
-
-    Raises:
-        RobotError: naming the joint that is otherwise, or has no limit of torque or speed.
-    """
+    """Check that base and legs are those of a planar biped with hips and knees, and have limits."""
     kinds = [joint.shortname() for joint in model.joints][1:]
     names = list(model.names)[1:]
     hinged = [joint.nq == joint.nv == 1 for joint in model.joints[1:]]
@@ -95,16 +87,7 @@ def check_planar(path: Path, model: pin.Model) -> None:
 
 
 def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
-    """Check that each foot hangs on a hip and a knee of its own, and the trunk turns at the hips.
-
-    Args:
-        path: of the URDF, for the message.
-        model: of the robot.
-        feet: names of the two foot links.
-
-    Raises:
-        RobotError: naming the foot or the hip that is elsewhere.
-    """
+    """Check that each foot has a hip and a knee of its own, and the trunk turns at the hips."""
     _check_feet(path, model, feet)
     legs = leg_joints(model, feet, PLANAR_DOF)
     _check_legs_apart(path, feet, legs)
@@ -127,15 +110,7 @@ def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None
 
 
 def check_guide(path: Path, model: pin.Model) -> None:
-    """Check that the joints of a planar robot's base lose nothing: the guide only holds it.
-
-    Args:
-        path: of the URDF, for the message.
-        model: of the robot.
-
-    Raises:
-        RobotError: naming the joint that does.
-    """
+    """Check that the joints of a planar robot's base lose nothing: the guide only holds it."""
     for joint in range(PLANAR_DOF):
         if model.damping[joint] > 0.0 or model.upperDryFrictionLimit[joint] > 0.0:
             raise RobotError(
@@ -145,16 +120,7 @@ def check_guide(path: Path, model: pin.Model) -> None:
 
 
 def check_floating(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
-    """Check that the robot is a biped whose legs can place their feet anywhere.
-
-    Args:
-        path: of the URDF, for the message.
-        model: of the robot, with a free flyer.
-        feet: names of the two foot links.
-
-    Raises:
-        RobotError: naming the foot or the joint that is otherwise.
-    """
+    """Check that a robot with a free flyer is a biped whose legs can place their feet anywhere."""
     _check_feet(path, model, feet)
     for joint, name in list(zip(model.joints, model.names, strict=True))[2:]:
         if joint.nq != 1 or joint.nv != 1:
@@ -210,19 +176,9 @@ def _near(given: Array, wanted: Array) -> bool:
 
 
 def add_feet(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> float:
-    """Add frames at the centres of the feet's spheres.
+    """Add frames at the centres of the feet's spheres to the model; their radius [m].
 
-    Args:
-        path: of the URDF, for the message.
-        urdf: its text, in which the collision shapes are.
-        model: of the robot, made from this text; changed.
-        feet: names of the two foot links.
-
-    Returns:
-        Radius of the spheres [m].
-
-    Raises:
-        RobotError: if a foot has not one sphere, or the radii differ.
+    A RobotError names the foot that has not one sphere, or the radii that differ.
     """
     try:
         geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
@@ -249,17 +205,7 @@ def add_feet(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> fl
 
 
 def check_size(path: Path, mass: float, leg_length: float, foot_radius: float) -> None:
-    """Check that mass, legs and feet could be those of one robot.
-
-    Args:
-        path: of the URDF, for the message.
-        mass: of the robot [kg].
-        leg_length: [m].
-        foot_radius: of the foot spheres [m].
-
-    Raises:
-        RobotError: if not.
-    """
+    """Check that mass [kg], legs [m] and feet's radius [m] could be those of one robot."""
     if 2.0 * foot_radius > leg_length:
         raise RobotError(
             f"{path}: feet of {foot_radius:.4g} m radius are larger than the legs, of"

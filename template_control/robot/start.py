@@ -79,17 +79,9 @@ class FloatingBasePose(Checked):
 
 
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
-    """State of a robot whose CoM and feet are in a pose.
+    """(nv,) q [m, rad] and (nv,) v [m/s, rad/s] of a robot in a pose.
 
-    Args:
-        robot: the model; its last update is overwritten.
-        pose: what is wanted.
-
-    Returns:
-        (nv,) configuration q [m, rad]; (nv,) velocity v [m/s, rad/s].
-
-    Raises:
-        RobotError: if the legs do not reach, or joints would be beyond their limits.
+    The robot's last update is overwritten. A RobotError says which legs do not reach, or which joints would be beyond their limits.
     """
     # From far away Newton's full step may bend a knee the wrong way; short ones do not.
     q = _bent_to(
@@ -179,15 +171,9 @@ def _bent_to(
 ) -> Array:
     """(nq,) configuration of a pose, with knees bent as their ranges allow.
 
-    Args:
-        robot: whose pose it is.
-        solve: finds the pose from a configuration with bent legs by steps of a largest length
-            [rad, m], or None.
-        longest: the lengths to try, one after the other.
-        height: of the CoM, for the message [m].
-
-    Raises:
-        RobotError: naming the joint that would be beyond its range, or the legs that were tried.
+    ``solve`` finds the pose from a configuration with bent legs by steps of a largest length [rad,
+    m],
+    or None; ``longest`` are the lengths to try, ``height`` is of the CoM, for the message.
     """
     beyond = ""
     low, high = robot.joint_range.T
@@ -223,15 +209,11 @@ def _newton(
     longest: float,
     iterations: int,
 ) -> Array | None:
-    """(nq,) configuration at which an error is zero, by Newton's method; None if none is found.
+    """(nq,) configuration at which ``error`` is zero, by Newton's method; None if none is found.
 
-    Args:
-        robot: the model; its last update is overwritten.
-        q: (nq,) where the search begins.
-        error: (n,) of the configuration, at the robot's last update.
-        step: (nv,) that takes away the error, of the configuration and the error.
-        longest: part of a step, the largest change of any coordinate [rad, m].
-        iterations: the most.
+    ``error`` (n,) is a function of the configuration at the robot's last update; ``step`` gives the
+    (nv,) that takes the error away; of it, ``longest`` is the largest change of a coordinate [rad,
+    m].
     """
     rest = np.zeros(robot.nv)
     for _ in range(iterations):
@@ -245,14 +227,7 @@ def _newton(
 
 
 def _configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: float) -> Array | None:
-    """(nv,) q of a pose, None where it is not found.
-
-    Args:
-        robot: the model; its last update is overwritten.
-        pose: what is wanted.
-        q: (nv,) bent legs, from which the search begins; changed.
-        longest: step of Newton's method, the largest change of any joint [rad].
-    """
+    """(nv,) q of a pose by steps of at most ``longest`` [rad] from bent legs; None: not found."""
     stance, swing = pose.rear, 1 - pose.rear
     q[:PLANAR_DOF] = pose.com[0], 0.8 * pose.com[1], pose.pitch
 
@@ -346,11 +321,7 @@ def _solved(robot: PlanarBiped, matrix: Array, right: Array) -> Array:
 
 
 def _smallest(robot: FloatingBaseBiped, matrix: Array, right: Array) -> Array:
-    """The smallest solution: a leg may have a joint to spare.
-
-    Raises:
-        RobotError: if the legs do not determine the pose.
-    """
+    """The smallest solution: a leg may have a joint to spare. A RobotError if there is none."""
     solution, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=None)
     if rank < len(matrix):
         raise RobotError(f"{robot.name}: the legs do not determine the pose; bend them")

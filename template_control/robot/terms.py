@@ -38,17 +38,11 @@ FloatingSources = tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...],
 
 @compiled
 def joint_reserve(q: Array, speeds: Array, limits: Array, ranges: Array) -> tuple[float, float]:
-    """The fastest joint, and the one that is soonest at a stop.
+    """Largest share of its limit that a joint's speed has, and the soonest arrival at a stop [s].
 
-    Args:
-        q: (nq,) configuration; its last nu entries are the joints' angles [rad].
-        speeds: (nu,) of the joints [rad/s].
-        limits: (nu,) of these speeds [rad/s].
-        ranges: (nu, 2) the joints' stops [rad].
-
-    Returns:
-        The largest share of its limit that a speed has. The shortest time in which a joint would
-        come to its stop at its speed [s]: 0 of one that is there, inf where none moves.
+    The latter is 0 of a joint that is at its stop, inf where none moves. ``q`` ends in the nu
+    angles;
+    ``speeds``, ``limits`` (nu,) [rad/s]; ``ranges`` (nu, 2) [rad].
     """
     fastest, soonest = 0.0, np.inf
     first = q.shape[0] - speeds.shape[0]
@@ -90,11 +84,7 @@ class PlanarTerms(NamedTuple):
 
     @classmethod
     def zeros(cls, nv: int) -> PlanarTerms:
-        """All zero.
-
-        Args:
-            nv: degrees of freedom.
-        """
+        """All zero."""
         shapes = ((2,), (2,), (2,), (2, nv), (nv,), (2, 2), (2, 2, nv), (2, 2), (nv - PLANAR_DOF,))
         return cls(*(np.zeros(shape) for shape in shapes))
 
@@ -106,14 +96,8 @@ def planar_sources(
     radius: float,
     limits: tuple[Array, Array],
 ) -> PlanarSources:
-    """Views of what :func:`gather_planar` reads.
-
-    Args:
-        model: the robot's.
-        data: written by Pinocchio at every update.
-        frames: of the two feet.
-        radius: of the foot spheres [m].
-        limits: of the joints, (nu,) speeds [rad/s] and (nu, 2) stops [rad].
+    """Views of what :func:`gather_planar` reads; ``limits``: (nu,) speeds [rad/s], (nu, 2) stops
+    [rad].
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.nle, data.g)
     jacobians = (data.Jcom, data.Ag, data.J)
@@ -208,11 +192,7 @@ class FloatingTerms(NamedTuple):
 
     @classmethod
     def zeros(cls, nv: int) -> FloatingTerms:
-        """All zero.
-
-        Args:
-            nv: degrees of freedom.
-        """
+        """All zero."""
         three, rows = (3,), (3, nv)
         shapes: tuple[tuple[int, ...], ...] = (three, three, three, rows, three, rows, three)
         shapes = (*shapes, (2, 3), (2, 3, nv), (2, 3), three, rows, (nv - FLOATING_DOF,))
@@ -226,15 +206,7 @@ def floating_sources(
     radius: float,
     limits: tuple[Array, Array],
 ) -> FloatingSources:
-    """Views of what :func:`gather_floating` reads.
-
-    Args:
-        model: the robot's.
-        data: written by Pinocchio at every update.
-        frames: of the two feet.
-        radius: of the foot spheres [m].
-        limits: of the joints, (nu,) speeds [rad/s] and (nu, 2) stops [rad].
-    """
+    """Views of what :func:`gather_floating` reads; ``limits`` as for :func:`planar_sources`."""
     vectors = (data.com[0], data.vcom[0], data.hg.vector, data.nle, data.g)
     matrices = (data.Jcom, data.Ag, data.J, data.oMi[1].rotation)
     feet = tuple(data.oMf[frame].translation for frame in frames)
@@ -254,19 +226,10 @@ def gather_floating(
 ) -> tuple[bool, float, float]:
     """Write the terms at the state that Pinocchio has last computed.
 
-    Args:
-        views: from :func:`floating_sources`.
-        q: (nq,) the configuration.
-        v: (nv,) the velocity.
-        drift: of each foot's frame the (6,) classical acceleration dJ/dt v, linear then angular,
-            in the world's axes [m/s^2, rad/s^2].
-        frame: (4,) of the heading frame: x and y of its origin in the world [m], cosine and sine of
-            the heading.
-        out: the arrays of :class:`FloatingTerms`, overwritten.
-
-    Returns:
-        Whether the state is finite; what
-        :func:`joint_reserve` returns.
+    As :func:`gather_planar`; ``frame`` (4,) is the heading frame's: x and y of its origin in the
+    world
+    [m], cosine and sine of the heading. Returns whether the state is finite, and
+    :func:`joint_reserve`'s two numbers.
     """
     vectors, matrices, feet, (carries, constants, limit, stops) = views
     centre, speed, momentum, effects, weight = vectors

@@ -49,13 +49,8 @@ def read_urdf(path: Path) -> ET.Element:
     """The root element of a URDF; entities of its DTD are replaced, whatever its encoding.
 
     Axes are made as long as 1, which PyBullet takes them for. Of a fixed joint, axis, limits and
-    the like mean nothing and are removed.
-
-    Args:
-        path: the file.
-
-    Raises:
-        RobotError: naming what is missing, named twice or no number.
+    the like mean nothing and are removed. A RobotError names what is missing, named twice or no
+    number.
     """
     if not path.is_file():
         raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
@@ -78,15 +73,7 @@ def read_urdf(path: Path) -> ET.Element:
 
 
 def build_model(path: Path, urdf: str) -> pin.Model:
-    """Pinocchio's model of a URDF's text.
-
-    Args:
-        path: of the file, for the message.
-        urdf: the text.
-
-    Raises:
-        RobotError: if Pinocchio does not read it.
-    """
+    """Pinocchio's model of a URDF's text; a RobotError if it does not read it."""
     try:
         return pin.buildModelFromXML(urdf)
     except (ValueError, RuntimeError) as error:
@@ -94,37 +81,20 @@ def build_model(path: Path, urdf: str) -> pin.Model:
 
 
 def end_of(joint: ET.Element, end: str) -> str:
-    """Name of the link at an end of a joint; "" where none is named.
-
-    Args:
-        joint: the element.
-        end: ``parent`` or ``child``.
-    """
+    """Name of the link at an end of a joint, ``parent`` or ``child``; "" where none is named."""
     element = joint.find(end)
     return "" if element is None else str(element.get("link"))
 
 
 def strip_motion(joint: ET.Element) -> None:
-    """Remove what says how a joint moves.
-
-    Args:
-        joint: that is fixed; changed.
-    """
+    """Remove from a fixed joint what says how it moves."""
     for name in ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration"):
         for element in joint.findall(name):
             joint.remove(element)
 
 
 def check_motion(path: Path, robot: ET.Element) -> None:
-    """Check that the joints that are left to move have a range, and move by themselves.
-
-    Args:
-        path: of the file, for the message.
-        robot: its root element.
-
-    Raises:
-        RobotError: naming the joint that follows another one, or whose range is none.
-    """
+    """Check that the joints that are left to move have a range, and move by themselves."""
     for joint in robot.findall("joint"):
         where = f"{path}: joint {joint.get('name')!r}"
         mimic = joint.find("mimic")
@@ -149,11 +119,7 @@ def check_motion(path: Path, robot: ET.Element) -> None:
 
 
 def link_masses(urdf: str) -> dict[str, float]:
-    """Mass of each link by its name [kg], 0 without ``<inertial>``.
-
-    Args:
-        urdf: text of a URDF.
-    """
+    """Mass of each link by its name [kg], 0 without ``<inertial>``."""
     links = ET.fromstring(urdf).findall("link")
     masses = {str(link.get("name")): link.find("inertial/mass") for link in links}
     return {
@@ -163,17 +129,7 @@ def link_masses(urdf: str) -> dict[str, float]:
 
 
 def check_bodies(path: Path, robot: ET.Element, model: pin.Model, first: int) -> None:
-    """Check that whatever a joint moves weighs something.
-
-    Args:
-        path: of the file, for the message.
-        robot: its root element.
-        model: of the robot.
-        first: index of the first joint whose body is looked at.
-
-    Raises:
-        RobotError: naming the link that weighs nothing.
-    """
+    """Check that whatever a joint moves weighs something, from Pinocchio's joint ``first`` on."""
     children = {joint.get("name"): joint.find("child") for joint in robot.findall("joint")}
     for index in range(first, model.njoints):
         child = children.get(model.names[index])
@@ -185,15 +141,7 @@ def check_bodies(path: Path, robot: ET.Element, model: pin.Model, first: int) ->
 
 
 def check_shapes(path: Path, robot: ET.Element) -> None:
-    """Check that shapes which touch the ground have a size.
-
-    Args:
-        path: of the file, for the message.
-        robot: its root element.
-
-    Raises:
-        RobotError: naming the link whose collision shape has none.
-    """
+    """Check that shapes which touch the ground have a size."""
     for link in robot.findall("link"):
         for geometry in link.findall("collision/geometry"):
             for kind, name, count in _SIZES:
@@ -207,15 +155,7 @@ def check_shapes(path: Path, robot: ET.Element) -> None:
 
 
 def check_inertias(path: Path, robot: ET.Element) -> None:
-    """Check that inertias are those of bodies.
-
-    Args:
-        path: of the file, for the message.
-        robot: its root element.
-
-    Raises:
-        RobotError: naming the link whose is not.
-    """
+    """Check that inertias are those of bodies."""
     for link in robot.findall("link"):
         reason = why_impossible(link)
         if reason:
@@ -241,17 +181,9 @@ def why_impossible(link: ET.Element) -> str:
 
 
 def read_losses(path: Path, robot: ET.Element, lossless: bool) -> None:
-    """Check the joints' ``<dynamics>``, or remove it.
+    """Check the joints' ``<dynamics>``; remove it if it states no loss, or all are ``lossless``.
 
     Rotor inertias are ignored, and the log says so once.
-
-    Args:
-        path: of the URDF, for messages.
-        robot: its root element; changed: a ``<dynamics>`` that tells no loss is removed.
-        lossless: whether all of them are.
-
-    Raises:
-        RobotError: naming the joint whose damping or friction is no number, or below zero.
     """
     _tell_rotors(path, robot)
     for joint in robot.findall("joint"):
@@ -318,11 +250,7 @@ def _check_names(path: Path, robot: ET.Element) -> None:
 
 
 def _numbers(where: str, element: ET.Element, name: str, count: int, default: str = "") -> Array:
-    """(count,) of an attribute.
-
-    Raises:
-        RobotError: if it has not as many finite numbers.
-    """
+    """(count,) finite numbers of an attribute; a RobotError if it has not as many."""
     text = element.get(name, default)
     try:
         values = np.array([float(word) for word in text.split()])
@@ -390,15 +318,9 @@ def _check_joint(path: Path, joint: ET.Element) -> None:
 
 
 def with_masses(path: Path, urdf: str, masses: Mapping[str, float]) -> str:
-    """The text of a URDF with other masses, and with inertias in proportion.
+    """The text of a URDF with other masses by link [kg], and with inertias in proportion.
 
-    Args:
-        path: of the file, for the message.
-        urdf: the text.
-        masses: by link [kg].
-
-    Raises:
-        RobotError: if there is no such link, or it weighs nothing.
+    A RobotError names the link that is not there, or weighs nothing.
     """
     before = {name: mass for name, mass in link_masses(urdf).items() if mass > 0.0}
     robot = ET.fromstring(urdf)

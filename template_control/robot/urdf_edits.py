@@ -35,13 +35,8 @@ _PACKAGE = ("package://", "model://")  # what the name of a package's mesh begin
 def complete(path: Path, robot: ET.Element) -> str:
     """The text of a URDF as all engines read it, once its joints and feet are as they shall be.
 
-    Args:
-        path: of the file, for messages.
-        robot: its root element; changed.
-
-    Raises:
-        RobotError: naming the joint without a range, the link whose inertia is no body's or whose
-            collision shape has no size, or the mesh that is missing.
+    A RobotError names the joint without a range, the link whose inertia is no body's or whose
+    collision shape has no size, or the mesh that is missing.
     """
     check_motion(path, robot)
     check_inertias(path, robot)
@@ -56,16 +51,7 @@ def complete(path: Path, robot: ET.Element) -> str:
 
 
 def check_joint_names(path: Path, robot: ET.Element, names: Iterable[str]) -> None:
-    """Check that joints are there.
-
-    Args:
-        path: of the URDF, for the message.
-        robot: its root element.
-        names: of the joints.
-
-    Raises:
-        RobotError: naming the one that is not.
-    """
+    """Check that joints are there."""
     joints = {str(joint.get("name")) for joint in robot.findall("joint")}
     for name in names:
         if name not in joints:
@@ -73,12 +59,7 @@ def check_joint_names(path: Path, robot: ET.Element, names: Iterable[str]) -> No
 
 
 def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
-    """Names of the joints that neither are locked nor mimic a locked one.
-
-    Args:
-        robot: the root element of a URDF.
-        locked: names of those that are locked.
-    """
+    """Names of the joints that neither are locked nor mimic a locked one."""
     leaders = {
         str(joint.get("name")): str(mimic.get("joint"))
         for joint in robot.findall("joint")
@@ -93,18 +74,11 @@ def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
 def lock(
     path: Path, robot: ET.Element, moving: Collection[str], locked: Mapping[str, float]
 ) -> None:
-    """Hold joints where they are.
+    """Hold all joints but the ``moving`` ones, where ``locked`` says [rad, m] or at 0.
 
-    A joint that mimics a locked one and is not named itself is held at its multiple.
-
-    Args:
-        path: of the URDF, for the message.
-        robot: its root element; changed.
-        moving: names of the joints that stay as they are.
-        locked: position of each joint [rad, m]; 0 of those not named.
-
-    Raises:
-        RobotError: if a joint that is not named mimics one that moves.
+    A joint that mimics a locked one and is not named itself is held at its multiple; a RobotError
+    if
+    one that is not named mimics one that moves.
     """
     joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
     places: dict[str, float] = dict(locked)
@@ -145,13 +119,7 @@ def _fix(joint: ET.Element, position: float) -> None:
 
 
 def set_limits(robot: ET.Element, torque: float, velocity: float) -> None:
-    """Give all moving joints other limits.
-
-    Args:
-        robot: the root element of a URDF; changed.
-        torque: the largest [N m].
-        velocity: the largest [rad/s].
-    """
+    """Give all moving joints other limits of torque [N m] and velocity [rad/s]."""
     for joint in robot.findall("joint"):
         if joint.get("type") != "fixed":
             limit = joint.find("limit")
@@ -164,17 +132,7 @@ def set_limits(robot: ET.Element, torque: float, velocity: float) -> None:
 def set_ranges(
     path: Path, robot: ET.Element, feet: Sequence[str], ranges: Sequence[tuple[float, float]]
 ) -> None:
-    """Give the joints of both legs other ranges.
-
-    Args:
-        path: of the URDF, for the message.
-        robot: its root element, whose moving joints have limits; changed.
-        feet: names of the two foot links.
-        ranges: of a leg's joints, from the trunk to the knee [rad].
-
-    Raises:
-        RobotError: if a leg has another number of joints.
-    """
+    """Give the joints of both legs other ranges [rad], from the trunk to the knee."""
     carriers = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
     for foot in feet:
         leg, link = [], foot
@@ -204,17 +162,11 @@ def spheres(
     radius: float | None,
     offset: Sequence[float] | None = None,
 ) -> None:
-    """Leave collision shapes to the feet alone, and give them spheres.
+    """Leave collision shapes to the feet alone, and give them spheres of this radius [m].
 
-    Args:
-        path: of the URDF, for the message.
-        robot: its root element; changed.
-        feet: names of the foot links.
-        radius: of the spheres [m]; None to keep the feet's own shapes.
-        offset: (3,) of their centres from the links' origins, in the links' axes [m].
-
-    Raises:
-        RobotError: if the radius is not positive, or an offset comes without it.
+    None keeps the feet's own shapes; ``offset`` (3,) [m] is from the links' origins, in their axes.
+    A
+    RobotError if the radius is not positive, or an offset comes without it.
     """
     if radius is not None and not 0.0 < radius < np.inf:
         raise RobotError(f"foot_radius is {radius!r} m: give a positive number")
@@ -239,17 +191,12 @@ def spheres(
 def find_meshes(path: Path, robot: ET.Element) -> None:
     """Write absolute paths of meshes into a URDF, so that its text can be read from anywhere.
 
-    A visual whose mesh is missing is left out, and the log says so once: it is not needed to
-    walk.
-
-    Args:
-        path: of the URDF. A relative name counts from its folder; that of a package counts from
-            each folder above it, with and without the package's name, and from those of the
-            environment variable ``ROS_PACKAGE_PATH``.
-        robot: its root element; changed.
-
-    Raises:
-        RobotError: if the mesh of a collision shape is missing.
+    A relative name counts from the URDF's folder; that of a package counts from each folder above
+    it,
+    with and without the package's name, and from those of the environment variable
+    ``ROS_PACKAGE_PATH``. A visual whose mesh is missing is left out, and the log says so once: it
+    is
+    not needed to walk. Of a collision shape it is a RobotError.
     """
     missing = []
     for link in robot.findall("link"):
@@ -313,11 +260,8 @@ def take_points(path: Path, robot: ET.Element) -> None:
     """Take links on the trunk whose inertia is no body's for points with their mass; and log it.
 
     Heads and arms often have such an inertia, and little of the trunk's. That of a root link, of a
-    leg, or of what is fixed to a leg counts, and is left for :func:`check_inertias`.
-
-    Args:
-        path: of the file, for the log.
-        robot: its root element, in which all joints but the legs' are fixed; changed.
+    leg, or of what is fixed to a leg counts, and is left for :func:`check_inertias`. All joints but
+    the legs' are fixed.
     """
     links = {link.get("name"): link for link in robot.findall("link")}
     waiting, points = [root_link(robot)], []
@@ -347,11 +291,7 @@ def _log_points(path: Path, links: tuple[str, ...]) -> None:
 
 
 def write_out_massless(robot: ET.Element) -> None:
-    """Give links without ``<inertial>`` one of zero: PyBullet takes them for a kilogram.
-
-    Args:
-        robot: the root element; changed.
-    """
+    """Give links without ``<inertial>`` one of zero: PyBullet takes them for a kilogram."""
     for link in robot.findall("link"):
         if link.find("inertial") is None:
             inertial = ET.SubElement(link, "inertial")
@@ -363,9 +303,6 @@ def drop_world(robot: ET.Element) -> None:
     """Remove a massless root link that carries nothing but a floating joint, and that joint.
 
     Some URDFs write down that the robot floats in a world; here the root link floats anyway.
-
-    Args:
-        robot: the root element of a URDF; changed.
     """
     links = {link.get("name"): link for link in robot.findall("link")}
     joints = robot.findall("joint")
@@ -452,11 +389,7 @@ def _set_inertia(link: ET.Element, inertia: pin.Inertia | None) -> None:
 
 
 def root_link(robot: ET.Element) -> str:
-    """The link that is no joint's child.
-
-    Args:
-        robot: the root element of a URDF.
-    """
+    """The link that is no joint's child."""
     children = {child.get("link") for child in robot.findall("joint/child")}
     names = [str(link.get("name")) for link in robot.findall("link")]
     return next((name for name in names if name not in children), "")
@@ -469,12 +402,7 @@ def origin_of(element: ET.Element) -> ET.Element:
 
 
 def vector(text: str | None, default: str = "0 0 0") -> Array:
-    """Numbers of an attribute.
-
-    Args:
-        text: of the attribute, None where it is absent.
-        default: taken then.
-    """
+    """Numbers of an attribute; ``default`` where it is absent."""
     return np.array([float(x) for x in (text or default).split()])
 
 
