@@ -81,7 +81,8 @@ class FloatingBasePose(Checked):
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     """(nv,) q [m, rad] and (nv,) v [m/s, rad/s] of a robot in a pose.
 
-    The robot's last update is overwritten. A RobotError says which legs do not reach, or which joints would be beyond their limits.
+    The robot's last update is overwritten. A RobotError says which legs do not reach, or which
+    joints would be beyond their limits.
     """
     # From far away Newton's full step may bend a knee the wrong way; short ones do not.
     q = _bent_to(
