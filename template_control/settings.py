@@ -159,7 +159,7 @@ def _value(hint: Any, value: Any, where: str) -> Any:
 def _deeper(hint: Any, current: Any, entries: _Entries, where: str) -> Any:
     """A field's value with keys of its own set."""
     if isinstance(current, Mapping) or current is None:
-        table: dict[str, Any] = dict(current or {})
+        table: dict[str, Any] = _toml_value(current or {}, where)
         for path, value in entries:
             inner = table
             for name in path[:-1]:
@@ -232,7 +232,8 @@ def _read_one_of(hints: list[Any], value: Any, where: str) -> Any:
     if isinstance(value, str) and str in hints:
         return value
     if not kinds:
-        return _read(hints[0], value, where)
+        lists = [h for h in hints if get_origin(h) is tuple]
+        return _read(lists[0] if lists and isinstance(value, list) else hints[0], value, where)
     if not isinstance(value, dict):
         raise ParameterError(f"{where} is {value!r}: give a table")
     wanted = value.get(_KIND, next(iter(kinds)))
@@ -383,10 +384,15 @@ def literal(value: Any) -> str:
     """
     said = _toml_value(value, "the value")
     if isinstance(said, Mapping):
-        return "{" + ", ".join(f"{key} = {literal(entry)}" for key, entry in said.items()) + "}"
+        pairs = (f"{_key(key)} = {literal(entry)}" for key, entry in said.items())
+        return "{" + ", ".join(pairs) + "}"
     if isinstance(said, list):
         return "[" + ", ".join(map(literal, said)) + "]"
     return tomli_w.dumps({"x": said}).removeprefix("x = ").strip()
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[\w-]+", name) else literal(name)
 
 
 def text(table: Mapping[str, Any]) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rich import table
 from rich.console import Console
 
 if TYPE_CHECKING:
@@ -12,16 +14,33 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+_UNBOUNDED = 10_000  # columns: no line of a table is cut or wrapped in a file or a pipe
+
 
 def plain_console(stderr: bool = False) -> Console:
-    """A console that takes no text for markup or emoji.
+    """A console that takes no text for markup or emoji, and wraps lines in a terminal only.
 
     The names of robots, scenarios and files are a user's: ``[/b]`` or ``:bus:`` is no order.
 
     Args:
         stderr: print there, not on standard output.
     """
-    return Console(stderr=stderr, markup=False, emoji=False)
+    console = Console(stderr=stderr, markup=False, emoji=False)
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = _UNBOUNDED
+    return console
+
+
+class Table(table.Table):
+    """A table that folds a word rather than leave its end out, however narrow the terminal is."""
+
+    def add_column(self, *arguments: Any, **options: Any) -> None:
+        """As rich's.
+
+        Args:
+            arguments, options: see :meth:`rich.table.Table.add_column`.
+        """
+        super().add_column(*arguments, **{"overflow": "fold", **options})
 
 
 def bar(console: Console, note: str = "", **options: Any) -> Progress:

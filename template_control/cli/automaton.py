@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from template_control.checks import option_types as values
 from template_control.errors import ParameterError, RecordError
@@ -17,6 +16,7 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Outcome, Reset, Slot
 from template_control.storage import Files
+from template_control.terminal import Table
 from template_control.view.automaton_figure import GAIT_NAMES, automaton_figure, gaits, words
 from template_control.view.style import save_figure
 
@@ -142,7 +142,7 @@ def tables(automaton: Automaton) -> list[Table]:
         table = Table(title=GAIT_NAMES.get(gait, f"gait {gait}"), show_lines=True)
         table.title_justify = "left"
         for heading in ("node", "phase", "rear leg", "front leg"):
-            table.add_column(heading, no_wrap=True)
+            table.add_column(heading)
         table.add_column("guard -> successor (reset)")
         table.add_column("fails")
         for name in names:

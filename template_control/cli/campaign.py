@@ -7,8 +7,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
 from template_control import settings
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
@@ -37,7 +35,7 @@ from template_control.run.experiment import Experiment
 from template_control.run.specs import GaitSpec
 from template_control.storage import Files, write_text, writing
 from template_control.sweep.executor import workers
-from template_control.terminal import plain_console
+from template_control.terminal import Table, plain_console
 from template_control.view.trial_figures import campaign_figure
 
 _LISTED = 20  # trials that went wrong, at most, in the printed table

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from template_control import storage
 from template_control.checks import option_types as values
@@ -44,7 +43,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.storage import Files, writing
-from template_control.terminal import plain_console
+from template_control.terminal import Table, plain_console
 from template_control.view.stability_figures import UNITS, branch_figure, speed_family_figure
 from template_control.view.style import save_figure
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from template_control.cli.report import (
     failures_text,
@@ -15,7 +14,7 @@ from template_control.cli.report import (
 from template_control.run.record import Record
 from template_control.run.summary import OTHERS, STRIDES, summarise
 from template_control.slip.scenario.run import ScenarioRecord
-from template_control.terminal import plain_console
+from template_control.terminal import Table, plain_console
 
 NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (

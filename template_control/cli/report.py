@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from rich.console import Console
-from rich.table import Table
 
 from template_control import view
 from template_control.checks import option_types as values
@@ -25,7 +24,7 @@ from template_control.run.experiment import STEPS, Experiment, PreparedExperimen
 from template_control.run.record import Record, RunInterrupted, one_line, recorded
 from template_control.run.simulation import simulate
 from template_control.storage import Files, writing
-from template_control.terminal import bar, plain_console
+from template_control.terminal import Table, bar, plain_console
 
 
 def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:

@@ -7,12 +7,11 @@ import json
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from template_control.embedding.robot_template import default_gait
 from template_control.robot.library import ROBOTS, load_robot
 from template_control.slip.automaton.vocabulary import Slot
-from template_control.terminal import plain_console
+from template_control.terminal import Table, plain_console
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -7,8 +7,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
 from template_control.checks import option_types as values
 from template_control.cli.experiment_options import add_flags, experiment_from
 from template_control.cli.flags import SUBJECT
@@ -28,7 +26,7 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import Files, writing
 from template_control.sweep.executor import workers
-from template_control.terminal import plain_console
+from template_control.terminal import Table, plain_console
 from template_control.view.trial_figures import robustness_figure
 
 _NAMES = tuple(d.name for d in ALL)
@@ -201,7 +199,7 @@ def markdown(found: Robustness) -> str:
 def _print_table(found: Robustness, figure: Path | None) -> None:
     table = Table(title=_title(found))
     for column in _COLUMNS:
-        table.add_column(column, no_wrap=column == _COLUMNS[0])
+        table.add_column(column)
     for finding in found.findings:
         table.add_row(*_row(finding))
     console = plain_console()

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from template_control import view
 from template_control.checks import option_types as values
@@ -20,7 +19,7 @@ from template_control.slip.automaton.vocabulary import MapKind, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import Files
-from template_control.terminal import plain_console
+from template_control.terminal import Table, plain_console
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}
 _NAMES = {

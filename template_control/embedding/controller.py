@@ -89,7 +89,8 @@ class EmbeddingController:
         if route is None:
             raise ParameterError("several planners and no route: say which stride comes next")
         scale = Scale.of(route.parameters)
-        o = scaled(options or EmbeddingOptions(), scale)
+        given = options or EmbeddingOptions()
+        o = scaled(replace(given, phases=given.phase_table(), tasks={}), scale)
         self.robot, self.options, self.parameters = robot, o, route.parameters
         self.learners = Learners(o, self.parameters, robot)
         self.ground = SlopingGround(robot, self.parameters.rest_length)

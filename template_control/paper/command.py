@@ -7,13 +7,11 @@ import json
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from rich.table import Table
-
 from template_control.checks import option_types as values
 from template_control.errors import ParameterError
 from template_control.paper.reproduction import LONG, REPRODUCTIONS, Reproduction
 from template_control.storage import Files, writing
-from template_control.terminal import plain_console
+from template_control.terminal import Table, plain_console
 from template_control.view.style import save_figure
 
 _ON_A_ROBOT = "fig10"

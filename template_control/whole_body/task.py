@@ -7,6 +7,7 @@ feedforward and the PD feedback.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
@@ -92,6 +93,16 @@ class Task(Protocol):
             references: references and measurements of this tick.
             rows: views of the task's own rows, overwritten; entries that it never writes are 0.
         """
+
+
+def task_name(task: Task) -> str:
+    """Name of a task in options: its class's without "Task", as in ``side_foot``.
+
+    Args:
+        task: of a phase.
+    """
+    name = type(task).__name__.removesuffix("Task")
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
 class TaskStack:

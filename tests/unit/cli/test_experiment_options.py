@@ -167,6 +167,7 @@ OTHERWISE = {
     "world.kind": "mujoco", "sensors.kind": "imu", "planner.kind": "ahead", "delay": 0.003,
     "world.terrain.points": [[0.0, 0.0], [1.0, 0.1]], "course.turns": [[1.0, 0.1]],
     "planner.path": "math:Planner", "start": [1.0, 0.97, 0.0], "world.time_step": 5e-4,
+    "controller.tasks": {"com": {"gains": [80.0, 18.0]}},
     "planner.map_kind": "paper", "robot.masses": {"a": 1.0}, "world.robot.masses": {"a": 1.0},
     "controller.lean.strides": {"r": {"speeds": [0.3], "pitches": [0.1]}},
     "world.robot.model": "human", "world.robot.locked": {"a": 0.1}, "world.robot.feet": ["a", "b"],
