@@ -33,8 +33,8 @@ found["robot"] = [robot.mass, robot.leg_length, robot.foot_radius, robot.urdf]
 terrain = tc.Terrain.slope(np.radians(2.0))
 worlds = tc.PlantOptions(terrain=terrain), tc.MujocoOptions(terrain=terrain), tc.IdealOptions()
 for world in worlds:
-    record = tc.simulate(robot, tc.LqrPlanner(tc.default_gait(robot)),
-                         tc.Experiment(steps=2, world=world))
+    planner = tc.LqrPlanner(tc.default_gait(robot))
+    record = tc.simulate(tc.Experiment(robot, planner=planner, steps=2, world=world))
     bits = hashlib.sha256(record.q.tobytes() + record.contact_force.tobytes()).hexdigest()
     found[world.kind] = [record.steps, bits]
 free = load_floating_robot("bolt")
