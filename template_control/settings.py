@@ -44,16 +44,10 @@ def read(
     path: str | Path,
     translated: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
 ) -> T:
-    """A dataclass from a TOML file.
+    """A dataclass from a TOML file; keys that are left out keep their defaults.
 
-    Args:
-        kind: the dataclass.
-        path: of the file. Keys that it leaves out keep their defaults.
-        translated: makes a table of today of one of an earlier version.
-
-    Raises:
-        ParameterError: naming the file and the key, if it cannot be read, has an unknown key or a
-            value of another type, or the dataclass refuses a value.
+    ``translated`` makes today's table from one of an earlier version. A ParameterError names the
+    file and the key.
     """
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
@@ -68,15 +62,9 @@ def read(
 
 
 def from_table(kind: type[T], table: Any, where: str = "") -> T:
-    """A dataclass from a table as :mod:`tomllib` reads it.
+    """A dataclass from a table as :mod:`tomllib` reads it; a ParameterError names the key.
 
-    Args:
-        kind: the dataclass.
-        table: by key.
-        where: the table's own key, for messages; "" for the whole file.
-
-    Raises:
-        ParameterError: naming the key, if it is unknown or its value is of another type.
+    ``where`` is the table's own key for messages, "" for the whole file.
     """
     if not isinstance(table, dict):
         raise ParameterError(f"{where} is {table!r}: give a table")
@@ -101,7 +89,7 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
 
 
 def _made(make: Callable[[], T], kind: type, where: str) -> T:
-    """What ``make`` makes of a dataclass; its errors name the key, and not the class."""
+    """Dataclass from ``make``, whose errors name the key and not the class."""
     try:
         return make()
     except TemplateControlError as error:
@@ -110,16 +98,10 @@ def _made(make: Callable[[], T], kind: type, where: str) -> T:
 
 
 def changed(options: T, keys: Mapping[str, Any]) -> T:
-    """A dataclass with some of its keys set.
+    """A dataclass with some of its keys set; a ParameterError names one that is unknown or wrong.
 
-    Args:
-        options: the dataclass instance.
-        keys: values by dotted key, such as ``{"world.friction": 0.5}``; as TOML says them, or as
-            the fields hold them. Another ``kind`` keeps what was set and
-            both kinds have.
-
-    Raises:
-        ParameterError: naming the key, if it is unknown or its value does not fit.
+    ``keys`` are dotted, such as ``{"world.friction": 0.5}``, with values as in TOML or as the
+    fields hold them. Another ``kind`` keeps what was set and both kinds have.
     """
     return _changed(options, [(tuple(key.split(".")), value) for key, value in keys.items()], "")
 
@@ -256,10 +238,8 @@ def _read_tuple(hints: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ..
 class Leaf(NamedTuple):
     """A key of a file that holds no table.
 
-    Attributes:
-        path: dotted.
-        hint: what its value may be.
-        default: in the first kind of table that has the key; None where there is none.
+    ``path`` is dotted, ``hint`` its value's type; ``default`` is that of the first kind of table
+    that has the key, None where there is none.
     """
 
     path: str
@@ -268,12 +248,7 @@ class Leaf(NamedTuple):
 
 
 def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
-    """The keys that a dataclass's file can have, of all kinds of its tables.
-
-    Args:
-        kind: the dataclass.
-        where: its own key; "" for the whole file.
-    """
+    """The keys that a dataclass's file can have, of all kinds of tables; ``where`` is its own."""
     found: dict[str, Leaf] = {}
     hints = get_type_hints(kind)
     for f in fields(kind):
@@ -302,7 +277,7 @@ def _is_union(hint: Any) -> bool:
 
 
 def _said(hint: Any) -> bool:
-    """Whether TOML can say values of a type."""
+    """True if TOML can hold values of a type."""
     arguments = get_args(hint)
     if _is_union(hint):
         return any(_said(h) for h in arguments if h is not NoneType)
@@ -320,15 +295,10 @@ def _said(hint: Any) -> bool:
 
 
 def to_table(options: Any, where: str = "") -> dict[str, Any]:
-    """A dataclass as a table, with every value that TOML can say.
+    """A dataclass as a table, with every value that TOML can hold; ``where`` is its own key.
 
-    Args:
-        options: the dataclass instance.
-        where: its own key, for messages; "" for the whole.
-
-    Raises:
-        ParameterError: naming the key, if a value that differs from its default can be given in
-            Python only.
+    A ParameterError names the key of a value that differs from its default and can be given in
+    Python only.
     """
     table: dict[str, Any] = {_KIND: options.kind} if hasattr(options, _KIND) else {}
     hints = get_type_hints(type(options))
@@ -377,11 +347,7 @@ def _toml_value(value: Any, where: str) -> Any:
 
 
 def literal(value: Any) -> str:
-    """A field's value as TOML text on one line.
-
-    Raises:
-        ParameterError: if TOML cannot say it.
-    """
+    """A field's value as TOML text on one line; a ParameterError if TOML cannot hold it."""
     said = _toml_value(value, "the value")
     if isinstance(said, Mapping):
         pairs = (f"{_key(key)} = {literal(entry)}" for key, entry in said.items())
@@ -396,9 +362,5 @@ def _key(name: str) -> str:
 
 
 def text(table: Mapping[str, Any]) -> str:
-    """A table as TOML text that :mod:`tomllib` reads back bit by bit.
-
-    Args:
-        table: as :func:`to_table` returns it.
-    """
+    """A table of :func:`to_table` as TOML text that :mod:`tomllib` reads back bit by bit."""
     return _NUMBERS.sub(lambda row: f"[{' '.join(row[1].split())[:-1]}]", tomli_w.dumps(table))

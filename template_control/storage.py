@@ -1,4 +1,4 @@
-"""Files: how they are written whole or not at all, and how records are kept in them.
+"""Files that are written whole or not at all, and records kept in them.
 
 A record is a ``.npz`` with one array a field and the metadata as JSON.
 """
@@ -27,14 +27,8 @@ T = TypeVar("T")
 def to_jsonable(value: Any, describe: Callable[[Any], Any] | None = None) -> Any:
     """A value as JSON keeps it, so that what is read back equals it.
 
-    Numbers of NumPy become Python's, arrays and tuples lists, keys of mappings texts.
-
-    Args:
-        value: numbers, texts, arrays, or lists and mappings of them.
-        describe: makes one of these of any other value; None: no other is taken.
-
-    Raises:
-        TypeError: for another value, where ``describe`` is None.
+    Numbers of NumPy become Python's, arrays and tuples lists, keys of mappings texts. ``describe``
+    makes one of these of any other value; without it that is a TypeError.
     """
     if value is None or isinstance(value, bool):
         return value
@@ -60,17 +54,11 @@ def to_jsonable(value: Any, describe: Callable[[Any], Any] | None = None) -> Any
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
-    """Where to write a file, so that what was there is replaced by a whole one or stays.
+    """Path at which to write a file, so that the old one is replaced by a whole one or stays.
 
-    Args:
-        path: the file's. A link keeps pointing where it does; a device is written as it is.
-
-    Yields:
-        A path beside it with the same ending, that of an empty file. It takes the file's name
-        when the ``with`` block is done, and is removed if an error ends the block.
-
-    Raises:
-        RecordError: for an OSError, also of the ``with`` block.
+    It is that of an empty file in the same folder, with the same ending. The file takes its name at
+    the end of the ``with`` block, and is removed if an error ends the block; an OSError becomes a
+    RecordError. A link keeps its target; a device is written directly.
     """
     target = Path(os.path.realpath(path))
     beside = target.with_name(f".part-{uuid.uuid4().hex[:12]}{target.suffix}")
@@ -117,27 +105,16 @@ class Files:
         return None
 
     def raise_pending(self) -> None:
-        """Raise what went wrong, once the table is printed.
-
-        Raises:
-            TemplateControlError: if a file could not be written.
-            KeyboardInterrupt: if Ctrl-C came while files were written.
-        """
+        """Raise what went wrong (an error or a Ctrl-C), once the table is printed."""
         if self._trouble is not None:
             raise self._trouble
 
 
 def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
-    """Write a dataclass of arrays with a ``metadata`` dictionary.
+    """Write a dataclass of arrays with a ``metadata`` dictionary as a ``.npz``.
 
-    Args:
-        record: the dataclass instance.
-        path: of the ``.npz``, taken as it is.
-        kind: what :func:`load` must ask for.
-        quick: do not compress, for somebody who waits.
-
-    Raises:
-        RecordError: if the file cannot be written.
+    ``kind`` is what :func:`load` must ask for; ``quick`` does not compress. A RecordError if it
+    fails.
     """
     arrays = {f.name: getattr(record, f.name) for f in fields(record) if f.name != "metadata"}
     text = json.dumps({"format": kind, **record.metadata})
@@ -148,7 +125,7 @@ def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
 
 
 class Layout(NamedTuple):
-    """What the fields of a record look like in its file.
+    """Layout of a record's fields in its file.
 
     Attributes:
         fields: by name the sizes of each field's axes, such as "T nv 2". A letter is the same
@@ -167,16 +144,9 @@ def load(
     kind: str,
     layout: Layout,
 ) -> T:
-    """Read what :func:`save` wrote with the same ``kind``.
+    """Record that :func:`save` wrote with the same ``kind``.
 
-    Args:
-        record_type: the dataclass.
-        path: of the ``.npz``.
-        kind: format.
-        layout: of that format.
-
-    Raises:
-        RecordError: if the file is missing or is no such record, naming the field that is wrong.
+    A RecordError if the file is missing or is no such record, naming the field that is wrong.
     """
     try:
         values = _values(path, kind)
@@ -191,7 +161,7 @@ def load(
 
 
 class _NoRecordError(Exception):
-    """Why a file is none."""
+    """Reason why a file is no record."""
 
 
 def _values(path: str | Path, kind: str) -> dict[str, Any]:
@@ -261,15 +231,7 @@ def _wanted(axes: Sequence[str], shape: tuple[int, ...], sizes: dict[str, int]) 
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a text file.
-
-    Args:
-        path: of the file.
-        text: all of it.
-
-    Raises:
-        RecordError: if the file cannot be written.
-    """
+    """Write a text file in UTF-8; a RecordError if it fails."""
     with atomic_path(path) as place:
         place.write_text(text, encoding="utf-8")
     return Path(path)
@@ -279,14 +241,7 @@ def write_text(path: str | Path, text: str) -> Path:
 def writing(folder: Path) -> Iterator[Path]:
     """Keep a folder for one command's files: made if need be, and locked meanwhile.
 
-    Args:
-        folder: where the files go.
-
-    Yields:
-        The folder.
-
-    Raises:
-        RecordError: if nothing can be written there, or another command writes there now.
+    A RecordError if nothing can be written there, or another command writes there now.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -315,11 +270,7 @@ def writing(folder: Path) -> Iterator[Path]:
 def take_lock(descriptor: int) -> bool:
     """Take the lock of an open file, which the system frees when its holder ends.
 
-    Args:
-        descriptor: of the file.
-
-    Returns:
-        False while another process holds it; True also where the file system knows no locks.
+    False while another process holds it; True also where the file system knows no locks.
     """
     try:
         return lock_descriptor(descriptor, blocking=False)
@@ -328,10 +279,6 @@ def take_lock(descriptor: int) -> bool:
 
 
 def free_lock(descriptor: int) -> None:
-    """Free a lock; a process forked meanwhile has the file too, so that closing would not do.
-
-    Args:
-        descriptor: of the file, which may be unlocked.
-    """
+    """Free a lock, if there is one; closing would not do, as processes forked meanwhile have it."""
     with suppress(OSError):
         unlock_descriptor(descriptor)

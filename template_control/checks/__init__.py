@@ -1,1 +1,1 @@
-"""How what a user gives is checked: by the types and ranges that fields and parameters declare."""
+"""Checks of what a user gives, by the types and ranges that fields and parameters declare."""

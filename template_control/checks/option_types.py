@@ -20,13 +20,9 @@ MANY = Range(1, 1_000_000)
 
 
 def number(within: Range) -> Callable[[str], float]:
-    """Reader of a number.
+    """The ``type`` of an option that is a number in a range, in the unit that the user types.
 
-    Args:
-        within: range of the number, in the unit that the user types.
-
-    Returns:
-        The ``type`` of an option; it refuses other texts in words that follow the option's name.
+    It refuses other texts in words that follow the option's name.
     """
     return partial(_read, hint=Annotated[float, within])
 

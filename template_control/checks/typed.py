@@ -10,15 +10,9 @@ from template_control.errors import ParameterError
 
 
 def parsed(text: str, hint: Any) -> Any:
-    """Number that a text holds.
+    """Number that a text holds; Refused says "is ...: give ...", to follow the number's name.
 
-    Args:
-        text: as typed.
-        hint: float or int, maybe ``Annotated`` with a :class:`~.ranges.Range` in the unit that is
-            typed.
-
-    Raises:
-        Refused: saying "is ...: give ...", to follow the number's name.
+    ``hint`` is float or int, maybe ``Annotated`` with a :class:`~.ranges.Range` in the unit typed.
     """
     kind = get_args(hint)[0] if get_origin(hint) is Annotated else hint
     try:
@@ -32,16 +26,7 @@ def parsed(text: str, hint: Any) -> Any:
 
 
 def number(where: str, text: str, hint: Any) -> Any:
-    """Number that a text holds; see :func:`parsed`.
-
-    Args:
-        where: names the number in a message, as the user knows it.
-        text: as typed.
-        hint: see :func:`parsed`.
-
-    Raises:
-        ParameterError: if it is no number, or out of its range.
-    """
+    """Number that a text holds, as :func:`parsed`; a ParameterError names it by ``where``."""
     try:
         return parsed(text, hint)
     except Refused as refused:
@@ -51,13 +36,8 @@ def number(where: str, text: str, hint: Any) -> Any:
 def entries(where: str, texts: Iterable[str], form: str) -> dict[str, str]:
     """Values by key of entries ``key=value``.
 
-    Args:
-        where: names the line in a message.
-        texts: of the entries.
-        form: of an entry, for a message.
-
-    Raises:
-        ParameterError: if an entry has no equals sign, or a key comes twice.
+    A ParameterError names the line by ``where`` if an entry has no equals sign (``form`` says what
+    one looks like), or a key comes twice.
     """
     found: dict[str, str] = {}
     for text in texts:
