@@ -43,9 +43,6 @@ class JointFilter:
     a = 1 - r^2 and b = 2 (2 - a) - 4 sqrt(1 - a) (Kalata 1984):
 
         q^ <- q_p + a (q - q_p),    v^ <- v_p + b (q - q_p) / dt.
-
-    Args:
-        options: the noise.
     """
 
     def __init__(self, options: JointFilterOptions) -> None:
@@ -54,21 +51,14 @@ class JointFilter:
         self.speed: Array = np.zeros(0)
 
     def reset(self, angle: Array, speed: Array) -> None:
-        """Reset to a known state.
-
-        Args:
-            angle: (nu,) [rad].
-            speed: (nu,) [rad/s].
-        """
+        """Reset to known angles (nu,) [rad] and speeds (nu,) [rad/s]."""
         self.angle, self.speed = angle.copy(), speed.copy()
 
     def update(self, measured: Array, acceleration: Array, dt: float) -> None:
-        """Advance the estimate by one tick.
+        """Advance the estimate by one tick of dt [s].
 
-        Args:
-            measured: (nu,) the encoders' angles [rad].
-            acceleration: (nu,) expected since the tick before [rad/s^2].
-            dt: since then [s].
+        ``measured`` (nu,) are the encoders' angles [rad], ``acceleration`` (nu,) is expected since
+        the tick before [rad/s^2].
         """
         alpha, beta = self._gains(dt)
         angle = self.angle + (self.speed + 0.5 * acceleration * dt) * dt
@@ -113,11 +103,7 @@ class BaseFilter:
     by forward kinematics; a round foot rolls, so that p_i is its contact point less the
     radius times its angle, which keeps its value while it rolls. Along the world's x and y
     nothing is measured: the estimate drifts there as a real robot's does. (Bloesch et al. 2012,
-    in the plane.)
-
-    Args:
-        robot: model; its last update is overwritten.
-        options: the noise.
+    in the plane.) The robot's last update is overwritten.
     """
 
     def __init__(self, robot: PlanarBiped, options: BaseFilterOptions) -> None:
@@ -129,24 +115,17 @@ class BaseFilter:
         self._stands = np.zeros(2, dtype=bool)
 
     def reset(self, q: Array, v: Array) -> None:
-        """Reset to a known state, with no foot in stance.
-
-        Args:
-            q: (nv,) configuration [m, rad].
-            v: (nv,) velocity [m/s, rad/s].
-        """
+        """Reset to a known state q, v (nv,) [m, rad, m/s, rad/s], with no foot in stance."""
         self.state[:] = 0.0
         self.state[:3], self.state[_V], self.pitch_rate = q[:3], v[:2], float(v[2])
         self._covariance[:] = 0.0
         self._stands[:] = False
 
     def predict(self, pitch_rate: float, specific_force: Array, dt: float) -> None:
-        """Advance the estimate by one tick.
+        """Advance the estimate by one tick of dt [s].
 
-        Args:
-            pitch_rate: read now [rad/s].
-            specific_force: (2,) mean since the tick before [m/s^2].
-            dt: since then [s].
+        ``pitch_rate`` is read now [rad/s]; ``specific_force`` (2,) is the mean since the tick
+        before [m/s^2].
         """
         o, s, g = self.options, self.state, self.robot.gravity
         middle = s[_PITCH] + 0.5 * (self.pitch_rate + pitch_rate) * dt * 0.5
@@ -169,12 +148,7 @@ class BaseFilter:
         self._covariance = flow @ self._covariance @ flow.T + np.diag(noise)
 
     def correct(self, joints: Array, contact: NDArray[np.bool_]) -> None:
-        """Correct the estimate with the leg kinematics of the feet in contact.
-
-        Args:
-            joints: (nu,) angles [rad].
-            contact: (2,) whether each foot touches the ground.
-        """
+        """Correct the estimate with the joints' angles (nu,) [rad] of the feet in contact (2,)."""
         q = np.concatenate((self.state[:3], joints))
         robot = self.robot
         robot.update(q, np.zeros_like(q))
@@ -294,8 +268,7 @@ class NoiseFilter:
 class _Pair:
     """Covariance of a position and its speed, both measured at every tick.
 
-    Args:
-        deviation: (2,) standard deviations of the measurements.
+    ``deviation`` (2,) are the standard deviations of the measurements.
     """
 
     def __init__(self, deviation: Array) -> None:
@@ -303,11 +276,9 @@ class _Pair:
         self._covariance = self._noise.copy()
 
     def gain(self, lacking: float, dt: float) -> Array:
-        """(2, 2) gain of a tick's measurement.
+        """(2, 2) gain of a tick's measurement, dt [s] after the last one.
 
-        Args:
-            lacking: standard deviation of the accelerations since the last one.
-            dt: since then [s].
+        ``lacking`` is the standard deviation of the accelerations since then.
         """
         flow, entry = np.array([[1.0, dt], [0.0, 1.0]]), np.array([0.5 * dt**2, dt])
         ahead = flow @ self._covariance @ flow.T + lacking**2 * np.outer(entry, entry)

@@ -128,11 +128,8 @@ class ImuOptions(Checked):
 class ImuSensors:
     """Simulated sensors of a robot and its state estimate, which starts at the true state.
 
-    Args:
-        options: the noise.
-        robot: whose state; its last update is overwritten.
-        scale: of the robot's template.
-        time_step: from tick to tick [s].
+    The robot's last update is overwritten; ``scale`` is its template's, ``time_step`` the ticks'
+    [s].
     """
 
     exact = False

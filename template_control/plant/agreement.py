@@ -21,18 +21,11 @@ _CLOSE = 1e-6  # relative; engines agree to 1e-14
 
 
 def check_mass_matrix(robot: Biped, engine: str, mass_matrix: Callable[[Array], Array]) -> None:
-    """Compare an engine's mass matrix with Pinocchio's.
+    """Compare an engine's mass matrix with Pinocchio's; a RobotError names where they differ.
 
     It depends on all that moves the robot: masses, centres of mass, inertias, joint axes and
-    placements, of the base too.
-
-    Args:
-        robot: the model.
-        engine: its name, for the message.
-        mass_matrix: the engine's (nv, nv), in the model's coordinates, at a configuration (nq,).
-
-    Raises:
-        RobotError: naming the joint or the base where they differ.
+    placements, of the base too. ``mass_matrix`` is the engine's (nv, nv), in the model's
+    coordinates, at a configuration (nq,).
     """
     q = _bent(robot)
     ours, theirs = _mass_matrix(robot, q), mass_matrix(q)
@@ -50,16 +43,10 @@ def check_mass_matrix(robot: Biped, engine: str, mass_matrix: Callable[[Array], 
 
 
 def check_damping(robot: Biped, time_step: float) -> None:
-    """Check that damping held for a time step takes away no more speed than there is.
+    """Check that damping held for a time step [s] takes away no more speed than there is.
 
-    PyBullet and the integrator of the ideal plant overshoot then, and diverge.
-
-    Args:
-        robot: the model.
-        time_step: of the engine [s].
-
-    Raises:
-        RobotError: naming the joint of the largest damping, and the time step that would do.
+    PyBullet and the integrator of the ideal plant overshoot then, and diverge. A RobotError names
+    the joint of the largest damping, and the time step that would do.
     """
     damping = robot.joint_damping
     # Of the joints alone: nothing holds the base, so their inertia is at its least.

@@ -38,22 +38,21 @@ AXES = {2: [0, 2], 3: [0, 1, 2]}
 
 @dataclass(frozen=True)
 class PlantOptions(Checked):
-    """What the world is like.
+    """Options of the world in PyBullet.
 
     Attributes:
         friction: Coulomb coefficient between foot and ground.
         time_step: physics step [s].
         mass_scale: factor of every link's mass and inertia; the controller does not know it.
-        ground_step: a step of the ground, which the controller does not know; None for flat
-            ground.
-        terrain: any other ground, which the controller does not know; None for flat ground, or
-            that with the ``ground_step``.
+        ground_step: a step of the ground, which the controller does not know; None for flat ground.
+        terrain: any other ground, which the controller does not know; None for flat ground, or that
+            with the ``ground_step``.
         gravity: [m/s^2]; None: what the controller knows.
         robot: that is simulated, with the joints and feet of the controller's, which does not know
             it; None: the same.
 
     Raises:
-        ParameterError: if a number is not positive and finite, or the ground is told twice.
+        ParameterError: if a number is not positive and finite, or the ground is given twice.
     """
 
     kind: ClassVar[str] = "pybullet"
@@ -87,11 +86,7 @@ class PlantOptions(Checked):
 
 @cache
 def pybullet() -> Any:
-    """The module, imported where a world of it is made.
-
-    Raises:
-        ParameterError: if it is not installed.
-    """
+    """The module, imported where a world of it is made; a ParameterError if it is not installed."""
     try:
         with silenced():  # it announces its build time on standard output or stderr
             import pybullet as module
@@ -332,15 +327,8 @@ class BulletPlant:
 class FloatingBaseBulletPlant(BulletPlant):
     """As :class:`BulletPlant`, for a floating-base robot.
 
-    PyBullet tells and sets the state of the base link's CoM in its axes of inertia; the robot's is
-    that of the link's own frame.
-
-    Args:
-        robot: whose URDF to load and whose joint order to speak.
-        options: friction, physics step, mass error, step of the ground.
-
-    Raises:
-        RobotError: if PyBullet does not read the URDF, or reads another robot.
+    PyBullet has the state of the base link's CoM in its axes of inertia; the robot's is that of the
+    link's own frame.
     """
 
     def __init__(self, robot: FloatingBaseBiped, options: PlantOptions) -> None:
@@ -369,12 +357,7 @@ class FloatingBaseBulletPlant(BulletPlant):
         return self._engine.getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
 
     def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
-        """See :meth:`~.plant.Plant.step`.
-
-        Args:
-            torque: (nu,) joint torques [N m].
-            push, aside: disturbance on the trunk's centre of mass along the world's x and y [N].
-        """
+        """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
         self._advance(torque, push, aside)
 
     def reset(self, q: Array, v: Array) -> None:
@@ -409,16 +392,7 @@ class FloatingBaseBulletPlant(BulletPlant):
 
 
 def _load_body(robot: Biped, client: int, held: bool = True) -> int:
-    """Body of a robot's URDF; PyBullet only reads files.
-
-    Args:
-        robot: whose URDF.
-        client: PyBullet's handle of the world.
-        held: whether the root link is fixed to the world.
-
-    Raises:
-        RobotError: if PyBullet does not read it.
-    """
+    """Body of a robot's URDF, its root link fixed to the world if ``held``; a RobotError if bad."""
     engine = pybullet()
     # By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
     flags = engine.URDF_USE_INERTIA_FROM_FILE | engine.URDF_IGNORE_VISUAL_SHAPES
@@ -440,15 +414,7 @@ def _load_body(robot: Biped, client: int, held: bool = True) -> int:
 
 
 def _ground_bodies(terrain: Terrain, client: int) -> dict[int, float | None]:
-    """Make the ground's bodies.
-
-    Args:
-        terrain: the ground.
-        client: PyBullet's handle of the world.
-
-    Returns:
-        The friction of each body; None: that of the plant's options.
-    """
+    """Make the ground's bodies; friction of each, None where it is that of the plant's options."""
     p = pybullet()
 
     def body(shape: int, position: tuple[float, float, float], pitch: float = 0.0) -> int:

@@ -27,7 +27,7 @@ def stdout_to_stderr() -> Iterator[None]:
 def silenced() -> Iterator[None]:
     """Hold back everything that is written to standard output and stderr, also by C code.
 
-    If an error ends the ``with`` block, it is written to stderr after all: it may tell why.
+    If an error ends the ``with`` block, it is written to stderr after all: it may hold the reason.
     """
     with tempfile.TemporaryFile() as held:
         try:
@@ -44,9 +44,8 @@ def silenced() -> Iterator[None]:
 def decimal_points() -> Iterator[None]:
     """Let this thread's C code read and write numbers with a point within the ``with`` block.
 
-    A program that has set a locale with decimal commas, as Qt does, makes PyBullet read "0.7" as
-    0. Only the calling thread is changed: setlocale would change all, and other threads may be
-    printing.
+    In a program with a locale of decimal commas, as Qt sets it, PyBullet reads "0.7" as 0. Other
+    threads may be printing, so setlocale, which changes all of them, would not do.
     """
     libc = ctypes.CDLL(None)
     for function in (libc.newlocale, libc.uselocale):

@@ -41,7 +41,7 @@ _DRIFT = 1e-12  # constraint error [m, m/s] that is projected away
 
 @dataclass(frozen=True)
 class IdealOptions(Checked):
-    """What the ideal world is like. Friction is not modelled: stance feet stick.
+    """Options of the ideal world. Friction is not modelled: stance feet stick.
 
     Attributes:
         time_step: period of the torques [s]; one step of the integrator.

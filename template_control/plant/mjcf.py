@@ -36,16 +36,11 @@ _ROOT = 1  # Pinocchio's index of the free flyer
 
 
 def mjcf(robot: Biped, world: PlantOptions, contact_time: float) -> str:
-    """The model as MuJoCo reads it.
+    """The model as MuJoCo reads it; ``contact_time`` is the contacts' time constant [s].
 
     The joints have the names of Pinocchio's, the feet's spheres are ``foot0`` and ``foot1``, and
     the trunk's body and shapes begin with ``trunk``. Feet and a planar robot's trunk meet the
     ground; the other links, and the robot itself, do not.
-
-    Args:
-        robot: the model.
-        world: friction, time step, mass error, ground.
-        contact_time: time constant with which a contact gives way [s].
     """
     root = Element("mujoco", model="plant")
     _add(root, "compiler", angle="radian", autolimits="true")

@@ -25,11 +25,11 @@ _POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
 
 @dataclass(frozen=True)
 class MujocoOptions(PlantOptions):
-    """What the world in MuJoCo is like; as in PyBullet, and how its contacts give way.
+    """Options of the world in MuJoCo: as in PyBullet, and the compliance of its contacts.
 
     Attributes:
-        contact_time: time constant of a contact [s]; MuJoCo takes at least two time steps. From
-            2 to 20 ms the robots walk alike; 4 ms lets a foot sink by less than a millimetre.
+        contact_time: time constant of a contact [s]; MuJoCo takes at least two time steps. From 2
+            to 20 ms the robots walk alike; 4 ms lets a foot sink by less than a millimetre.
 
     Raises:
         ParameterError: if a number is not positive and finite, or the contact is too quick.
@@ -49,11 +49,7 @@ class MujocoOptions(PlantOptions):
 
 
 def _mujoco() -> Any:
-    """The package, which not everybody has.
-
-    Raises:
-        ParameterError: if it is not installed.
-    """
+    """The package, an optional one; a ParameterError if it is not installed."""
     try:
         import mujoco
     except ImportError:
@@ -170,23 +166,10 @@ class FloatingBaseMujocoPlant(MujocoPlant):
 
     MuJoCo has the trunk's velocity in the world and its angular velocity in the trunk's axes, and
     quaternions begin with w.
-
-    Args:
-        robot: whose model to write as MJCF, and whose joint order to speak.
-        options: friction, time step, mass error, contacts, step of the ground.
-
-    Raises:
-        ParameterError: if MuJoCo is not installed.
-        RobotError: if MuJoCo does not take the model, or makes another robot of it.
     """
 
     def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
-        """See :meth:`~.plant.Plant.step`.
-
-        Args:
-            torque: (nu,) joint torques [N m].
-            push, aside: disturbance on the trunk's centre of mass along the world's x and y [N].
-        """
+        """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
         self.data.xfrc_applied[self._trunk, 1] = aside
         super().step(torque, push)
 

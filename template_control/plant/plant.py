@@ -29,7 +29,7 @@ class Plant(Protocol):
 
     @property
     def time_step(self) -> float:
-        """How long a :meth:`step` is [s]."""
+        """Duration of a :meth:`step` [s]."""
 
     def ground_height(self, x: float) -> float:
         """Height of the ground at ``x`` [m]; to tell a fall, and to stand on at the start."""
@@ -94,14 +94,7 @@ def default_plant() -> PlantOptions:
 
 
 def check_world(world: World) -> None:
-    """Check that an object implements :class:`Plant`.
-
-    Args:
-        world: a plant, or options; those have checked themselves.
-
-    Raises:
-        ParameterError: naming what it lacks, or its time step if that is no positive number.
-    """
+    """Check that an object is options or a :class:`Plant`; a ParameterError says what it lacks."""
     if isinstance(world, PlantOptions | IdealOptions):
         return
     lacking = [name for name in _MEMBERS if not hasattr(world, name)]
@@ -128,15 +121,9 @@ R = TypeVar("R", bound=Biped)
 
 
 def robot_in(world: PlantOptions | IdealOptions, robot: R) -> R:
-    """The robot that is simulated.
+    """The robot that is simulated: the controller's, or the world's own, with the world's gravity.
 
-    Args:
-        world: may have a robot and a gravity of its own.
-        robot: the controller's model.
-
-    Raises:
-        ParameterError: if the world's robot has other joints or feet, or another base.
-        RobotError: if there is no such robot.
+    A ParameterError if the world's robot has other joints or feet, or another base.
     """
     own = robot
     if world.robot is not None:
