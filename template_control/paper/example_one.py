@@ -112,14 +112,9 @@ def fig10() -> Reproduction:
 
 
 def fig10_on(robot_name: str) -> Reproduction:
-    """Example I on a robot, compared with its template.
+    """Example I on a robot, shipped or a URDF's path, compared with its template.
 
-    Args:
-        robot_name: a shipped robot, or the path of a URDF.
-
-    Raises:
-        RobotError: if there is no such robot.
-        ScenarioError: if it cannot follow Example I.
+    A ScenarioError if the robot cannot follow Example I.
     """
     robot = load_robot(robot_name)
     route = robot_route(robot, example_one())

@@ -57,15 +57,7 @@ class Liftoff:
 
 
 def beginning(record: Record, seconds: float) -> Record:
-    """Cut a run down to its first seconds.
-
-    Args:
-        record: the run.
-        seconds: time at which the samples end [s].
-
-    Returns:
-        The run with fewer samples; its sections and its metadata are still all there.
-    """
+    """Samples of a run's first seconds; all of its sections and metadata are kept."""
     count, end = len(record.time), int(np.searchsorted(record.time, seconds))
     cut = {
         f.name: getattr(record, f.name)[:end]
@@ -118,11 +110,8 @@ def states_figure(
 ) -> Figure:
     """y, phi and E at VLO over the steps: a row of panels for each plant, a line for each planner.
 
-    Args:
-        states: (steps + 1, 3) y [m], phi [rad], E [J] of each walk, by (planner, plant); not every
-            planner walks on every plant.
-        planners, plants: names in the order they are drawn in.
-        target: (3,) y, phi, E of the equilibrium.
+    ``states`` are (steps + 1, 3) y [m], phi [rad], E [J] by (planner, plant), of which some may
+    lack; ``target`` (3,) are those of the equilibrium. Names are in the order they are drawn in.
     """
     figure = Figure(figsize=(9.5, 1.7 * len(plants) + 0.6), layout="constrained")
     panels = figure.subplots(len(plants), 3, sharex=True, sharey="col", squeeze=False)
@@ -155,11 +144,8 @@ def states_figure(
 def liftoff_figure(settled: Record, records: dict[str, Record]) -> Figure:
     """CoM of a settled walk, and torques of a first step with each liftoff rule.
 
-    A step is shown from touchdown to touchdown.
-
-    Args:
-        settled: a run that ends on its gait; one of its last steps is shown.
-        records: at most five runs by the name of their liftoff rule, every sample kept.
+    A step is shown from touchdown to touchdown: one of the last of ``settled``, which ends on its
+    gait. ``records`` are at most five runs by the name of their liftoff rule, with every sample.
     """
     figure = Figure(figsize=(9.0, 2.2 * (len(records) + 1)), layout="constrained")
     panels = figure.subplots(len(records) + 1, 1)
@@ -216,9 +202,7 @@ _JOINTS = ("lifting hip", "lifting knee", "standing hip", "standing knee")
 class Walk:
     """VLO states of a walk from z_0.
 
-    Attributes:
-        states: (steps + 1, 3) y [m], phi [rad], E [J].
-        fall: why it ended early, or "".
+    ``states`` (steps + 1, 3) are y [m], phi [rad], E [J]; ``fall`` is why it ended early, or "".
     """
 
     states: Array
@@ -244,14 +228,9 @@ def start_state(gait: WalkingGait) -> tuple[float, float, float]:
 
 
 def sections(gait: WalkingGait, z: Array) -> Array:
-    """y, phi and energy of VLO states, with the template's formulas.
+    """(n, 3) y [m], phi [rad, positive downward], E [J] of VLO states, by the template's formulas.
 
-    Args:
-        gait: its template counts.
-        z: (n, 3) dx/dt, y, dy/dt at VLO [m/s, m, m/s].
-
-    Returns:
-        (n, 3) y [m], phi [rad, positive downward], E [J].
+    ``z`` (n, 3) are dx/dt, y, dy/dt [m/s, m, m/s].
     """
     energy = np.asarray(VLO.energy(gait.parameters, z))
     return np.column_stack((z[:, 1], velocity_angle(z), energy))
@@ -260,16 +239,11 @@ def sections(gait: WalkingGait, z: Array) -> Array:
 def robot_walk(
     planner: str, plant: str, steps: int = STEPS, beta: float | None = None
 ) -> tuple[Walk, Record]:
-    """Let the five-link robot walk from z_0.
+    """Walk of the five-link robot from z_0: VLO states, and the whole record.
 
-    Args:
-        planner: key of :data:`PLANNERS`.
-        plant: key of :data:`PLANTS`.
-        steps: how many at most.
-        beta: predefined liftoff direction, from forward horizontal [rad]; None for the template's.
-
-    Returns:
-        VLO states, and the whole record.
+    Planner and plant are keys of :data:`PLANNERS` and :data:`PLANTS`; ``steps`` are how many at
+    most. ``beta`` is a predefined liftoff direction, from forward horizontal [rad]; None for the
+    template's.
     """
     gait = _gait()
     world, tuning = PLANTS[plant]
@@ -287,7 +261,7 @@ def robot_walk(
 
 
 def template_walk(planner: str, steps: int = STEPS) -> Walk:
-    """Let the template itself walk from z_0, integrated exactly, with a planner of the robot's.
+    """Walk of the template itself from z_0, integrated exactly, with a planner of the robot's.
 
     Arguments as for :func:`robot_walk`.
     """
@@ -334,11 +308,9 @@ def _numbers(walk: Walk) -> dict[str, Any]:
 
 
 def fig12(planners: Sequence[str] = tuple(PLANNERS), steps: int = STEPS) -> Reproduction:
-    """Where the robot settles from z_0, by planner and by plant.
+    """States on which the robot settles from z_0, by planner and by plant.
 
-    Args:
-        planners: keys of :data:`PLANNERS`.
-        steps: of each walk; the last 20 are what it settles on.
+    They are those of the last 20 of each walk's steps.
     """
     plants, first = (ALONE, *PLANTS), planners[0]
     # What full grip changes is the robot's, whatever its planner.
@@ -414,11 +386,7 @@ def _liftoffs(
 
 
 def fig13(steps: int = _LIFTOFF_STEPS) -> Reproduction:
-    """Torques with the template's liftoff and with predefined ones.
-
-    Args:
-        steps: of each walk from z_0.
-    """
+    """Torques with the template's liftoff and with predefined ones, in walks from z_0."""
     cases = [(rule, plant) for plant in ("PyBullet", "ideal") for rule in _LIFTOFFS]
     with workers() as pool:
         done = counted(pool.map(partial(_liftoffs, steps=steps), cases), len(cases), "walks")

@@ -57,10 +57,8 @@ class Grid:
 class MapErrors:
     """Errors of one map over the valid runs; NaN where the step fails on the map.
 
-    Attributes:
-        position: (n,) e of (31) at the next VLO [%].
-        velocity: (n,) script E of (32) [%].
-        failed: number of valid runs in which the map's step fails.
+    ``position`` (n,) is e of (31) at the next VLO [%], ``velocity`` (n,) script E of (32) [%];
+    ``failed`` is the number of valid runs in which the map's step fails.
     """
 
     position: Array
@@ -81,12 +79,9 @@ class MapErrors:
 
 @dataclass(frozen=True)
 class ErrorStudy:
-    """Result of :func:`study`.
+    """Result of :func:`study`: errors by map, and d_v of (33) of the valid runs, ``distance`` (n,).
 
-    Attributes:
-        tried: states on the grid.
-        distance: (n,) d_v of (33) of the valid runs.
-        errors: by map.
+    ``tried`` is the number of states on the grid.
     """
 
     tried: int
@@ -102,12 +97,8 @@ class ErrorStudy:
 def study(grid: Grid | None = None, parameters: SlipParameters | None = None) -> ErrorStudy:
     """Compare the closed-form VLO maps with the exact one over a grid.
 
-    A run is valid if the exact step completes and its energy allows the next touchdown,
-    (29) and (30).
-
-    Args:
-        grid: numbers of points; None for the default ones.
-        parameters: the template, whose stiffness the grid replaces; None for Table IV's.
+    A run is valid if the exact step completes and its energy allows the next touchdown, (29) and
+    (30). The grid replaces the template's stiffness; the default template is Table IV's.
     """
     p = parameters or SlipParameters()
     z, u = (grid or Grid()).states(p)
@@ -143,10 +134,8 @@ _COLORS = ("#db7321", "#2a6196", "#6b7078", "#3a9a4a")
 def error_figure(edges: Array, counts: Array, means: Mapping[str, tuple[Array, Array]]) -> Figure:
     """Mean errors binned over d_v, with the number of runs in each bin.
 
-    Args:
-        edges: (b + 1,) of the bins.
-        counts: (b,) runs.
-        means: by map, (b,) mean position and velocity errors [%].
+    ``edges`` (b + 1,) are the bins', ``counts`` (b,) the runs'; ``means`` are, by map, (b,) mean
+    position and velocity errors [%].
     """
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     centres, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
@@ -175,11 +164,8 @@ def stride_figure(
 ) -> Figure:
     """A stride's CoM path with its legs at the events.
 
-    Args:
-        paths: label and (n, 2) x, y of each path [m].
-        legs: toe and CoM (2,) of each leg drawn.
-        events: name, x and y of each event.
-        title: over the figure.
+    ``paths`` are label and (n, 2) x, y [m]; ``legs`` toe and CoM (2,) of each leg drawn; ``events``
+    name, x and y.
     """
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     axes = figure.subplots()

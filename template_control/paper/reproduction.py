@@ -1,4 +1,4 @@
-"""What a reproduction of a table or figure yields, and which ones there are."""
+"""Result of a reproduction of a table or figure, and the list of reproductions."""
 
 from __future__ import annotations
 

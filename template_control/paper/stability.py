@@ -40,9 +40,7 @@ _RETURNS = 1e-7  # how exactly a step of the set must lead onto the equilibrium
 class DeadbeatSet:
     """States from which one exact step leads onto an equilibrium.
 
-    Attributes:
-        state: (n, 3) at VLO.
-        controls: (n, NUM_SLOTS) of that step.
+    ``state`` (n, 3) is at VLO; ``controls`` (n, NUM_SLOTS) are those of that step.
     """
 
     state: Array
@@ -56,14 +54,11 @@ def backward_set(
 ) -> DeadbeatSet:
     """Integrate backward in time from a gait's VLO state over the controls.
 
-    The dynamics are the same backward: the mirrored equilibrium is walked forward with
-    kappa_2 first and k0 after the virtual bottom. Its touchdown is the real step's liftoff,
+    The dynamics are the same backward: the mirrored equilibrium, which is at k0, is walked forward
+    with kappa_2 first and k0 after the virtual bottom. Its touchdown is the real step's liftoff,
     and the other way round; so the angle at that liftoff is the real touchdown angle.
-
-    Args:
-        gait: the equilibrium, at k0.
-        stiffness_range: of kappa_2 over k0.
-        counts: numbers of kappa_2 and of angles between 0 and 90 degrees.
+    ``stiffness_range`` is kappa_2's over k0; ``counts`` are of kappa_2 and of angles between 0 and
+    90 degrees.
     """
     p = gait.parameters
     start = VLO.state(VLO.mirror(gait.vlo))
@@ -91,15 +86,9 @@ def backward_set(
 
 
 def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Array:
-    """Walk one exact step from each state, with the controls that a map finds for it.
+    """(n, 3) VLO states after one exact step with the controls of a map; NaN where it fails.
 
-    Args:
-        found: the states; the search for controls begins at the exact step's.
-        gait: the equilibrium that the controls aim at.
-        kind: of the map that the controls are found on.
-
-    Returns:
-        (n, 3) VLO states after the step, NaN where it fails.
+    The search for controls begins at the exact step's; they aim at the equilibrium ``gait``.
     """
     p = gait.parameters
     slots = (Slot.TOUCHDOWN_ANGLE, Slot.K_SD)
@@ -117,18 +106,11 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
 def settles(
     ends: Array, branch: list[BranchPoint], gait: WalkingGait, limit: int = 50
 ) -> NDArray[np.bool_]:
-    """Whether passive walking from each state converges to the equilibria of a branch.
+    """(n,) True if passive walking from a VLO state converges to the equilibria of a branch.
 
-    The touchdown angle is that of the branch's equilibrium with the state's energy.
-
-    Args:
-        ends: (n, 3) VLO states; NaN does not settle.
-        branch: stable equilibria with the height of ``gait``, energy rising or falling.
-        gait: for the template and the height.
-        limit: steps to take.
-
-    Returns:
-        (n,) whether it converges.
+    The touchdown angle is that of the equilibrium with the state's energy; ``branch`` are stable
+    equilibria with the height of ``gait``, energy rising or falling. ``ends`` (n, 3) that are NaN
+    do not settle; ``limit`` is the number of steps.
     """
     p = gait.parameters
     order = np.argsort([point.energy for point in branch])
@@ -148,13 +130,9 @@ def inside_share(
 ) -> tuple[Array, float]:
     """Share of the set's states that settle, among those with at least a given touchdown angle.
 
-    Args:
-        found: the set.
-        settled: (n,) from :func:`settles`.
-        least_angles: (m,) alpha_min, the least touchdown angle of the step [rad].
-
-    Returns:
-        (m,) shares, NaN where no state is left; the least angle from which all settle [rad].
+    ``settled`` (n,) is from :func:`settles`; ``least_angles`` (m,) are alpha_min, the least
+    touchdown angle of the step [rad]. Returns (m,) shares, NaN where no state is left, and the
+    least angle from which all settle [rad].
     """
     alpha = found.controls[:, Slot.TOUCHDOWN_ANGLE]
     shares = np.array(
@@ -192,7 +170,7 @@ def branch(step: float = _COARSE) -> list[BranchPoint]:
 
 
 def disc_converges(energy: float) -> bool:
-    """Whether 16 states around the equilibrium at an energy [J] come back to it in 50 steps."""
+    """True if 16 states around the equilibrium at an energy [J] come back to it in 50 steps."""
     gait = gait_from_energy(P, HEIGHT, energy)
     y = HEIGHT + _DISC[0] * np.cos(_DIRECTIONS)
     z = vlo_state(P, y, _DISC[1] * np.sin(_DIRECTIONS), energy)
@@ -218,11 +196,7 @@ def basin_slice(energy: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
 
 
 def fig8(energies: Array = _ENERGIES) -> Reproduction:
-    """The self-stable basin of the equilibria at 0.9818 m.
-
-    Args:
-        energies: (n,) whose slices are computed [J].
-    """
+    """The self-stable basin of the equilibria at 0.9818 m, in slices at ``energies`` (n,) [J]."""
     points = branch()
     fold = next(p for p in points if p.special is Special.FOLD)
     lost = next(p for p in points if p.special is Special.SADDLE_NODE)
@@ -278,8 +252,7 @@ def fig8(energies: Array = _ENERGIES) -> Reproduction:
 def fig9(counts: tuple[int, int] = (100, 400)) -> Reproduction:
     """The one-step deadbeat set, and the share of it that each map's controller saves.
 
-    Args:
-        counts: numbers of kappa_2 and of angles, as for :func:`backward_set`.
+    ``counts`` as for :func:`backward_set`.
     """
     gait = equilibrium()
     stable = [p for p in branch(_FINE) if p.kind is Kind.STABLE]

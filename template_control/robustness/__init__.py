@@ -1,4 +1,4 @@
-"""How much a robot's walk takes until it breaks."""
+"""Robustness of a robot's walk: disturbances that grow until it falls, and drawn ones."""
 
 from template_control.deprecated import attach_stub
 

@@ -35,7 +35,7 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True)
 class DisturbanceSample(Checked):
-    """What disturbs one trial; units and meaning as in :class:`DisturbanceDistribution`.
+    """Disturbances of one trial; units and meaning as in :class:`DisturbanceDistribution`.
 
     Attributes:
         speed, height: how far off its gait the robot starts.
@@ -154,7 +154,7 @@ class DisturbanceDistribution(Checked):
             raise ParameterError(f"the mix {factor:g} times as severe: {text}") from None
 
     def severity(self, draw: DisturbanceSample) -> float:
-        """How severe a draw is for this mix: root mean square of its shares of the ranges.
+        """Severity of a draw for this mix: root mean square of its shares of the ranges.
 
         Each share is a number's distance from where nothing disturbs over the distance of its
         range's end on that side. Ranges of no width are left out, as all trials share them.
@@ -187,7 +187,7 @@ OFF_GAIT = 0.03
 
 @dataclass(frozen=True)
 class CampaignConfig(Checked):
-    """What is tried.
+    """A campaign: the undisturbed experiment, the disturbances and the seed.
 
     Attributes:
         experiment: undisturbed: a gait that is kept, in a physics engine.
@@ -215,7 +215,7 @@ class CampaignConfig(Checked):
             )
 
     def draw(self, number: Index) -> DisturbanceSample:
-        """What disturbs a trial.
+        """Disturbances of a trial.
 
         Args:
             number: of the trial, from 0.
@@ -265,7 +265,7 @@ def _ground_step(draw: DisturbanceSample, length: float, step_length: float) -> 
 
 
 class Trial(NamedTuple):
-    """What came of one trial.
+    """Result of one trial.
 
     Attributes:
         number: from 0.
@@ -287,18 +287,18 @@ class Trial(NamedTuple):
 
     @property
     def off_gait(self) -> bool:
-        """Whether the robot is on its feet and off its gait."""
+        """True if the robot is on its feet and off its gait."""
         return self.speed_error is not None and abs(self.speed_error) > OFF_GAIT
 
     @property
     def good(self) -> bool:
-        """Whether it is on its gait."""
+        """True if the robot is on its gait."""
         return not (self.fell or self.off_gait)
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """What came of a campaign.
+    """Result of a campaign.
 
     Attributes:
         conditions: that were tried.
@@ -320,7 +320,7 @@ class Campaign:
 
     @property
     def reasons(self) -> dict[str, int]:
-        """How many falls began with what."""
+        """Number of falls by what went wrong first."""
         return dict(Counter(t.first for t in self.fell).most_common())
 
     def interval(self, of: Sequence[Trial]) -> tuple[float, float]:
@@ -333,14 +333,9 @@ class Campaign:
 
 
 def campaign_trial(conditions: dict[str, Any], number: int) -> dict[str, Any]:
-    """One trial, as a sweep's worker runs it.
+    """One trial, as a sweep's worker runs it: fell, reason, first, speed_error of :class:`Trial`.
 
-    Args:
-        conditions: as :func:`~.settings.to_table` makes them.
-        number: of the trial, from 0.
-
-    Returns:
-        fell, reason, first, speed_error; see :class:`Trial`.
+    ``conditions`` are as :func:`~.settings.to_table` makes them; ``number`` counts from 0.
     """
     _, where = settings.from_table(CampaignConfig, conditions).trial(number)
     record = simulate(where)

@@ -32,8 +32,7 @@ from template_control.slip.similarity import REFERENCE, Scale
 def engine(experiment: Experiment) -> PlantOptions:
     """The physics engine of an experiment, whose friction, masses and ground can be disturbed.
 
-    Raises:
-        ParameterError: if it has another plant.
+    A ParameterError if it has another plant.
     """
     if not isinstance(experiment.world, PlantOptions):
         raise ParameterError(
@@ -46,7 +45,7 @@ def engine(experiment: Experiment) -> PlantOptions:
 def footholds(
     where: PreparedExperiment, start: tuple[float, float, float], steps: int
 ) -> NDArray[np.float64]:
-    """Where a robot treads in each step when nothing disturbs it.
+    """Footholds of a robot in each step when nothing disturbs it.
 
     Args:
         where: the undisturbed experiment.
@@ -54,8 +53,8 @@ def footholds(
         steps: how many.
 
     Returns:
-        (n,) x of the footholds [m], the last step's last; the gait's own if the robot falls,
-        as it will then fall with the disturbance as well.
+        (n,) x of the footholds [m], the last step's last; the gait's own if the robot falls, as it
+            will then fall with the disturbance as well.
     """
     record = simulate(replace(where, steps=steps, start=start))
     if record.fell:
@@ -77,9 +76,8 @@ def footholds(
 class Unit:
     """The unit that levels are shown in.
 
-    Attributes:
-        name: stands after the number; "" for a coefficient.
-        factor: one SI unit in this unit; negative where a level is a share taken away.
+    ``name`` stands after the number, "" for a coefficient. ``factor`` is one SI unit in this unit,
+    negative where a level is a share taken away.
     """
 
     name: str
@@ -160,11 +158,7 @@ def _time(parameters: SlipParameters) -> float:
 
 
 def impulse_unit(parameters: SlipParameters) -> float:
-    """What an impulse for the reference template is multiplied by: M sqrt(g l0) over its own.
-
-    Args:
-        parameters: of a robot's template.
-    """
+    """Factor of an impulse on the reference template: M sqrt(g l0) over that template's."""
     return parameters.mass / REFERENCE.mass * Scale.of(parameters).speed
 
 
@@ -175,13 +169,9 @@ def _scale(where: PreparedExperiment) -> Scale:
 def pushed(
     where: PreparedExperiment, level: float, trial: int, direction: float = 0.0
 ) -> PreparedExperiment:
-    """An experiment with a push.
+    """An experiment with a push of ``level`` [N s], in a phase of the step by the trial's number.
 
-    Args:
-        where: the undisturbed one.
-        level: its impulse [N s].
-        trial: which phase of the step it comes in.
-        direction: of a floating-base robot, from forward to the left [rad].
+    ``direction`` is from forward to the left [rad], of a floating-base robot.
     """
     push = Push(level, BEGIN, trial / PHASES, PUSH_SECONDS * _scale(where).time, direction)
     return replace(where, steps=BEGIN + 1 + AFTER, pushes=(push,))

@@ -1,4 +1,4 @@
-"""What went wrong first, before a robot fell."""
+"""First thing that went wrong before a robot fell."""
 
 from __future__ import annotations
 

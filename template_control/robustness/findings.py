@@ -1,4 +1,4 @@
-"""What came of the disturbances: trials by level, and from which level on a robot breaks."""
+"""Results of the disturbances: trials by level, and the level from which on a robot falls."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def wilson_interval(successes: Index, trials: Count) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Level:
-    """What came of one disturbance at one level.
+    """Results of one disturbance at one level.
 
     Attributes:
         level: the disturbance's size for this robot [SI].
@@ -53,7 +53,7 @@ class Level:
 
     @property
     def trials(self) -> int:
-        """How many there were."""
+        """Number of trials."""
         return self.succeeded + self.fell + self.off_gait
 
     @property
@@ -74,7 +74,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Finding:
-    """What one disturbance does to a robot.
+    """Effect of one disturbance on a robot.
 
     Attributes:
         disturbance: the one that was raised.
@@ -103,7 +103,7 @@ class Finding:
 
     @property
     def broken(self) -> bool:
-        """Whether the disturbance need not be raised further.
+        """True if the disturbance need not be raised further.
 
         All trials of the last level fell, or more than half of the trials at each of the last two.
         """

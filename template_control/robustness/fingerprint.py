@@ -19,11 +19,8 @@ WITHOUT = ("cli", "paper", "sweep", "view")
 def fingerprint(model: Biped, *trials: object) -> str:
     """Ten letters of a digest of the code that a trial runs, the robot's URDF and the trials.
 
-    Comments, docstrings and lines do not count, nor do the rooms ``WITHOUT``.
-
-    Args:
-        model: the robot.
-        trials: what else the results depend on; known by its ``repr``.
+    Comments, docstrings and lines do not count, nor do the rooms ``WITHOUT``; trials are what else
+    the results depend on, by their ``repr``.
     """
     digest = hashlib.sha256(model.urdf.encode())
     digest.update(_code(_PACKAGE).encode())

@@ -46,17 +46,11 @@ Array = NDArray[np.float64]
 def template_limit(
     disturbance: Disturbance, where: PreparedExperiment, strides: int, settled: float
 ) -> float | None:
-    """The severest level up to which the template comes back to its gait from its section.
+    """The severest level [SI] up to which the template comes back to its gait from its section.
 
-    Args:
-        disturbance: one that changes the state at once.
-        where: whose gait and planner.
-        strides: after which the template must be back.
-        settled: relative error of speed and height that counts as back.
-
-    Returns:
-        The level [SI]; 0 if it does not come back from the mildest. None where the template has
-        no limit of its own, as to friction.
+    It is back if after ``strides`` the relative errors of speed and height are below ``settled``. 0
+    if it does not come back from the mildest; None where the template has no limit of its own, as
+    to friction. The disturbance is one that changes the state at once.
     """
     if disturbance.kick is None:
         return None
@@ -89,15 +83,10 @@ _BY_NAME = {d.name: d for d in ALL}
 
 
 def gait_errors(record: Record, gait: Gait) -> tuple[float, float]:
-    """How far a robot's last 5 steps are from its gait, relative to the gait.
+    """Relative errors of a robot's speed and height over its last 5 steps, from its gait's.
 
-    Args:
-        record: a run of at least 5 steps, without a fall.
-        gait: the gait to compare with.
-
-    Returns:
-        Mean forward speed over the gait's, less one; mean height at the section over the gait's,
-        less one.
+    Mean forward speed and mean height at the section, over the gait's, less one; the record has at
+    least 5 steps and no fall.
     """
     x = np.interp(record.section_time[[-1 - _LAST, -1]], record.time, record.com[:, 0])
     speed = (x[1] - x[0]) / (record.section_time[-1] - record.section_time[-1 - _LAST])

@@ -31,13 +31,8 @@ class ExecutorLostError(Exception):
 def check_pickles(function: Callable[..., Any], executor: Executor | None) -> None:
     """Check, before the first call, that the function can be sent to worker processes.
 
-    Args:
-        function: what the workers are to call.
-        executor: where they are; None for processes of this machine. An executor other than a
-            process pool is taken to send what it can call.
-
-    Raises:
-        SweepError: if the function cannot be pickled.
+    A SweepError if it cannot be pickled; an executor other than a process pool is taken to send
+    what it can call. ``executor`` None stands for processes of this machine.
     """
     # Dask sends what pickle cannot.
     if executor is not None and not isinstance(executor, ProcessPoolExecutor):
@@ -61,17 +56,10 @@ def run_calls(
 ) -> None:
     """Submit calls to the executor and keep each outcome, also those finished before an error.
 
-    Args:
-        function: what to call.
-        calls: index and keyword arguments of each call.
-        executor: None for processes of this machine, ended before this returns.
-        in_flight: how many calls are with the executor at a time.
-        keep: called with index and outcome of each call as it finishes.
-        refresh: called a few times a second.
-
-    Raises:
-        ExecutorLostError: if the executor cannot go on.
-        SweepError: raised by ``keep``.
+    ``calls`` are index and keyword arguments; ``executor`` None stands for processes of this
+    machine, ended before this returns; ``in_flight`` calls are with the executor at a time.
+    ``keep`` gets index and outcome of each call as it finishes; ``refresh`` is called a few times a
+    second. An ExecutorLostError if the executor cannot go on.
     """
     # Dask takes calls with equal arguments for one, whose outcome it may still hold.
     token = uuid.uuid4().hex

@@ -38,8 +38,7 @@ class Outcome(NamedTuple):
 def name_of(function: Callable[..., Any]) -> str:
     """Module and qualified name; of a ``functools.partial`` its arguments too.
 
-    Raises:
-        TypeError: if a partial's arguments are no plain data.
+    A TypeError if a partial's arguments are no plain data.
     """
     if isinstance(function, partial):
         return (
@@ -54,14 +53,8 @@ def header(
 ) -> dict[str, Any]:
     """Identity of a sweep: format, function, seed, number and SHA-256 of its plain items.
 
-    Args:
-        function: what the sweep calls; its name counts, not its code.
-        seed: what the items' seeds come from.
-        items: keyword arguments of each call, in order.
-        whole: whether number and SHA-256 of the items count, which all are in the lines too.
-
-    Raises:
-        SweepError: if the items or a partial's arguments are no plain data.
+    The function counts by its name, not its code; number and SHA-256 only if ``whole``, as all
+    items are in the lines too. A SweepError if items or a partial's arguments are no plain data.
     """
     digest, count, what = hashlib.sha256(), 0, "the function"
     try:
@@ -79,18 +72,11 @@ def header(
 class SweepFile:
     """A results file, open and locked for this process; a context manager.
 
-    Args:
-        path: of the file; a new one is begun where there is none.
-        head: of :func:`header`.
-        items: of a sweep that may have fewer or more of them in the file; None: the header
-            identifies them.
-
-    Attributes:
-        finished: outcome by item index, as the file had them; the last of an item counts.
-
-    Raises:
-        SweepError: if the file holds anything but this sweep, another process is writing it
-            or it cannot be written.
+    A new file is begun where there is none. ``head`` is :func:`header`'s; ``items`` are those of a
+    sweep that may have fewer or more of them in the file, None where the header identifies them.
+    ``finished`` are outcomes by item index, as the file had them; the last of an item counts. A
+    SweepError if the file holds anything but this sweep, another process is writing it or it cannot
+    be written.
     """
 
     def __init__(
@@ -178,14 +164,8 @@ class SweepFile:
     def append(self, index: int, item: Mapping[str, Any], seed: int, outcome: Outcome) -> None:
         """Append a finished item; the line is flushed to the operating system before this returns.
 
-        Args:
-            index: place of the item in the sweep, from 0.
-            item: keyword arguments of its call.
-            seed: that :func:`~.sweep.item_seed` gives this item.
-            outcome: its result, as plain data, or its error.
-
-        Raises:
-            SweepError: if it cannot be written.
+        ``index`` counts from 0; ``item`` are the call's keyword arguments, ``seed`` is that of
+        :func:`~.sweep.item_seed`, ``outcome`` plain data or an error.
         """
         end = {"result": outcome.result} if outcome.error is None else {"error": outcome.error}
         entry = {"index": index, "item": to_jsonable(item), "seed": seed, **end}

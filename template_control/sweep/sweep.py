@@ -235,7 +235,7 @@ def sweep(
 def _checked(
     function: Callable[..., Any], items: Iterable[Mapping[str, Any]], seed: int
 ) -> tuple[bool, list[Item]]:
-    """Whether the function has a parameter ``seed``, and the items after a check of their names."""
+    """True if the function has a parameter ``seed``, and the items after a check of their names."""
     if seed < 0:
         raise SweepError(f"seed is {seed}: give at least 0")
     try:
