@@ -61,10 +61,10 @@ def cache_folder() -> Path | None:
 
 
 def _digest() -> str:
-    """Hash of the sources that compiled code depends on.
+    """Hash of the sources that compiled code depends on: another change compiles nothing again.
 
-    These are the modules with compiled functions, and what they import: constants are frozen into
-    the code. A change anywhere else compiles nothing again.
+    They are the modules with compiled functions, and what they import, whose constants are frozen
+    into the code.
     """
     names = {path: _module(path) for path in sorted(_PACKAGE.rglob("*.py"))}
     contents = {name: path.read_bytes() for path, name in names.items()}
@@ -113,10 +113,9 @@ def inner(function: Function) -> Any:
 
 
 def inner_by_type(function: Function) -> Callable[[Function], Any]:
-    """Decorator of what chooses, by its arguments' types, the code of an :func:`inner` function.
+    """Decorator of what chooses code for ``function`` by its arguments' types, as Numba's overload.
 
-    Args:
-        function: what Python runs; compiled functions call it by this name.
+    Compiled functions call it by the name of ``function``, which is what Python runs.
     """
     # Not strict: the choices have type hints of their own.
     return overload(function, jit_options=_LEAN, strict=False, prefer_literal=True)

@@ -65,12 +65,8 @@ def attach_stub(
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """As ``lazy_loader.attach_stub``; a deprecated name gives a DeprecationWarning and its object.
 
-    Args:
-        package: the package's ``__name__``.
-        file: the package's ``__file__``, beside its stub of the public names.
-
-    Returns:
-        The package's ``__getattr__``, ``__dir__`` and ``__all__``.
+    Takes ``__name__`` and ``__file__`` of a package whose stub is next to it; returns its
+    ``__getattr__``, ``__dir__`` and ``__all__``.
     """
     attribute, directory, names = lazy_loader.attach_stub(package, file)
 

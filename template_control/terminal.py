@@ -18,12 +18,9 @@ _UNBOUNDED = 10_000  # columns: no line of a table is cut or wrapped in a file o
 
 
 def plain_console(stderr: bool = False) -> Console:
-    """A console that takes no text for markup or emoji, and wraps lines in a terminal only.
+    """A console that takes no text for markup or emoji.
 
     The names of robots, scenarios and files are a user's: ``[/b]`` or ``:bus:`` is no order.
-
-    Args:
-        stderr: print there, not on standard output.
     """
     console = Console(stderr=stderr, markup=False, emoji=False)
     if not console.is_terminal and "COLUMNS" not in os.environ:
@@ -44,12 +41,9 @@ class Table(table.Table):
 
 
 def bar(console: Console, note: str = "", **options: Any) -> Progress:
-    """Progress bar of tasks that are counted.
+    """Progress bar of tasks that are counted; ``options`` are :class:`rich.progress.Progress`'s.
 
-    Args:
-        console: where it is drawn.
-        note: rich's format of a text after the count, such as ``{task.fields[failed]} failed``.
-        options: of :class:`rich.progress.Progress`.
+    ``note`` is rich's format of a text after the count, such as ``{task.fields[failed]} failed``.
     """
     # Here, because whoever only asks for help should not wait for it.
     from rich.progress import (
@@ -74,12 +68,6 @@ def bar(console: Console, note: str = "", **options: Any) -> Progress:
 
 
 def counted(items: Iterable[T], total: int, text: str) -> Iterator[T]:
-    """The items, with a progress bar on standard error for as long as they last.
-
-    Args:
-        items: to go through, once.
-        total: how many they are.
-        text: in front of the bar.
-    """
+    """The items, once, with a progress bar on standard error; ``text`` is in front of it."""
     with bar(plain_console(stderr=True), transient=True) as progress:
         yield from progress.track(items, total=total, description=text)

@@ -27,9 +27,8 @@ _LOOK_AGAIN = 0.05  # [s]
 class Part(NamedTuple):
     """Compiled functions that are made ready together.
 
-    Attributes:
-        run: calls them, with arguments of the types they are used with; a function of a module.
-        seconds: that compiling them takes, on the machine where all were measured [s].
+    ``run``, a function of a module, calls them with arguments of the types they are used with;
+    ``seconds`` is how long compiling took on the machine where all were measured [s].
     """
 
     run: Callable[[], object]
@@ -42,7 +41,7 @@ class Part(NamedTuple):
 
     @property
     def done(self) -> bool:
-        """Whether a process has compiled it and kept the machine code."""
+        """True if a process has compiled it and kept the machine code."""
         folder = cache_folder()
         return folder is not None and self._mark(folder).exists()
 
@@ -64,10 +63,8 @@ _READY: set[Part] = set()
 def ready(parts: Sequence[Part]) -> None:
     """Have all compiled that ``parts`` call: afterwards a call of it compiles and loads nothing.
 
-    Announces on the standard error what takes longer than a second, once.
-
-    Args:
-        parts: what is called by another part comes after that one.
+    What is called by another part comes after that one. Announces on the standard error what takes
+    longer than a second, once.
     """
     wanted = [part for part in parts if part not in _READY]
     missing = [part for part in wanted if not part.done]

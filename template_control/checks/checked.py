@@ -1,4 +1,4 @@
-"""What a user gives, checked against the types that fields and parameters declare.
+"""Checks of a user's values against the types that fields and parameters declare.
 
 A dataclass that inherits :class:`Checked`, and a function decorated with :func:`checked`, take
 what fits their annotations and refuse the rest in one line. The annotation says the range too::
@@ -62,8 +62,8 @@ def _fields(kind: Any) -> tuple[tuple[str, Any, Callable[[Any], Any]], ...]:
 def checked(function: Callable[P, T]) -> Callable[P, T]:
     """Let a function check its arguments against its annotations.
 
-    What does not fit is a :class:`~.errors.ParameterError`; a wrong number of arguments stays
-    a TypeError.
+    What does not fit is a :class:`~.errors.ParameterError`; a wrong number of arguments stays a
+    TypeError.
     """
     parameters = inspect.signature(function).parameters.values()
     positional = [p.name for p in parameters if p.kind in _POSITIONAL]

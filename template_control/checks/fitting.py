@@ -43,9 +43,7 @@ def shown(value: Any) -> str:
 def inward(low: float, high: float, digits: int = 3) -> str:
     """A range for a message, rounded so that both ends that are printed lie in it.
 
-    Args:
-        low, high: ends of the range.
-        digits: of the larger one.
+    ``digits`` are those of the larger end.
     """
     size = max(abs(low), abs(high))
     step = 10.0 ** (math.floor(math.log10(size)) + 1 - digits) if size > 0.0 else 1.0
@@ -56,7 +54,7 @@ def inward(low: float, high: float, digits: int = 3) -> str:
 
 
 def words_for(hint: Any) -> str:
-    """What fits an annotation, for a message."""
+    """Words for what fits an annotation, for a message."""
     origin, args = get_origin(hint), get_args(hint)
     if origin is Literal:
         return "one of " + ", ".join(dict.fromkeys(repr(x) for x in args))
@@ -100,19 +98,10 @@ class Refused(Exception):
 def check(
     where: str, value: Any, hint: Any, error: type[TemplateControlError] = ParameterError
 ) -> Any:
-    """A value as its annotation wants it.
+    """A value as its annotation wants it: tuples for lists and arrays, plain numbers for NumPy's.
 
-    Args:
-        where: names the value in a message.
-        value: what was given.
-        hint: the annotation, maybe ``Annotated`` with a :class:`Range` or a :class:`Shape`.
-        error: to raise.
-
-    Returns:
-        The value; tuples for lists and arrays, plain numbers for NumPy's.
-
-    Raises:
-        TemplateControlError: of the class ``error``, saying what would fit.
+    ``hint`` may be ``Annotated`` with a :class:`Range` or a :class:`Shape`; ``where`` names the
+    value in the message of ``error``, which says what would fit.
     """
     try:
         return _fit(value, hint)
@@ -125,7 +114,7 @@ _PLANS: dict[int, tuple[Any, Callable[[Any], Any]]] = {}
 
 
 def fitter(hint: Any) -> Callable[[Any], Any]:
-    """What fits values to an annotation as :func:`check` does, but raises :class:`Refused`."""
+    """Function that fits values to an annotation as :func:`check`, but raises :class:`Refused`."""
     known = _PLANS.get(id(hint))
     if known is None:
         known = _PLANS[id(hint)] = hint, _plan(hint)  # held here, its identity stays its own
@@ -310,7 +299,7 @@ def _mapping(value: Any, hint: Any) -> Any:
 
 
 def _kind(hint: Any) -> Any:
-    """What an annotated array is of."""
+    """Type of an annotated array's entries."""
     wanted = get_args(get_args(hint)[1])
     return wanted[0] if wanted and isinstance(wanted[0], type) else np.float64
 
@@ -390,15 +379,8 @@ T = TypeVar("T")
 def asked(method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """Call a method; an error goes up with the name of its class and method.
 
-    An error of this library has them in its message, any other one in a note. A state of the
-    part's own that is not finite is no divergence of the run, but a ParameterError.
-
-    Args:
-        method: of a planner, a route or a task.
-        args, kwargs: its arguments.
-
-    Returns:
-        What the method returns.
+    An error of this library has them in its message, any other one in a note. A planner's, route's
+    or task's own state that is not finite is no divergence of the run, but a ParameterError.
     """
     try:
         return method(*args, **kwargs)
@@ -407,12 +389,7 @@ def asked(method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
 
 
 def blame(error: Exception, method: Callable[..., Any]) -> NoReturn:
-    """Raise an error that came up in a method, as :func:`asked` does.
-
-    Args:
-        error: that is being handled.
-        method: where it came up.
-    """
+    """Raise an error that came up in a method, as :func:`asked` does."""
     if isinstance(error, TemplateControlError):
         kind = ParameterError if isinstance(error, DivergedError) else type(error)
         raise kind(f"{name_of(method)}: {error}") from error
@@ -421,30 +398,14 @@ def blame(error: Exception, method: Callable[..., Any]) -> NoReturn:
 
 
 def answered(kind: type[T], method: Callable[P, Any], *args: P.args, **kwargs: P.kwargs) -> T:
-    """As :func:`asked`, of a method that must return one kind of object.
-
-    Args:
-        kind: of what it returns.
-        method, args, kwargs: as for :func:`asked`.
-
-    Raises:
-        ParameterError: if it returns something else.
-    """
+    """As :func:`asked`; a ParameterError if the method returns another kind of object."""
     return _of_kind(kind, method, asked(method, *args, **kwargs))
 
 
 def answered_or_none(
     kind: type[T], method: Callable[P, Any], *args: P.args, **kwargs: P.kwargs
 ) -> T | None:
-    """As :func:`answered`, of a method that may return None as well.
-
-    Args:
-        kind: of what it returns.
-        method, args, kwargs: as for :func:`asked`.
-
-    Raises:
-        ParameterError: if it returns something else.
-    """
+    """As :func:`answered`, of a method that may return None as well."""
     answer = asked(method, *args, **kwargs)
     return None if answer is None else _of_kind(kind, method, answer)
 
@@ -458,11 +419,7 @@ def _of_kind(kind: type[T], method: Callable[..., Any], answer: Any) -> T:
 
 
 def name_of(method: Callable[..., Any]) -> str:
-    """Class and name of a method, for a message.
-
-    Args:
-        method: bound to its object, as a rule.
-    """
+    """Class and name of a bound method, for a message; of anything else, the object itself."""
     owner = getattr(method, "__self__", None)
     name = getattr(method, "__name__", None)
     return shown(method) if owner is None or name is None else f"{type(owner).__name__}.{name}"

@@ -1,4 +1,4 @@
-"""Which numbers and arrays a field or a parameter takes, for its annotation."""
+"""Ranges of numbers and shapes of arrays, for the annotations of fields and parameters."""
 
 from __future__ import annotations
 
@@ -11,13 +11,10 @@ from numpy.typing import NDArray
 
 
 class Range(NamedTuple):
-    """Which numbers are taken.
+    """Range of numbers; both ends belong to it unless they are said not to.
 
-    Attributes:
-        low, high: ends of the range, both taken.
-        above: whether ``low`` itself is refused.
-        below: whether ``high`` itself is refused.
-        endless: whether inf is taken, where it is an end.
+    ``above`` leaves out ``low`` itself and ``below`` leaves out ``high``; ``endless`` takes inf
+    where it is an end.
     """
 
     low: float = -math.inf
@@ -27,7 +24,7 @@ class Range(NamedTuple):
     endless: bool = False
 
     def holds(self, value: float) -> bool:
-        """Whether a number is in the range."""
+        """True if a number is in the range."""
         if isinstance(value, float) and not math.isfinite(value):
             return self.endless and value in (self.low, self.high)
         over = value > self.low if self.above else value >= self.low
@@ -60,16 +57,14 @@ def _plain(end: float) -> str:
 class Shape(NamedTuple):
     """Size of an array of numbers along its axes; None stands for any.
 
-    Attributes:
-        sizes: one an axis; an Ellipsis at the beginning stands for any axes.
-        finite: whether NaN and inf are refused.
+    An Ellipsis at the beginning of ``sizes`` stands for any axes; ``finite`` refuses NaN and inf.
     """
 
     sizes: tuple[int | EllipsisType | None, ...]
     finite: bool = True
 
     def holds(self, shape: tuple[int, ...]) -> bool:
-        """Whether an array's shape is this one."""
+        """True if an array's shape is this one."""
         sizes = self.sizes
         if shape == sizes:
             return True

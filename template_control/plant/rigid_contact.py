@@ -37,18 +37,9 @@ def solve(
 ) -> tuple[Array, Array]:
     """Solve the system with some of the contacts held.
 
-    Args:
-        mass_matrix: (nv, nv) M.
-        right: (nv,) right-hand side.
-        jacobian: (2, 2, nv) rows x and y of either contact.
-        gamma: (2, 2) x and y of either contact.
-        pressed: indices of the contacts that are held.
-
-    Returns:
-        x (nv,), and f (2, 2), zero for the contacts that are not held.
-
-    Raises:
-        numpy.linalg.LinAlgError: if the contacts' rows depend on each other.
+    ``right`` is (nv,); ``jacobian`` (2, 2, nv) and ``gamma`` (2, 2) have rows x and y of either
+    contact. Returns x (nv,), and f (2, 2), zero for contacts that are not held; a LinAlgError if
+    the held contacts' rows depend on each other.
     """
     held = 0 in pressed, 1 in pressed
     determined, x, force = _solution(mass_matrix, right, jacobian, gamma, held)
@@ -61,12 +52,10 @@ def solve(
 def _solution(
     mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, held: tuple[bool, bool]
 ) -> tuple[bool, Array, Array]:
-    """As :func:`solve`; ``held`` tells of either contact whether it is.
+    """As :func:`solve`; ``held`` says of either contact whether it is.
 
-    With A = J M^-1 J^T: A f = -gamma - J M^-1 right, and x = M^-1 (right + J^T f).
-
-    Returns:
-        Whether the contacts' rows determine f; x and f.
+    With A = J M^-1 J^T: A f = -gamma - J M^-1 right, and x = M^-1 (right + J^T f). The first result
+    is whether the contacts' rows determine f.
     """
     # Number by number: Numba compiles operations on whole arrays for seconds.
     nv, count = right.shape[0], 0
@@ -120,23 +109,11 @@ def pressing(
     gamma: Array,
     touching: Iterable[int],
 ) -> tuple[tuple[int, ...], Array, Array, bool]:
-    """Find which of the touching contacts press: none of them pulls, none of the others sinks.
+    """Contacts among the touching ones that press: none of them pulls, none of the others sinks.
 
-    As many contacts as possible are kept. The function serves accelerations and impacts alike.
-
-    Args:
-        mass_matrix: (nv, nv) M.
-        right: (nv,) right-hand side.
-        jacobian: (2, 2, nv) rows x and y of either contact.
-        gamma: (2, 2) x and y of either contact.
-        touching: indices of the contacts that touch the ground.
-
-    Returns:
-        The contacts that press; x and f as :func:`solve` returns them; and False where every
-        choice would pull or sink. All contacts are then held, whatever they pull.
-
-    Raises:
-        numpy.linalg.LinAlgError: if the contacts' rows depend on each other.
+    As many contacts as possible are kept. Arguments, x and f are those of :func:`solve`, for
+    accelerations and impacts alike. The last result is False where every choice would pull or sink:
+    all contacts are then held, whatever they pull.
     """
     touching = tuple(touching)
     for held in _subsets(touching):
@@ -159,12 +136,7 @@ def _subsets(items: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
 
 
 class RollingFeet:
-    """The feet of a robot over a terrain, at the robot's last update.
-
-    Args:
-        robot: whose feet.
-        terrain: below them.
-    """
+    """The feet of a robot over a terrain, at the robot's last update."""
 
     def __init__(self, robot: PlanarBiped, terrain: Terrain) -> None:
         self._robot = robot
@@ -182,20 +154,16 @@ class RollingFeet:
         return np.array([closest.distance - radius for closest in found])
 
     def meet(self, foot: int, q: Array) -> None:
-        """Let a foot hold where it is now.
-
-        Args:
-            foot: its index.
-            q: (nv,) the robot's configuration.
-        """
+        """Let a foot hold where it is now, at the configuration q (nv,)."""
         closest = self._terrain.closest(*self._centre(foot).tolist())
         x, y = closest.normal
         self._axes[foot] = (y, -x), (x, y)
         self._anchor[foot] = self._held(foot, q) - (0.0, closest.distance)
 
     def rows(self) -> tuple[Array, Array]:
-        """Jacobians (2, 2, nv) of the material points that touch, along and out of the plane of
-        each foot, and their dJ/dt v (2, 2) [m/s^2].
+        """Jacobians (2, 2, nv) of the material points that touch, and their dJ/dt v (2, 2) [m/s^2].
+
+        Rows are along and out of the plane of each foot.
         """
         r = self._robot
         found: tuple[Array, Array] = _rows(
@@ -204,20 +172,11 @@ class RollingFeet:
         return found
 
     def errors(self, foot: int, q: Array) -> Array:
-        """(2,) how far a foot is from where it holds, along and out of its plane [m].
-
-        Args:
-            foot: its index.
-            q: (nv,) the robot's configuration.
-        """
+        """(2,) distance of a foot from where it holds, along and out of its plane [m]."""
         return self._held(foot, q) - (0.0, self._robot.foot_radius) - self._anchor[foot]
 
     def in_world(self, force: Array) -> Array:
-        """(2, 2) x and y of what is given along and out of each foot's plane.
-
-        Args:
-            force: (2, 2) along and out of it.
-        """
+        """(2, 2) x and y of what is given (2, 2) along and out of each foot's plane."""
         return np.einsum("fi,fij->fj", force, self._axes)
 
     def _centre(self, foot: int) -> Array:
@@ -225,10 +184,7 @@ class RollingFeet:
         return np.asarray(r.foot_position[foot] + (0.0, r.foot_radius))
 
     def _held(self, foot: int, q: Array) -> Array:
-        """(2,) where a sphere's centre is along its plane, less what it has rolled, and out of it.
-
-        Arguments as for :meth:`errors`.
-        """
+        """(2,) a sphere's centre along its plane, less what it rolled, and out of it [m]."""
         r = self._robot
         rolled = r.foot_radius * float(r.foot_turning[foot] @ q)
         return np.asarray(self._axes[foot] @ self._centre(foot) - (rolled, 0.0))
@@ -240,9 +196,9 @@ def _rows(
 ) -> tuple[Array, Array]:
     """Rows as :meth:`RollingFeet.rows` returns them.
 
-    ``axes`` (2, 2, 2) are along and out of each foot's plane; ``lowest`` (2, 2, nv) is the
-    Jacobian of each sphere's lowest point, ``turning`` (2, nv) of its angle, and ``bias`` (2, 2)
-    the point's dJ/dt v.
+    ``axes`` (2, 2, 2) are along and out of each foot's plane; ``lowest`` (2, 2, nv) is the Jacobian
+    of each sphere's lowest point, ``turning`` (2, nv) of its angle, and ``bias`` (2, 2) the point's
+    dJ/dt v.
     """
     jacobian, rates = np.empty_like(lowest), np.empty((2, 2))
     for foot in range(2):

@@ -39,10 +39,8 @@ Points = tuple[tuple[Place, Height], ...]
 class Closest(NamedTuple):
     """The ground's surface seen from a point.
 
-    Attributes:
-        distance: to the surface, negative inside the ground [m].
-        normal: (x, y) of unit length, out of the ground: from the surface's closest point to the
-            point itself.
+    ``distance`` to it is negative inside the ground [m]; ``normal`` (x, y), of unit length, is out
+    of the ground, from the surface's closest point to the point itself.
     """
 
     distance: float
@@ -261,11 +259,7 @@ class Terrain(Checked):
 
 
 def _check_count(points: float) -> None:
-    """Refuse ground of more points than an engine takes; before they are made.
-
-    Args:
-        points: how many, about.
-    """
+    """Refuse ground of more points than an engine takes, before they are made."""
     if points > _MOST_POINTS:
         raise ParameterError(
             f"the ground has about {points:.3g} points: give fewer or longer pieces, of at most"
@@ -326,7 +320,7 @@ class Piece(NamedTuple):
     """A box of ground.
 
     Attributes:
-        centre: x, y across the way, and height [m].
+        centre: x, y (across the way), and height [m].
         half_sides: along its own axes [m].
         pitch: its turn about +y, forward down positive [rad].
         friction: its coefficient; None: that of the plant's options.
@@ -339,14 +333,10 @@ class Piece(NamedTuple):
 
 
 def pieces(terrain: Terrain) -> tuple[float, list[Piece]]:
-    """Height of a plane, and the boxes of ground that stand out of it.
+    """Height of a plane, and the boxes of ground that stand out of it, in the order of x.
 
-    Args:
-        terrain: whose ground.
-
-    Returns:
-        The height, which is the ground's lowest where its friction is everywhere the same; and
-        the boxes in the order of x: one for a level line, for a slope a plate and one below it.
+    The plane is at the ground's lowest where its friction is everywhere the same. A level line has
+    one box, a slope a plate and a box below it.
     """
     lowest = min(y for _, y in terrain.points)
     base = lowest - _DEPTH
