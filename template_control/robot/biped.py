@@ -1,4 +1,4 @@
-"""What controller, whole-body QP and plants read of a robot, held in its plane or free."""
+"""Robot terms that controller, whole-body QP and plants read, held in its plane or free."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ class FiveLink(Checked):
         return urdf_of(self.name, parts)
 
     def hip_place(self, side: str) -> str:
-        """Where a hip is in the trunk, as URDF text.
+        """Place of a hip in the trunk, as URDF text.
 
         Args:
             side: of :data:`SIDES`.
@@ -239,7 +239,7 @@ def joint(
 
 @dataclass(frozen=True)
 class HipBlock(Checked):
-    """What is between trunk and thigh: a ball about the hip, turned by the ab-/adduction's motor.
+    """Link between trunk and thigh: a ball about the hip, turned by the ab-/adduction's motor.
 
     Attributes:
         mass: [kg].

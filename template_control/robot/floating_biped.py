@@ -325,7 +325,7 @@ class FloatingBaseBiped(Biped):
         return self.roll_pitch_yaw()[1], float(self.space.turning[1])
 
     def roll_pitch_yaw(self) -> tuple[float, float, float]:
-        """How the trunk stands in the heading frame, at the last update [rad].
+        """Attitude of the trunk in the heading frame, at the last update [rad].
 
         Roll and pitch are the angles of its upward axis from the vertical, about the heading
         frame's x and y; yaw is that of its forward axis about the vertical.

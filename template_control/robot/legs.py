@@ -45,8 +45,7 @@ def straight_legs(
     """The configuration with straight legs, from a model whose neutral trunk is upright.
 
     ``legs`` are Pinocchio's joints from the trunk on, the last two hip and knee; ``feet`` are
-    frames.
-    Joints above the hip are turned until its axis is lateral, if they can.
+    frames. Joints above the hip are turned until its axis is lateral, if they can.
     """
     data, q = model.createData(), pin.neutral(model)
     for leg in legs:

@@ -19,7 +19,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 @dataclass(frozen=True)
 class _Entry:
-    """Where a robot's URDF is, and how it is loaded.
+    """A robot's URDF and how it is loaded.
 
     Attributes:
         file: name of the URDF.

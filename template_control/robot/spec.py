@@ -1,4 +1,4 @@
-"""Which robot, as data."""
+"""Specification of a robot, as data."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from template_control.robot.planar_biped import PlanarBiped
 
 @dataclass(frozen=True)
 class RobotSpec(Checked):
-    """Which robot; what a URDF of one's own may need is as in :meth:`PlanarBiped.from_urdf`.
+    """Robot and its changes; a URDF of one's own may need those of :meth:`PlanarBiped.from_urdf`.
 
     Attributes:
         model: a shipped robot, or the path of a URDF.

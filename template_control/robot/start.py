@@ -29,7 +29,7 @@ _OUTPUTS = 7  # CoM (2), trunk (1), both feet (4)
 
 @dataclass(frozen=True)
 class Pose(Checked):
-    """Where the CoM and the feet are, and how they move.
+    """Positions and velocities of the CoM and the feet, in the plane.
 
     Attributes:
         com, com_velocity: (2,) of the CoM [m, m/s].
@@ -41,8 +41,8 @@ class Pose(Checked):
         pitch: of the trunk [rad].
         angular_momentum: about the CoM [N m s]; the trunk turns so that the robot has it. None: the
             trunk is at rest.
-        momentum_speed: dx/dt of the CoM is meant to include the angular momentum about the
-            CoM: it is the momentum about the foot below, over m y.
+        momentum_speed: dx/dt of the CoM is meant to include the angular momentum about the CoM: it
+            is the momentum about the foot below, over m y.
     """
 
     com: Pair
@@ -58,12 +58,12 @@ class Pose(Checked):
 
 @dataclass(frozen=True)
 class FloatingBasePose(Checked):
-    """Where the CoM and the feet are, and how they move; in the heading frame, trunk upright.
+    """Positions and velocities of the CoM and the feet; in the heading frame, trunk upright.
 
     Attributes:
         com: (3,) of the CoM [m].
-        com_velocity: (3,) m/s; with the angular momentum about the CoM, as if it moved the CoM:
-            m z times it is the momentum about the point on the ground below.
+        com_velocity: (3,) m/s; with the angular momentum about the CoM, as if it moved the CoM: m z
+            times it is the momentum about the point on the ground below.
         feet: (2, 3) lowest points of rear and front foot [m].
         feet_velocity: (2, 3) [m/s].
         rear: the foot that is the rear leg's.
@@ -173,8 +173,7 @@ def _bent_to(
     """(nq,) configuration of a pose, with knees bent as their ranges allow.
 
     ``solve`` finds the pose from a configuration with bent legs by steps of a largest length [rad,
-    m],
-    or None; ``longest`` are the lengths to try, ``height`` is of the CoM, for the message.
+    m], or None; ``longest`` are the lengths to try, ``height`` is of the CoM, for the message.
     """
     beyond = ""
     low, high = robot.joint_range.T

@@ -41,8 +41,7 @@ def joint_reserve(q: Array, speeds: Array, limits: Array, ranges: Array) -> tupl
     """Largest share of its limit that a joint's speed has, and the soonest arrival at a stop [s].
 
     The latter is 0 of a joint that is at its stop, inf where none moves. ``q`` ends in the nu
-    angles;
-    ``speeds``, ``limits`` (nu,) [rad/s]; ``ranges`` (nu, 2) [rad].
+    angles; ``speeds``, ``limits`` (nu,) [rad/s]; ``ranges`` (nu, 2) [rad].
     """
     fastest, soonest = 0.0, np.inf
     first = q.shape[0] - speeds.shape[0]
@@ -96,9 +95,7 @@ def planar_sources(
     radius: float,
     limits: tuple[Array, Array],
 ) -> PlanarSources:
-    """Views of what :func:`gather_planar` reads; ``limits``: (nu,) speeds [rad/s], (nu, 2) stops
-    [rad].
-    """
+    """Views that :func:`gather_planar` reads; ``limits``: (nu,) [rad/s], (nu, 2) stops [rad]."""
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.nle, data.g)
     jacobians = (data.Jcom, data.Ag, data.J)
     feet = tuple(data.oMf[frame].translation for frame in frames)
@@ -227,8 +224,7 @@ def gather_floating(
     """Write the terms at the state that Pinocchio has last computed.
 
     As :func:`gather_planar`; ``frame`` (4,) is the heading frame's: x and y of its origin in the
-    world
-    [m], cosine and sine of the heading. Returns whether the state is finite, and
+    world [m], cosine and sine of the heading. Returns whether the state is finite, and
     :func:`joint_reserve`'s two numbers.
     """
     vectors, matrices, feet, (carries, constants, limit, stops) = views

@@ -77,8 +77,7 @@ def lock(
     """Hold all joints but the ``moving`` ones, where ``locked`` says [rad, m] or at 0.
 
     A joint that mimics a locked one and is not named itself is held at its multiple; a RobotError
-    if
-    one that is not named mimics one that moves.
+    if one that is not named mimics one that moves.
     """
     joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
     places: dict[str, float] = dict(locked)
@@ -165,8 +164,7 @@ def spheres(
     """Leave collision shapes to the feet alone, and give them spheres of this radius [m].
 
     None keeps the feet's own shapes; ``offset`` (3,) [m] is from the links' origins, in their axes.
-    A
-    RobotError if the radius is not positive, or an offset comes without it.
+    A RobotError if the radius is not positive, or an offset comes without it.
     """
     if radius is not None and not 0.0 < radius < np.inf:
         raise RobotError(f"foot_radius is {radius!r} m: give a positive number")
@@ -192,11 +190,9 @@ def find_meshes(path: Path, robot: ET.Element) -> None:
     """Write absolute paths of meshes into a URDF, so that its text can be read from anywhere.
 
     A relative name counts from the URDF's folder; that of a package counts from each folder above
-    it,
-    with and without the package's name, and from those of the environment variable
+    it, with and without the package's name, and from those of the environment variable
     ``ROS_PACKAGE_PATH``. A visual whose mesh is missing is left out, and the log says so once: it
-    is
-    not needed to walk. Of a collision shape it is a RobotError.
+    is not needed to walk. Of a collision shape it is a RobotError.
     """
     missing = []
     for link in robot.findall("link"):
@@ -353,7 +349,7 @@ def gather_inertias(robot: ET.Element) -> None:
 
 
 def _placement(element: ET.Element | None) -> pin.SE3:
-    """Where the ``<origin>`` of a joint or of an ``<inertial>`` is."""
+    """Frame of the ``<origin>`` of a joint or of an ``<inertial>``."""
     origin = None if element is None else element.find("origin")
     if origin is None:
         return pin.SE3.Identity()
