@@ -25,12 +25,7 @@ REFERENCE = SlipParameters()
 
 
 class Dimension(NamedTuple):
-    """What a number is measured in; angles, shares and counts have no dimension.
-
-    Attributes:
-        length: power of metres.
-        time: power of seconds.
-    """
+    """Dimension of a number: powers of metres and seconds; angles, shares and counts have none."""
 
     length: int = 0
     time: int = 0
@@ -58,12 +53,10 @@ _KEY = "dimension"
 
 
 def tuned(default: T, *dimensions: Dimension) -> T:
-    """A field of an options class, with its dimension.
+    """A field of an options class, with its dimension and its default for the reference template.
 
-    Args:
-        default: value for the reference template, a number or a tuple.
-        dimensions: of the number; of a tuple one for all its entries, or one each. An entry
-            that is a tuple itself has the dimension of its place in the outer one.
+    Of a tuple there is one dimension for all its entries, or one each; an entry that is a tuple
+    itself has the dimension of its place in the outer one.
     """
     found: T = field(default=default, metadata={_KEY: dimensions or (NUMBER,)})
     return found
@@ -103,17 +96,14 @@ class Scale(Checked):
         return np.array([self.speed, self.length, self.speed])
 
     def factor(self, dimension: Dimension) -> float:
-        """What a number of this dimension is multiplied by."""
+        """Factor of a number of this dimension."""
         return float(self.length**dimension.length * self.time**dimension.time)
 
 
 def scaled(options: T, scale: Scale) -> T:
-    """The same tuning for a template of another size.
+    """The same tuning for a template of another size, whose ``scale`` it is.
 
-    Args:
-        options: a dataclass whose tuned fields come from :func:`tuned`. Fields that are
-            dataclasses, or tuples or mappings of such, are scaled too.
-        scale: of that template.
+    Fields from :func:`tuned` are scaled, also those of dataclasses in fields, tuples or mappings.
     """
     changes: dict[str, Any] = {}
     for f in fields(options):  # type: ignore[arg-type]

@@ -61,9 +61,7 @@ FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
 def walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
     """VLO -> touchdown -> virtual bottom -> rear liftoff -> VLO.
 
-    Args:
-        gait: kind of its stride.
-        rear: stiffnesses of the rear leg in double stance, before and after the bottom.
+    ``rear`` are slots of the rear leg's stiffness in double stance, before and after the bottom.
     """
     return (
         Node(

@@ -116,7 +116,7 @@ MAX_EDGES = 8
 
 
 class Reset(IntEnum):
-    """What happens to the toes when an edge is taken.
+    """Change of the toes when an edge is taken.
 
     ``PLACE_REAR`` and ``PLACE_FRONT`` put a toe where the stretched leg at the touchdown
     angle meets the ground, x + l0 cos(alpha); ``SHIFT`` makes the front toe the rear one;
@@ -131,7 +131,7 @@ class Reset(IntEnum):
 
 
 class Outcome(IntEnum):
-    """How a stride ended: at its section, or why it did not."""
+    """End of a stride: at its section, or the reason why not."""
 
     SECTION = 0
     FALL = 1
@@ -159,7 +159,7 @@ _REASONS = {
 
 
 class MapKind(IntEnum):
-    """Which solution of the stance dynamics a return map is made of.
+    """Solution of the stance dynamics that a return map is made of.
 
     ``EXACT``: event-exact integration. The others are closed forms of Section III:
     ``PAPER`` as published, ``IMPROVED`` with one deferred correction and conserved energy,

@@ -32,16 +32,16 @@ class Design:
     Attributes:
         stride: key of ``STRIDE_START``.
         free: the controls that it chooses.
-        axes: values over whose product the search begins, by the controls that share them
-            [deg, k0]. All other controls are 70 deg and k0.
-        dense: whether that grid shows every minimum; then only a guess that reaches the target
-            is taken without looking at it.
-        angles: bounds of the touchdown angle [deg]: a flatter leg would need a friction
-            coefficient over 1 to land on, a vertical one would make no step.
+        axes: values over whose product the search begins, by the controls that share them [deg,
+            k0]. All other controls are 70 deg and k0.
+        dense: whether that grid shows every minimum; then only a guess that reaches the target is
+            taken without looking at it.
+        angles: bounds of the touchdown angle [deg]: a flatter leg would need a friction coefficient
+            over 1 to land on, a vertical one would make no step.
         stiffnesses: bounds of the leg stiffnesses [k0]; wide, as they only keep the search from
             running away.
-        seeds: how many of the grid's best points are searched from; the nearest minimum need
-            not be the best, and each seed takes a search.
+        seeds: how many of the grid's best points are searched from; the nearest minimum need not be
+            the best, and each seed takes a search.
     """
 
     stride: str

@@ -28,19 +28,14 @@ _SECTION = int(Outcome.SECTION)
 
 
 class Aim(NamedTuple):
-    """What a step is to reach, and with what.
-
-    Attributes:
-        target: (3,) dx/dt, y, dy/dt wanted at the next VLO [m/s, m, m/s].
-        stiffness_range: (2,) bounds of kappa_2 [N/m].
-    """
+    """Target (3,) of a step, dx/dt, y, dy/dt at the next VLO, and bounds (2,) of kappa_2."""
 
     target: Array
     stiffness_range: Array
 
 
 class AngleSearch(NamedTuple):
-    """How :func:`search_angle` looks for the touchdown angle.
+    """Parameters of :func:`search_angle`.
 
     Attributes:
         nominal: angle of the step after the first [rad].
@@ -48,9 +43,9 @@ class AngleSearch(NamedTuple):
         kappa_1: stiffness before the virtual bottom [N/m].
         coarse, fine: angles of the first grid, over all of the range, and of each later one.
         grids: how many, each about the best angle of the one before.
-        narrowing: half-width of a grid over the spacing of the one before: under 1, so that
-            its outer angles are not those just tried.
-        second_weight: of the squared residual after the second step beside the first's; small,
+        narrowing: half-width of a grid over the spacing of the one before: under 1, so that its
+            outer angles are not those just tried.
+        second_weight: of the squared residual after the second step, the first's counting 1; small,
             as the first is to reach the target.
         failure: counts in place of it where the second step fails [m^2/s^2]; more than any
             residual, so that a step after which the template walks on goes before.
@@ -81,11 +76,8 @@ def energy_stiffness(
 ) -> float:
     """Stiffness kappa_2 after the virtual bottom, equation (38) [N/m].
 
-    Args:
-        z, target: (3,) dx/dt, y, dy/dt at this VLO and wanted at the next.
-        front_length, rear_length: of the legs at the virtual bottom [m].
-        kappa_1: stiffness before the virtual bottom [N/m].
-        model: the template.
+    ``z``, ``target`` (3,) are dx/dt, y, dy/dt at this VLO and wanted at the next; lengths are the
+    legs' at the virtual bottom [m], before which the stiffness is ``kappa_1`` [N/m].
     """
     rest_length = model.rest_length
     mu_1 = (rest_length - target[1]) ** 2
@@ -106,15 +98,10 @@ def modified_step(
     scratch: Scratch,
     result: Array,
 ) -> int:
-    """One step with kappa_2 of (38), kept within its bounds.
+    """One step with kappa_2 of (38), kept within its bounds; returns the Outcome's value.
 
-    Args:
-        aim: the VLO state wanted, and the bounds.
-        controls: (NUM_SLOTS,) touchdown angle and kappa_1; kappa_2 is overwritten.
-        The rest as in :func:`~template_control.slip.maps.return_map.one_stride`.
-
-    Returns:
-        The Outcome's value.
+    As :func:`~template_control.slip.maps.return_map.one_stride`; ``controls`` have touchdown angle
+    and kappa_1, and kappa_2 is overwritten.
     """
     stiffness_range = aim.stiffness_range
     # The first pass finds the virtual bottom, which kappa_2 does not influence.
@@ -138,8 +125,7 @@ def modified_many(
 ) -> tuple[Array, IntArray]:
     """As :func:`modified_step`, from one state with rows of ``controls`` (n, NUM_SLOTS).
 
-    Returns:
-        (n, RESULTS) results and (n,) values of the outcomes.
+    Returns (n, RESULTS) results and (n,) values of the outcomes.
     """
     count = controls.shape[0]
     result, outcome = np.empty((count, RESULTS)), np.empty(count, np.int64)
@@ -160,16 +146,10 @@ def search_angle(
 ) -> tuple[int, float, float, float]:
     """Touchdown angle whose step ends nearest ``target``, equations (36) and (37).
 
-    A step is judged with the one after it (at the nominal angle), so that of two poor steps
-    the one is taken from which the gait can be reached.
-
-    Args:
-        search: which angles, and what counts.
-        z_next: (3,) overwritten with the VLO state after the step.
-        The rest as in :func:`modified_step`.
-
-    Returns:
-        Outcome, alpha [rad], kappa_2 [N/m], squared residual of the first step.
+    A step is judged with the one after it (at the nominal angle), so that of two poor steps the one
+    is taken from which the gait can be reached. ``z_next`` (3,) is overwritten with the VLO state
+    after the step; the rest as in :func:`modified_step`. Returns outcome, alpha [rad], kappa_2
+    [N/m] and the squared residual of the first step.
     """
     z1, z2, u = np.empty(RESULTS), np.empty(RESULTS), np.zeros(NUM_SLOTS)
     target, nominal, kappa_1 = aim.target, search.nominal, search.kappa_1
@@ -205,15 +185,8 @@ def search_angle(
 class ModifiedMap:
     """The VLO return map with kappa_2 by (38), for :class:`~.step_solver.StepProblem`.
 
-    Args:
-        parameters: the template.
-        kind: of return map.
-        stiffness_range: bounds of kappa_2 [N/m].
-
-    Attributes:
-        target: (3,) VLO state whose energy kappa_2 aims at.
-
-    The methods overwrite kappa_2 in the controls they are given.
+    The methods overwrite kappa_2 [N/m], kept in ``stiffness_range``, in the controls they are
+    given; it aims at the energy of ``target``, a (3,) VLO state.
     """
 
     dimensions = (3, 3)

@@ -42,12 +42,9 @@ class StepSolution:
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Which controls are free, and between which bounds.
+    """Free slots of the control vector, with ``lower`` and ``upper`` bounds (n,) [rad, N/m].
 
-    Attributes:
-        slots: the free slots of the control vector.
-        lower, upper: (len(slots),) bounds [rad, N/m].
-        scale: (len(slots),) changes of each that count as equally large [rad, N/m].
+    ``scale`` (n,) are changes of each that count as equally large [rad, N/m].
     """
 
     slots: tuple[Slot, ...]
@@ -57,51 +54,33 @@ class Unknowns:
 
 
 class Step(Protocol):
-    """What a controller needs of a return map; ``ReturnMap`` is one.
+    """Return map as a controller needs it; ``ReturnMap`` is one.
 
     ``evaluate`` and ``derivatives`` may complete the controls they are given in place.
-
-    Attributes:
-        parameters: the template.
-        dimensions: sizes n and m of the states at the sections a stride starts from and ends at.
+    ``dimensions`` are the sizes n and m of the states at the sections a stride starts from and ends
+    at.
     """
 
     parameters: SlipParameters
     dimensions: tuple[int, int]
 
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
-        """Map one stride.
+        """One stride from z (n,) with controls u (NUM_SLOTS,), by Slot [rad, N/m].
 
-        Args:
-            z: (n,) state at the section it starts from.
-            u: (NUM_SLOTS,) controls; touchdown angle [rad] and stiffnesses [N/m] by Slot.
-
-        Returns:
-            (RESULTS,) as of :func:`~template_control.slip.maps.return_map.section_map`; how the
-            stride ended.
+        Returns (RESULTS,) of :func:`~template_control.slip.maps.return_map.section_map`, and its
+        outcome.
         """
 
     def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
-        """Map strides from one state with many controls.
+        """Strides from one state z (n,) with rows u (count, NUM_SLOTS) of controls.
 
-        Args:
-            z: (n,) state at the section that all of them start from.
-            u: (count, NUM_SLOTS) controls, a row for each stride.
-
-        Returns:
-            (count, RESULTS) as :meth:`evaluate`; (count,) values of the strides' outcomes.
+        Returns (count, RESULTS) as :meth:`evaluate`, and (count,) values of the outcomes.
         """
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
-        """Map one stride, with chosen derivatives.
+        """One stride as :meth:`evaluate`, with (RESULTS, c) derivatives before the outcome.
 
-        Args:
-            z: (n,) state at the section it starts from.
-            u: (NUM_SLOTS,) controls.
-            columns: (c,) what to differentiate by: 3 + slot for a control.
-
-        Returns:
-            (RESULTS,) as :meth:`evaluate`; its (RESULTS, c) derivatives; how the stride ended.
+        ``columns`` (c,) are what to differentiate by: 3 + slot for a control.
         """
 
 
@@ -146,10 +125,8 @@ class StepProblem:
     def solve(self, z: Array, target: Array, starts: Sequence[Array]) -> StepSolution:
         """Best controls found from ``starts``, tried in turn until one is acceptable.
 
-        Args:
-            z: (n,) state at the section.
-            target: (m,) state wanted at the next.
-            starts: control vectors (NUM_SLOTS,) to begin from; fixed controls are theirs.
+        ``z`` (n,) is the state at the section, ``target`` (m,) is wanted at the next; the fixed
+        controls are those of the starts (NUM_SLOTS,).
         """
         self._set(target)
         best: StepSolution | None = None
@@ -166,15 +143,10 @@ class StepProblem:
         return best
 
     def costs(self, z: Array, target: Array, grid: Array) -> Array:
-        """Squared errors of the stride with each of many controls.
+        """(count,) weighted squared errors, as in (36), of the rows of ``grid`` (count, NUM_SLOTS).
 
-        Args:
-            z: (n,) state at the section.
-            target: (m,) state wanted at the next.
-            grid: (count, NUM_SLOTS) controls, a row for each stride.
-
-        Returns:
-            (count,) weighted sums of squared errors, as in (36); inf where the stride fails.
+        ``z`` (n,) is the state at the section, ``target`` (m,) is wanted at the next; inf where the
+        stride fails.
         """
         self._set(target)
         results, outcomes = self.step.evaluate_many(z, grid)

@@ -32,14 +32,9 @@ _NEWTON = 6
 
 @inner
 def polar(x: float, y: float) -> tuple[float, float]:
-    """Radius and angle of a point above the ground; a complex step goes through both.
+    """Radius [m] and angle from forward horizontal [rad] of a point above the ground.
 
-    Args:
-        x: horizontal distance from the pivot [m].
-        y: height over it, positive [m].
-
-    Returns:
-        The radius [m]; the angle, from forward horizontal [rad].
+    ``x`` and the positive ``y`` are its place from the pivot [m]; a complex step goes through both.
     """
     angle = np.arctan2(y.real, x.real)
     # The first-order term carries a complex step; it is zero for real numbers.
@@ -53,13 +48,8 @@ def axial_torsional(
 ) -> tuple[float, float, float]:
     """AT-SLIP that stands in for two legs: (18) to (25), with the notes' reading of (23).
 
-    Args:
-        spread: c, distance of the toes [m].
-        stiffness: of either leg [N/m].
-        mass, gravity, rest_length: SI.
-
-    Returns:
-        k_r [N/m], l_r0 [m], k_t [N m/rad].
+    ``spread`` is c, the distance of the toes [m], ``stiffness`` that of either leg [N/m]. Returns
+    k_r [N/m], l_r0 [m], k_t [N m/rad].
     """
     half = 0.25 * spread * spread
     weight = mass * gravity
@@ -81,12 +71,10 @@ def axial_torsional(
 
 
 class Launch(NamedTuple):
-    """Where a stance phase begins, in polar coordinates.
+    """Start of a stance phase, in polar coordinates.
 
-    Attributes:
-        pivot: x of their origin [m].
-        r, theta: the CoM [m, rad].
-        radial_speed: dr/dt [m/s].
+    ``pivot`` is x of their origin [m], ``r`` and ``theta`` are the CoM's [m, rad], ``radial_speed``
+    is dr/dt [m/s].
     """
 
     pivot: float
@@ -134,11 +122,8 @@ def harmonic(
 def momentum_changes(a: Array, t: float, gravity: tuple[float, float], torsion: float) -> float:
     """Change of p/m over [0, t] by gravity (12), (13) and the torsional spring (27).
 
-    Args:
-        a: (12,) the first iteration's path.
-        t: end of the phase [s].
-        gravity: into the ground, and what acts along it, backward positive [m/s^2].
-        torsion: k_t / m, 0 in single stance.
+    ``a`` (12,) is the first iteration's path; ``gravity`` acts into the ground, and along it,
+    backward positive [m/s^2]; ``torsion`` is k_t / m, 0 in single stance.
     """
     w, l1, l2 = a[5], a[2], a[3]
     s, c = np.sin(w * t), np.cos(w * t)
@@ -179,7 +164,7 @@ def corrected(
     model: Model,
     out: Array,
 ) -> float:
-    """Improve the path ``a`` in place by one deferred correction; p/m at ``t``.
+    """Improve the path ``a`` in place by one deferred correction; p/m at ``t`` [m^2/s].
 
     The true radial acceleration and torque at the start, middle and end of the first path
     differ from what it assumes by a defect; a quadratic in time through the three is added
@@ -193,9 +178,6 @@ def corrected(
         toes, stiffness: (2,) of the legs; stiffness 0 for one in the air.
         model: the template.
         out: (6,) scratch.
-
-    Returns:
-        p/m at ``t`` [m^2/s].
     """
     mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
     along = backward(model, stiffness)
@@ -380,14 +362,9 @@ def closed_form_stride(
     controls: Array,
     scratch: Scratch,
 ) -> int:
-    """As :func:`~.kernel.run_stride`, with one closed-form map a phase.
+    """As :func:`~.kernel.run_stride`, with one closed-form map a phase; the Outcome's value.
 
-    Args:
-        map_kind: value of a MapKind other than EXACT.
-        The rest as in :func:`~.kernel.run_stride`; ``state`` and ``toes`` are overwritten.
-
-    Returns:
-        The Outcome's value.
+    ``map_kind`` is the value of a MapKind other than EXACT; ``state`` and ``toes`` are overwritten.
     """
     tables, model, node = kernel.tables, model_of(kernel), kernel.node
     alpha = controls[0]

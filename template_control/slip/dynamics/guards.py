@@ -117,14 +117,10 @@ _REST = int(Event.REST)
 def guard(
     event: int, state: Array, toes: Array, rest_length: float, touchdown_height: float
 ) -> float:
-    """Value of a guard of ``Event``; it fires when it rises through 0.
+    """Value of the guard of an Event (by its value); it fires when it rises through 0.
 
-    Args:
-        event: value of the Event.
-        state: (4 or more,) x, y, dx/dt, dy/dt [m, m/s].
-        toes: (2,) x of rear and front toe [m].
-        rest_length: l0 [m].
-        touchdown_height: l0 sin(alpha) [m].
+    ``state`` (4 or more,) is x, y, dx/dt, dy/dt [m, m/s], ``toes`` (2,) x of rear and front toe
+    [m]; ``rest_length`` is l0, ``touchdown_height`` l0 sin(alpha) [m].
     """
     x, y, u, v = state[0], state[1], state[2], state[3]
     if event == _TOUCHDOWN:
@@ -154,16 +150,10 @@ def guard(
 def all_guards(
     state: Array, toes: Array, rest_length: float, touchdown_height: float, values: Array
 ) -> None:
-    """Write the real parts of all guards at once into ``values``.
+    """Write the real parts of all guards at once into ``values`` (NUM_EVENTS,), by Event.
 
-    There is no branch in it, which makes it faster than :func:`guard` for a few of them.
-
-    Args:
-        state: (4 or more,) x, y, dx/dt, dy/dt [m, m/s].
-        toes: (2,) x of rear and front toe [m].
-        rest_length: l0 [m].
-        touchdown_height: l0 sin(alpha) [m].
-        values: (NUM_EVENTS,) overwritten, by Event.
+    There is no branch in it, which makes it faster than :func:`guard` for a few of them. The rest
+    as for :func:`guard`.
     """
     x, y, u, v = state[0].real, state[1].real, state[2].real, state[3].real
     rear, front = x - toes[0].real, x - toes[1].real
@@ -219,10 +209,8 @@ def all_bends(
 def guard_rate(event: int, path: Array, toes: Array) -> float:
     """Time derivative of a guard along a path.
 
-    Args:
-        event: value of the Event.
-        path: (6,) x, y and their first and second derivatives.
-        toes: (2,) x of rear and front toe [m].
+    ``path`` (6,) is x, y and their first and second derivatives, ``toes`` (2,) x of rear and front
+    toe [m].
     """
     x, y, u, v = path[0], path[1], path[2], path[3]
     if event in (_TOUCHDOWN, _FALL):

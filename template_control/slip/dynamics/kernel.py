@@ -94,12 +94,8 @@ def new_scratch(dtype: type[float] | type[complex] = float) -> Scratch:
 def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha: float) -> None:
     """Move the toes as a reset of the automaton says.
 
-    Args:
-        reset: value of the Reset.
-        state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s].
-        toes: (2,) x of rear and front toe [m], overwritten.
-        rest_length: l0 [m].
-        alpha: touchdown angle, from the ground to the leg [rad].
+    ``state`` (4,) is x, y, dx/dt, dy/dt of the CoM [m, m/s]; ``toes`` (2,), x of rear and front toe
+    [m], are overwritten; ``alpha`` is the touchdown angle, from the ground to the leg [rad].
     """
     if reset == _PLACE_REAR:
         toes[0] = state[0] + rest_length * np.cos(alpha)
@@ -114,13 +110,10 @@ def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha
 
 @inner
 def note_bottom(event: int, state: Array, toes: Array, bottom: Array) -> None:
-    """Take note of the legs' lengths if the event is a bottom, virtual or not.
+    """Write the legs' lengths (2,) [m] into ``bottom`` if the event is a bottom, virtual or not.
 
-    Args:
-        event: value of the Event that fires.
-        state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s].
-        toes: (2,) x of rear and front toe [m].
-        bottom: (2,) lengths of rear and front leg [m], overwritten at a bottom only.
+    ``state`` (4,) is x, y, dx/dt, dy/dt of the CoM [m, m/s], ``toes`` (2,) x of rear and front toe
+    [m].
     """
     if event in (_BOTTOM, _VIRTUAL_BOTTOM):
         for leg in range(2):
@@ -149,8 +142,8 @@ def run_stride(
     ``state``, ``toes``, ``controls`` and ``scratch`` are all real or all complex.
 
     Returns:
-        Outcome, last node (the one entered, where the section was reached), number of
-        segments, number of events, duration [s].
+        Outcome, last node (the one entered, where the section was reached), number of segments,
+            number of events, duration [s].
     """
     tables, model, node = kernel.tables, model_of(kernel), kernel.node
     gravity, rest_length, max_time = model.gravity, model.rest_length, model.max_time
@@ -222,16 +215,10 @@ def record_stride(
     controls: Array,
     scratch: tuple[Any, ...],
 ) -> tuple[int, int, int, int, float]:
-    """:func:`run_stride` for Python, with every segment and event.
+    """:func:`run_stride` for Python, with every segment and event; all arguments are real.
 
-    Args:
-        kernel: from :func:`plain`; a compiled function is called with named tuples in twice the
-            time.
-        scratch: the arrays of :class:`Scratch`, in a plain tuple too.
-        The rest as in :func:`run_stride`, all real.
-
-    Returns:
-        As :func:`run_stride`.
+    ``kernel`` is from :func:`plain`, and the arrays of :class:`Scratch` are in a plain tuple too: a
+    compiled function is called with named tuples in twice the time.
     """
     tables, numbers = kernel
     named = Kernel(Tables(*tables), *numbers)

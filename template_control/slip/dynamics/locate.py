@@ -1,4 +1,4 @@
-"""Which of a node's guards fires first along a path, and exactly when.
+"""First of a node's guards to fire along a path, and its exact time.
 
 The exact kernel's polynomials and the closed-form maps share this code. Guards are looked at
 where substeps end. Bounds of their second derivatives exclude that one rises in between, or lead
@@ -68,15 +68,12 @@ class Watch(NamedTuple):
 
 @inner
 def arm(watch: Watch, state: Array, fired: int) -> None:
-    """Prepare ``watch`` at the start of a phase.
+    """Prepare ``watch`` at the start of a phase; its ``values`` and ``armed`` are overwritten.
 
     A guard that is zero there does not fire there. Exceptions are forbidden regions, and the
     touchdown of a foot that is on the ground already, unless the phase begins with a touchdown.
-
-    Args:
-        watch: the phase's guards; its ``values`` and ``armed`` are overwritten.
-        state: (4,) x, y, dx/dt, dy/dt of the CoM at the start [m, m/s].
-        fired: value of the Event that the phase begins with, -1 at the start of a stride.
+    ``state`` (4,) is x, y, dx/dt, dy/dt of the CoM [m, m/s]; ``fired`` is the value of the Event
+    that the phase begins with, -1 at the start of a stride.
     """
     events, values, armed = watch.events, watch.values, watch.armed
     all_guards(state, watch.toes, watch.rest_length, watch.touchdown_height, values[0])
@@ -107,17 +104,10 @@ def root(
 ) -> float:
     """Time within ``bracket`` at which the guard rises through 0, -1 if it does not.
 
-    Newton's method, then the inverse cubic through the last two points, kept bracketed. In
-    complex arithmetic the imaginary part carries the event time's derivative, which two
-    more steps make exact.
-
-    Args:
-        kind, path: on which the guard is taken.
-        event: value of the guard's Event.
-        start: where to begin [s].
-        bracket: earliest and latest time [s].
-        tolerance: of the time [s].
-        watch: toes and lengths; its ``out`` is overwritten.
+    Newton's method, then the inverse cubic through the last two points, kept bracketed. In complex
+    arithmetic the imaginary part carries the event time's derivative, which two more steps make
+    exact. The search begins at ``start``; times and ``tolerance`` are in [s]; ``watch.out`` is
+    overwritten.
     """
     toes, rest_length, out = watch.toes, watch.rest_length, watch.out
     lo, hi = bracket
@@ -163,15 +153,10 @@ def root(
 
 @inner
 def _clear(g_lo: float, g_hi: float, bend: float, width: float) -> bool:
-    """Whether a function cannot rise above zero within an interval.
+    """True if a function cannot rise above zero within an interval of a width.
 
-    A function below zero at both ends whose second derivative is at most ``bend`` lies below the
-    parabola through its ends that bends down so much.
-
-    Args:
-        g_lo, g_hi: values at the ends, not above zero.
-        bend: not below zero.
-        width: of the interval.
+    A function below zero at both ends whose second derivative is at most ``bend``, not below zero,
+    lies below the parabola through its ends that bends down so much.
     """
     sag = 0.5 * bend * width * width
     return sag <= _ROUNDING - g_lo - g_hi + 2.0 * np.sqrt(g_lo * g_hi)
@@ -179,9 +164,9 @@ def _clear(g_lo: float, g_hi: float, bend: float, width: float) -> bool:
 
 @inner
 def _comes_near(values: Array, event: int, sag: float) -> bool:
-    """Whether :func:`_clear`, with this ``sag``, has to be asked about a guard.
+    """True if :func:`_clear`, with this ``sag``, has to be evaluated for a guard.
 
-    It is spared the root: the geometric mean of two values is at least the smaller one.
+    It spares the root: the geometric mean of two values is at least the smaller one.
     """
     g_lo, g_hi = values[0, event], values[1, event]
     highest = max(g_lo, g_hi)
@@ -196,14 +181,9 @@ def _first_rise(
 
     The substep is halved until each part, from the first on, either holds no rise, by the bound of
     the guard's second derivative, or ends above zero. No rise is missed, however short the guard is
-    above or below zero.
-
-    Args:
-        kind, path: on which the guard is taken.
-        edge: which of the watched events.
-        span: the substep's ends [s]; ``watch`` holds the guard there.
-        tolerance: of the time [s].
-        watch: the node's guards; ``armed`` is updated. ``out`` is overwritten only if it fires.
+    above or below zero. ``edge`` is an index of the watched events; ``span`` are the substep's
+    ends, where ``watch`` holds the guard, and ``tolerance`` is of the time [s]. ``watch.armed`` is
+    updated, ``watch.out`` is overwritten only if the guard fires.
     """
     event, probe = watch.events[edge], watch.probe
     toes, rest_length, height = watch.toes, watch.rest_length, watch.touchdown_height
@@ -256,18 +236,11 @@ def _first_rise(
 def first_event(
     kind: int, path: Path, horizon: float, substep: float, tolerance: float, watch: Watch
 ) -> tuple[int, float]:
-    """First of a node's guards that fires within ``horizon``, and when.
+    """Index of the first of a node's guards that fires within ``horizon``, and its time [s].
 
-    Args:
-        kind, path: the CoM's, see :func:`~.guards.sample`.
-        horizon: where to stop looking [s].
-        substep: longest between two looks at a guard that comes close to zero [s].
-        tolerance: of event times [s].
-        watch: the node's guards, once :func:`arm` has seen the phase's start; updated.
-
-    Returns:
-        Which of the watched events, and the time [s]; -1 and ``horizon`` if none fires, and
-        then ``out`` holds the path there.
+    -1 and ``horizon`` if none fires; then ``watch.out`` holds the path there. Guards that come
+    close to zero are looked at every ``substep`` [s] at least; ``tolerance`` is of event times [s].
+    ``watch`` has to be prepared by :func:`arm` at the phase's start; it is updated.
     """
     events, values, bends, out = watch.events, watch.values, watch.bends, watch.out
     out[0] = 0.0

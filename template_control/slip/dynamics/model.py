@@ -42,15 +42,10 @@ class Model(NamedTuple):
 
 
 class Kernel(NamedTuple):
-    """A kind of stride of one template.
+    """A kind of stride of one template: the packed automaton, :class:`Model`, and the first node.
 
-    The model's numbers lie in it side by side: a tuple more within it would cost a
+    The model's numbers lie in it next to each other: a tuple more within it would cost a
     microsecond at every call from Python.
-
-    Attributes:
-        tables: the packed automaton.
-        mass, gravity, along, assist, rest_length, max_time: see :class:`Model`.
-        node: index of the stride's first node.
     """
 
     tables: Tables
@@ -64,12 +59,7 @@ class Kernel(NamedTuple):
 
 
 def kernel_model(parameters: SlipParameters, max_time: float | None = None) -> Model:
-    """``parameters`` as the kernel takes them.
-
-    Args:
-        parameters: the template.
-        max_time: time limit of a stride [s]; default 20 sqrt(l0/g).
-    """
+    """``parameters`` as the kernel takes them; ``max_time`` is 20 sqrt(l0/g) by default [s]."""
     p = parameters
     limit = 20.0 * np.sqrt(p.rest_length / p.gravity) if max_time is None else max_time
     return Model(p.mass, *p.gravity_parts, p.assist, p.rest_length, float(limit))
@@ -86,9 +76,7 @@ def model_of(kernel: Kernel) -> Model:
 def backward(model: Model, stiffness: Array) -> float:
     """Acceleration along the ground by all but the springs, backward positive [m/s^2].
 
-    Args:
-        model: the template.
-        stiffness: (2,) of the legs [N/m], 0 for a leg in the air.
+    ``stiffness`` (2,) is the legs' [N/m], 0 for a leg in the air.
     """
     if stiffness[0] == 0.0 or stiffness[1] == 0.0:
         return model.along
@@ -98,16 +86,7 @@ def backward(model: Model, stiffness: Array) -> float:
 def stride_kernel(
     parameters: SlipParameters, stride: str, automaton: Automaton = AUTOMATON
 ) -> Kernel:
-    """The kernel's input for strides of a kind.
-
-    Args:
-        parameters: the template.
-        stride: a key of the automaton's ``starts``.
-        automaton: of the stride.
-
-    Raises:
-        ParameterError: if there is no such stride.
-    """
+    """The kernel's input for strides of a kind, a key of the automaton's ``starts``."""
     node = automaton.index[automaton.start(stride).name]
     return Kernel(automaton.tables, *kernel_model(parameters), node=node)
 
@@ -129,7 +108,7 @@ def expand(
     cy: Array,
     work: Array,
 ) -> float:
-    """Taylor coefficients of the CoM path from ``state`` and the step they are good for.
+    """Taylor coefficients of the CoM path from ``state``, and the step they are good for.
 
     Args:
         state: (4,) x, y, dx/dt, dy/dt [m, m/s] in the world frame (y up).
@@ -188,12 +167,8 @@ def expand(
 def steepest(cx: Array, cy: Array, step: float) -> tuple[float, float, float]:
     """Bounds of the CoM's speed, acceleration and jerk within ``step`` [m/s, m/s^2, m/s^3].
 
-    They are the series of the derivatives with the absolute values of all coefficients; the length
-    of a vector is at most |x| + |y|.
-
-    Args:
-        cx, cy: (ORDER + 1,) from :func:`expand`.
-        step: [s].
+    They are the series of :func:`expand`'s derivatives with the absolute values of all
+    coefficients; the length of a vector is at most |x| + |y|.
     """
     acceleration = jerk = 0.0
     squared = step * step

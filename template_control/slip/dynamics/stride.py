@@ -143,18 +143,9 @@ def controls(
 
 
 def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
-    """Copy numbers into a new array after a check.
+    """Copy numbers into a new (size,) array.
 
-    Args:
-        name: what they are, for the error's message.
-        values: the numbers.
-        size: how many there must be.
-
-    Returns:
-        (size,) the numbers.
-
-    Raises:
-        ParameterError: if its shape is another, or a number is not finite.
+    A ParameterError, which calls them ``name``, if their shape is another or one is not finite.
     """
     array = np.array(values, dtype=float)
     if array.shape != (size,):
@@ -168,12 +159,8 @@ def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
 class StrideSimulator:
     """Simulates strides on the exact model, one after the other.
 
-    Args:
-        parameters: the template.
-        automaton: that the strides are of.
-        max_time: give a stride up after this time [s]; default 20 sqrt(l0/g).
-
-    One object serves one thread: it owns the compiled kernel's scratch arrays.
+    A stride is given up after ``max_time`` [s], by default 20 sqrt(l0/g). One object serves one
+    thread: it owns the compiled kernel's scratch arrays.
     """
 
     def __init__(
@@ -202,17 +189,11 @@ class StrideSimulator:
         u: Array,
         toes: Sequence[float] | Array = (0.0, 0.0),
     ) -> Stride:
-        """Simulate one stride.
+        """Simulate one stride from the node ``start``, usually from ``STRIDE_START``.
 
-        Args:
-            start: first node, usually from ``STRIDE_START``.
-            state: (4,) x, y, dx/dt, dy/dt [m, m/s].
-            u: (NUM_SLOTS,) controls from :func:`controls`.
-            toes: (2,) x of the rear and front toe [m].
-
-        Raises:
-            ParameterError: for NaN or a wrong shape.
-            ParameterError: if there is no node ``start``.
+        ``state`` (4,) is x, y, dx/dt, dy/dt [m, m/s], ``u`` (NUM_SLOTS,) from :func:`controls`,
+        ``toes`` (2,) x of the rear and front toe [m]. A ParameterError for NaN, a wrong shape or an
+        unknown node.
         """
         if start not in self._kernels:
             raise ParameterError(
@@ -251,7 +232,7 @@ class StrideSimulator:
 
 
 def _told(source: str, edge: Edge) -> tuple[Event, str, str, Reset]:
-    """What a :class:`FiredEvent` tells of an edge."""
+    """Fields of a :class:`FiredEvent` that come from an edge."""
     entered = edge.target if isinstance(edge.target, str) else ""
     return edge.event, source, entered, edge.reset
 

@@ -43,11 +43,7 @@ def _for_each(name: str, rows: Array, count: int) -> Array:
 
 
 def _together(**arrays: ArrayLike) -> list[Array]:
-    """Arrays by name that broadcast.
-
-    Raises:
-        ParameterError: naming them and their shapes, if they do not.
-    """
+    """Arrays by name that broadcast; a ParameterError with names and shapes if they do not."""
     found = [np.asarray(array, dtype=float) for array in arrays.values()]
     try:
         np.broadcast_shapes(*(array.shape for array in found))
@@ -91,9 +87,9 @@ def _steps(
     scratch: Scratch,
     result: Array,
 ) -> tuple[int, bool]:
-    """Steps taken (at most ``limit``), and whether they lead to ``goal``.
+    """Number of steps (at most ``limit``), and True if they lead to ``goal`` (2,) = y, phi.
 
-    ``z`` (3,) is overwritten with the last VLO state; ``goal`` (2,) is y, phi.
+    ``z`` (3,) is overwritten with the last VLO state.
     """
     early = middle = late = 0.0
     for step in range(limit):

@@ -34,11 +34,9 @@ class Kind(Enum):
 
 
 def classify(eigenvalues: ComplexArray, tolerance: float = 0.0) -> Kind:
-    """STABLE if all lie within the unit circle, UNSTABLE if none does, SADDLE between.
+    """STABLE if all eigenvalues lie within the unit circle, UNSTABLE if none does, SADDLE between.
 
-    Args:
-        eigenvalues: (n,) of a return map.
-        tolerance: to which they are known; NEUTRAL if the largest lies on the circle to it.
+    NEUTRAL if the largest lies on the circle to the ``tolerance`` to which they are known.
     """
     sizes = np.abs(eigenvalues)
     if abs(sizes.max() - 1.0) < tolerance:
@@ -52,12 +50,9 @@ def classify(eigenvalues: ComplexArray, tolerance: float = 0.0) -> Kind:
 def shell_eigenvalues(jacobian: Array, energy_gradient: Array) -> ComplexArray:
     """Eigenvalues of a passive return map within its energy shell.
 
-    A passive stride conserves energy, so one eigenvalue of the whole map is 1; it says
-    nothing about stability and is left out.
-
-    Args:
-        jacobian: (n, n) of the map at a fixed point.
-        energy_gradient: (n,) of the energy at the section.
+    A passive stride conserves energy, so one eigenvalue of the whole map is 1; it says nothing
+    about stability and is left out. ``jacobian`` (n, n) is the map's at a fixed point; the gradient
+    (n,) that of the energy at the section.
     """
     shell = np.linalg.svd(energy_gradient[None, :])[2][1:].T
     return np.linalg.eigvals(shell.T @ jacobian @ shell).astype(np.complex128)
@@ -84,7 +79,7 @@ _LOCATE = 40
 
 
 class Special(Enum):
-    """What happens between two points of a branch."""
+    """Special point between two points of a branch."""
 
     FOLD = "fold"
     """The branch turns back in the quantity it is drawn over."""
@@ -147,12 +142,9 @@ class BranchPoint:
 
 
 class Equations(NamedTuple):
-    """A family's equations at X, scaled.
+    """A family's equations at X: ``residual`` (n,), zero on the branch, and its Jacobian.
 
-    Attributes:
-        residual: (n,) zero on the branch.
-        jacobian: (n, n + 1) in scaled X.
-        valid: whether the stride ended at its section.
+    ``jacobian`` (n, n + 1) is in scaled X; ``valid`` says whether the stride ended at its section.
     """
 
     residual: Array
@@ -166,8 +158,8 @@ class Branch(ABC):
     Attributes:
         scale: (n + 1,) natural size of each coordinate.
         free: quantities that vary along it.
-        noise: how exactly eigenvalues are known. One that is this close to the unit circle does
-            not count as crossing it.
+        noise: accuracy of eigenvalues. One that is this close to the unit circle does not count as
+            crossing it.
         anchor: (n + 1,) scaled direction in which the first gait stays where its guess is; None
             where the nearest gait will do.
     """
@@ -187,29 +179,13 @@ class Branch(ABC):
 
     @abstractmethod
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:
-        """One of the quantities that vary along the branch, and its gradient in X.
-
-        Args:
-            x: (n + 1,) X.
-            name: of the quantity, one of :attr:`free`.
-
-        Returns:
-            The value [SI, angles in rad]; the (n + 1,) gradient, not scaled.
-        """
+        """A quantity of :attr:`free` [SI, rad], and its gradient (n + 1,) in X, not scaled."""
 
     def correct(self, x: Array, direction: Array | None = None) -> Array:
-        """Find the gait nearest X in the plane through X that is normal to a direction.
+        """X (n + 1,) of the gait nearest a guess, in the plane through it normal to a direction.
 
-        Args:
-            x: (n + 1,) guess of X.
-            direction: (n + 1,) normal of the plane, in scaled coordinates; None: any X will do, and
-                it is changed as little as possible.
-
-        Returns:
-            (n + 1,) X of the gait.
-
-        Raises:
-            GaitError: if Newton's method does not converge.
+        ``direction`` (n + 1,) is in scaled coordinates; None: any X will do, and it is changed as
+        little as possible. A GaitError if Newton's method does not converge.
         """
         start = x.copy()
         x = x.copy()
@@ -234,21 +210,13 @@ class Branch(ABC):
         step: float = 0.01,
         points: int = 400,
     ) -> list[BranchPoint]:
-        """Follow the branch both ways from ``start`` by pseudo-arclength.
+        """Points of the branch both ways from ``start`` by pseudo-arclength, special ones included.
 
-        Args:
-            start: (n + 1,) guess of X.
-            over: the quantity the branch is drawn over; folds are where it turns back.
-            limits: of that quantity; the branch ends outside of them.
-            step: largest arclength step, in scaled units.
-            points: at most so many points each way.
-
-        Returns:
-            Points in order along the branch, special ones included.
-
-        Raises:
-            GaitError: if there is no gait near ``start``.
-            ParameterError: if ``over`` does not vary along the branch.
+        ``start`` (n + 1,) is a guess of X. ``over`` is the quantity that the branch is drawn over:
+        folds are where it turns back, and the branch ends outside of its ``limits``. ``step`` is
+        the largest arclength step, in scaled units; there are at most ``points`` each way. A
+        GaitError if there is no gait near ``start``, a ParameterError if ``over`` does not vary
+        along the branch.
         """
         if over not in self.free:
             raise ParameterError(

@@ -98,12 +98,7 @@ class Figures(NamedTuple):
 def gait_figures(gait: WalkingGait, weights: FamilyCost) -> Figures:
     """Figures and cost of a gait with push-off, on the reference template.
 
-    Args:
-        gait: of the family.
-        weights: of its cost.
-
-    Raises:
-        GaitError: if no control holds it.
+    A GaitError if no control holds it.
     """
     a, b = vlo_jacobians(gait)
     ahead, closed = _controlled(a, b)
@@ -144,14 +139,10 @@ def _controlled(a: Array, b: Array) -> tuple[Array, float]:
 
 
 def stance_figures(gait: WalkingGait, leg: float = FamilyCost.leg) -> tuple[float, float]:
-    """Largest knee torque over m g l0, and the share of double stance.
+    """Largest knee torque over m g l0, and the share of double stance, of a gait with push-off.
 
-    A leg of two equal halves that pushes with F has the torque F times the knee's distance from
-    the line of the push.
-
-    Args:
-        gait: with push-off.
-        leg: length of the robot's leg, from the CoM on, over l0.
+    A leg of two equal halves that pushes with F has the torque F times the knee's distance from the
+    line of the push. ``leg`` is the robot leg's length, from the CoM on, over l0.
     """
     p = gait.parameters
     stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
@@ -206,13 +197,13 @@ _MOVES = np.array([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.
 
 @dataclass(frozen=True)
 class SearchEffort:
-    """How a chain is searched for.
+    """Parameters of the search for a chain.
 
     Attributes:
         spacing: of a chain's speeds at VLO [m/s].
         settling: rounds of smoothing, before the descent and after it.
         rounds: of the descent; each takes a minute or more.
-        moves: how far a gait is moved in the first and in the last round, in natural changes.
+        moves: of a gait in the first and in the last round, in natural changes.
         smoothing: of a round, in squared spacings of the chain.
     """
 
@@ -224,12 +215,7 @@ class SearchEffort:
 
 
 class Member(NamedTuple):
-    """A gait of the chain and its figures.
-
-    Attributes:
-        gait: on the reference template, in steps with push-off.
-        figures: its stability and cost.
-    """
+    """A gait of the chain, on the reference template and with push-off, and its figures."""
 
     gait: WalkingGait
     figures: Figures
@@ -240,18 +226,10 @@ def search_family(
     effort: SearchEffort | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[list[Member], ...]:
-    """Make the family of walking gaits by speed.
+    """Family of walking gaits by speed: each chain's members, from the slowest to the fastest.
 
-    Args:
-        weights: of the cost.
-        effort: how to search.
-        progress: told after each round of the descent.
-
-    Returns:
-        The members of each chain on the reference template, from the slowest to the fastest.
-
-    Raises:
-        GaitError: if a chain leaves the surface of gaits.
+    They are on the reference template. ``progress`` gets a line after each round of the descent. A
+    GaitError if a chain leaves the surface of gaits.
     """
     w, o = weights or FamilyCost(), effort or SearchEffort()
     return tuple(_search(np.array(rough), w, o, progress) for rough in (_SLOW, _FAST))
@@ -352,12 +330,7 @@ def chain_of(members: list[Member]) -> Chain:
 
 
 def family_data(chains: tuple[list[Member], ...], weights: FamilyCost) -> dict[str, Any]:
-    """The family and how it was made, as its file holds it.
-
-    Args:
-        chains: the members of each.
-        weights: of the cost that they were made with.
-    """
+    """The family as its file holds it, with the weights of the cost that it was made with."""
     return {
         "made by": "template-control gaits --family",
         "units": "l0, sqrt(l0 / g), m g; angles in rad",

@@ -145,21 +145,19 @@ def _kind(gait: Gait) -> str:
 
 
 def control_units(gait: Gait) -> tuple[list[int], Array]:
-    """What a walking step is controlled by; a stride of one's own is taken for the paper's.
+    """Slots (c,) of a walking step's controls, and their units (c,): 1 rad, k0 for stiffnesses.
 
-    Returns:
-        The slots of its controls, (c,); their units, (c,): 1 rad, and k0 of each stiffness [N/m].
+    A stride of one's own is taken for the paper's.
     """
     slots = [int(slot) for slot in WALKING_SLOTS[_kind(gait)]]
     return slots, np.array([1.0, *[gait.parameters.leg_stiffness] * (len(slots) - 1)])
 
 
 def vlo_jacobians(gait: Gait) -> tuple[Array, Array]:
-    """Jacobians of the exact VLO map at a gait: A in z and B in the angle and shares of k0.
+    """Jacobians of the exact VLO map at a gait: A (3, 3) in z, B (3, c) in its controls.
 
-    Returns:
-        A (3, 3); B (3, c), whose columns are the touchdown angle [1/rad], kappa_1 / k0,
-        kappa_2 / k0 and, in steps with push-off, kappa_p / k0.
+    Columns of B are the touchdown angle [1/rad], kappa_1 / k0, kappa_2 / k0 and, in steps with
+    push-off, kappa_p / k0.
     """
     linear = ReturnMap(gait.parameters, _kind(gait)).linearise(gait.state, gait.controls)
     slots, units = control_units(gait)
@@ -174,7 +172,7 @@ def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingG
 
 
 def _misses(step: ReturnMap, z: Array, u: Array) -> tuple[float, float]:
-    """What dy/dt and y of the next VLO are over those of ``z``; NaN where there is no next."""
+    """dy/dt at the next VLO and the change of y to it [m/s, m]; NaN where there is no next."""
     z_next, outcome = step.step(z, u)
     if outcome is not Outcome.SECTION:
         return np.nan, np.nan
@@ -184,12 +182,9 @@ def _misses(step: ReturnMap, z: Array, u: Array) -> tuple[float, float]:
 def root(
     function: Callable[[float], float], ends: tuple[float, float], xtol: float, rtol: float
 ) -> float | None:
-    """Where a function is zero between two numbers; None if it is NaN somewhere there.
+    """Zero of a function of different signs at two ends; None if it is NaN somewhere between.
 
-    Args:
-        function: of different signs at both ends.
-        ends: the two numbers.
-        xtol, rtol: how near, absolute and relative.
+    ``xtol`` and ``rtol`` are the absolute and the relative accuracy.
     """
     try:
         return float(brentq(function, *ends, xtol=xtol, rtol=rtol))
@@ -204,10 +199,9 @@ def _symmetric_roots(
 ) -> list[tuple[Array, Array]]:
     """All (z, u) = make(value) on the grid ``values`` that return to themselves.
 
-    dy/dt at the next VLO is zero for a symmetric gait, and for strides that only return to a
-    level flight. Where one of these is next to the gait, both roots may lie between two values
-    of the grid, and there is no change of sign. The height then tells: it returns for the gait
-    only.
+    dy/dt at the next VLO is zero for a symmetric gait, and for strides that only return to a level
+    flight. Where one of these is next to the gait, both roots may lie between two values of the
+    grid, and there is no change of sign. The height then decides: it returns for the gait only.
     """
     step = ReturnMap(parameters)
 
@@ -261,16 +255,10 @@ def gait_at(
 def find_gait_at(
     parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
 ) -> WalkingGait | None:
-    """Gait of :func:`gait_at`, if there is one.
+    """Gait of :func:`gait_at`, or None if there is none.
 
-    Args:
-        parameters: the template; both legs have its stiffness k0.
-        touchdown_angle: alpha, from the ground to the leg [rad].
-        vlo_speed: dx/dt at VLO [m/s].
-        name: of the gait.
-
-    Returns:
-        The gait, or None.
+    ``touchdown_angle`` is alpha, from the ground to the leg [rad], ``vlo_speed`` dx/dt at VLO
+    [m/s].
     """
     k0, l0 = parameters.leg_stiffness, parameters.rest_length
     u = controls(touchdown_angle, k0, k0)
@@ -282,7 +270,7 @@ def find_gait_at(
 def _nearest(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float) -> str:
     """Advice where :func:`gait_at` finds no gait, itself tried.
 
-    Angles and speeds that have gaits fill no rectangle, so no two windows tell them.
+    Angles and speeds that have gaits fill no rectangle, so no two windows describe them.
     """
     wanted = np.degrees(touchdown_angle)
     for angle in sorted(_ANGLES, key=lambda angle: abs(angle - wanted)):
@@ -326,12 +314,7 @@ def gait_from_energy(
 
 
 def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
-    """Share of a stride's duration in which no foot is on the ground.
-
-    Args:
-        gait: any whose stride returns to its state.
-        automaton: that its stride is of.
-    """
+    """Share of a gait's stride in which no foot is on the ground."""
     start = automaton.start(gait.stride).name
     section = section_of(automaton.sections(start)[0])
     stride = simulate_stride(
@@ -341,11 +324,6 @@ def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
 
 
 def flying(stride: Stride, automaton: Automaton = AUTOMATON) -> float:
-    """Share of a simulated stride's duration in which no foot is on the ground.
-
-    Args:
-        stride: one that was completed.
-        automaton: that it is of.
-    """
+    """Share of a completed stride's duration in which no foot is on the ground."""
     flies = [node.phase is Phase.F for node in automaton.nodes]
     return float(sum(row[1] for row in stride.meta if flies[int(row[2])]) / stride.duration)

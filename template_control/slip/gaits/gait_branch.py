@@ -135,16 +135,10 @@ class Family(Branch):
 def energy_gradient(
     section: Section, parameters: SlipParameters, z: Array, stiffness: float
 ) -> tuple[Array, float]:
-    """Derivatives of :meth:`Section.energy` at ``z`` (n,).
+    """Derivatives of :meth:`Section.energy` at ``z`` (n,): (n,) by z, and by the stiffness [J m/N].
 
-    Args:
-        section: VLO, where the stance leg is vertical and as long as the CoM is high, or APEX.
-        parameters: the template.
-        z: state at the section.
-        stiffness: of the stance leg [N/m].
-
-    Returns:
-        (n,) by the state; by the stiffness [J m/N].
+    ``section`` is VLO, where the stance leg is vertical and as long as the CoM is high, or APEX;
+    ``stiffness`` is the stance leg's [N/m].
     """
     p = parameters
     compression = p.rest_length - z[1] if section.event is Event.VLO else 0.0
@@ -235,15 +229,9 @@ class ControlledFamily(Branch):
 
 
 def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisation, Array, Array]:
-    """Take the exact stride from a state with a policy's controls, and differentiate it.
+    """The exact stride with a policy's controls: linear map, (n, n) closed loop, u (NUM_SLOTS,).
 
-    Args:
-        step: the map z moves on; the exact one, whatever map the policy computes with.
-        policy: controls (NUM_SLOTS,) at a state (n,).
-        z: (n,) state at the section.
-
-    Returns:
-        The map at z and u; the (n, n) derivative of the closed loop; u (NUM_SLOTS,).
+    ``step`` is the map z (n,) moves on, whatever map the policy computes with.
     """
     u = policy(z)
     linear = step.linearise(z, u)

@@ -42,19 +42,13 @@ _RETURNED = 1e-9  # of the units of the state
 
 
 def nearest_gait(parameters: SlipParameters, vlo_speed: float, guess: Array) -> WalkingGait:
-    """The gait with a speed at VLO that is nearest a guess, in steps with push-off.
+    """The gait with a speed at VLO [m/s] that is nearest a guess, in steps with push-off.
 
-    At the next VLO of a symmetric gait dy/dt is zero and the height the same. Of all changes of
-    the guess that make it so, the method takes the least, with exact derivatives. So it does not
-    mind where gaits of one stiffness and angle turn back, or where other strides cross them.
-
-    Args:
-        parameters: the template; its stiffness k0 counts for nothing, the gait has its own.
-        vlo_speed: dx/dt at VLO [m/s].
-        guess: (3,) ln of k l0 / (m g), alpha [rad], y / l0 at VLO.
-
-    Raises:
-        GaitError: if there is none near it.
+    At the next VLO of a symmetric gait dy/dt is zero and the height the same. Of all changes of the
+    guess that make it so, the method takes the least, with exact derivatives. So it does not mind
+    where gaits of one stiffness and angle turn back, or where other strides cross them. ``guess``
+    (3,) is ln of k l0 / (m g), alpha [rad], y / l0 at VLO; the template's k0 is not used. A
+    GaitError if there is none near it.
     """
     p, step = parameters, ReturnMap(parameters)
     unit, weight = p.speed_unit, p.mass * p.gravity / p.rest_length
@@ -148,28 +142,16 @@ class Chain:
         return speed, height
 
     def gait(self, parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
-        """The gait with a speed at VLO; the nearest end's coordinates serve beyond it.
+        """The gait with a speed at VLO [m/s]; beyond the chain the nearest end's coordinates serve.
 
-        Args:
-            parameters: the template; its stiffness k0 counts for nothing, the gait has its own.
-            vlo_speed: dx/dt at VLO [m/s].
-
-        Raises:
-            GaitError: if there is none near the curve.
+        It has its own stiffness, not the template's k0. A GaitError if there is none near the
+        curve.
         """
         speed = np.clip(vlo_speed / parameters.speed_unit, self.vlo_speed[0], self.vlo_speed[-1])
         return nearest_gait(parameters, vlo_speed, self._curve(speed))
 
     def gait_for(self, parameters: SlipParameters, mean_speed: float) -> WalkingGait:
-        """The gait with a mean speed that lies between those of two knots.
-
-        Args:
-            parameters: the template; its stiffness k0 counts for nothing, the gait has its own.
-            mean_speed: step length over step duration [m/s].
-
-        Raises:
-            GaitError: if there is none near the curve.
-        """
+        """The gait with a mean speed [m/s] between those of two knots; see :meth:`gait`."""
         p, unit = parameters, parameters.speed_unit
         wanted = mean_speed / unit
         knot = int(np.clip(np.searchsorted(self.mean_speed, wanted) - 1, 0, len(self.height) - 2))

@@ -32,12 +32,13 @@ from template_control.slip.similarity import (
 
 @dataclass(frozen=True)
 class LateralLearningOptions(Checked):
-    """How fast the sideways motion is learnt, and how much is believed.
+    """Gains and bounds of what is learnt of the sideways motion.
 
     Attributes:
         gain: share of a step's surprise that enters the offset of y and dy/dt.
         one_sided: how far a step from one side teaches that side alone. At 0 the other side learns
-            the mirror image: a drift aside, which is the walk's own and no offset, is not learnt.
+            the mirror image: a sideways drift, which is the walk's own and no offset, is not
+            learnt.
         offset_bound: largest offsets of y and dy/dt [m, m/s].
         surprise_bound: a larger surprise counts as this much: a push is no offset [m, m/s].
         stretch_gain: share of a stance's surprise that enters the stretch.
@@ -177,10 +178,10 @@ def _cost_to_go(a: Array, b: Array, state_cost: Array, step_cost: float) -> Arra
 
 @dataclass(frozen=True)
 class LateralWish(Checked):
-    """What the feet are to do aside.
+    """Wanted sideways motion of the feet.
 
     Attributes:
-        width: distance aside between left and right footholds [m].
+        width: lateral distance between left and right footholds [m].
         aside: distance to the left that each step moves the walk [m].
         turn: angle by which the heading turns to the left at each section [rad].
     """

@@ -127,12 +127,8 @@ COLUMNS = 2 + NEXT + 1
 def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> None:
     """Write c_i = f_i / (m l_i) of the rear and the front leg into ``out`` (2,) [1/s^2].
 
-    Args:
-        path: whose CoM and toes are known.
-        row: segment.
-        time: since its start [s].
-        com: (6,) overwritten with x, z and their first and second derivatives.
-        out: overwritten; 0 for a leg in the air. Legs do not pull.
+    ``time`` is since the start of segment ``row`` [s]; ``com`` (6,) is overwritten with x, z and
+    their first and second derivatives. 0 for a leg in the air; legs do not pull.
     """
     coefficients, meta = path.coefficients, path.meta
     sample(SERIES, Path(coefficients[0, row], coefficients[1, row]), time, com)
@@ -154,12 +150,9 @@ def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> N
 def advance(path: LateralPath, start: float, end: float, stretch: float, motion: Array) -> None:
     """Carry motions on along the path, by the classical Runge-Kutta method.
 
-    Args:
-        path: the planar path.
-        start, end: times on it [s]; ``end`` is at most its section.
-        stretch: single stance takes this times as long as on the path.
-        motion: (2, COLUMNS) overwritten: y and dy/dt at ``start`` and then at ``end``, per unit
-            of y, dy/dt and each foothold's y at some earlier time.
+    ``end`` is at most the path's section [s]; single stance takes ``stretch`` times as long as on
+    the path. ``motion`` (2, COLUMNS) are y and dy/dt at ``start``, overwritten by those at ``end``,
+    per unit of y, dy/dt and each foothold's y at some earlier time.
     """
     com, before, middle, after = np.empty(6), np.empty(2), np.empty(2), np.empty(2)
     meta, footholds = path.meta, path.footholds
@@ -200,16 +193,11 @@ def advance(path: LateralPath, start: float, end: float, stretch: float, motion:
 
 @compiled
 def transition(path: LateralPath, start: float, end: float, stretch: float) -> Array:
-    """The matrix of the motion between two times, (2, COLUMNS).
+    """(2, COLUMNS) matrix M of the motion between two times on the path.
 
-    Args:
-        path: the planar path.
-        start, end: times on it [s]; ``end`` is at most its section.
-        stretch: single stance takes this times as long as on the path.
-
-    Returns:
-        M with (y, dy/dt)(end) = M (y, dy/dt, y_0, y_1, y_2), y_i the footholds' [m]. All moved
-        aside by one length move the end by it: M[:, 0] + M[:, 2:].sum(1) = (1, 0).
+    (y, dy/dt)(end) = M (y, dy/dt, y_0, y_1, y_2), y_i the footholds' [m]; arguments as for
+    :func:`advance`. A shift of all of them shifts the end alike: M[:, 0] + M[:, 2:].sum(1) = (1,
+    0).
     """
     motion = np.zeros((2, COLUMNS))
     motion[0, 0] = motion[1, 1] = 1.0
@@ -219,14 +207,10 @@ def transition(path: LateralPath, start: float, end: float, stretch: float) -> A
 
 @compiled
 def acceleration(path: LateralPath, time: float, y: float, feet: Array) -> float:
-    """d2y/dt2 = sum_i c_i (y - y_i) of the template [m/s^2].
+    """d2y/dt2 = sum_i c_i (y - y_i) of the template at a time on the path [m/s^2].
 
-    Args:
-        path: the planar path.
-        time: on it [s].
-        y: of the CoM [m].
-        feet: (3,) y of the footholds: of the feet that were rear and front at the start of the
-            path, and of the next one [m].
+    ``feet`` (3,) are y_i of the feet that were rear and front at the start of the path, and of the
+    next foothold [m].
     """
     com, leg = np.empty(6), np.empty(2)
     meta, row = path.meta, 0

@@ -41,7 +41,7 @@ def _nothing() -> Array:
 
 @dataclass(frozen=True)
 class LateralLearnt:
-    """What has been learnt so far; each lesson gives a new one.
+    """State of the sideways learning; each lesson gives a new one.
 
     Attributes:
         offset: (2, 2) what the robot adds to y and dy/dt at a section, in steps from the left and
@@ -90,17 +90,17 @@ _FOOTHOLDS, _NEXT = 2, 2 + NEXT  # columns of a motion
 
 
 class LateralAim(NamedTuple):
-    """What the next foothold is chosen for.
+    """Target and costs by which the next foothold is chosen.
 
     Attributes:
         state: (2,) wanted y from the next foot and dy/dt, at the section after touchdown.
-        step: distance from the stance foot to the next foothold in the periodic gait, to the
-            left [m].
+        step: distance from the stance foot to the next foothold in the periodic gait, to the left
+            [m].
         cost: (2, 2) cost-to-go of an error of the state.
         step_cost: of an error of the step [1/m^2].
         offset: (2,) what the robot adds to that state.
         steps: (2,) least and largest distance from the stance foot to the next, to the left [m].
-        reach: largest distance aside between CoM and foot at touchdown [m].
+        reach: largest lateral distance between CoM and foot at touchdown [m].
         stretch: single stance takes this times as long as on the path.
     """
 
@@ -149,13 +149,13 @@ def lateral_aim(
     learnt: LateralLearnt,
     options: LateralOptions,
 ) -> LateralAim:
-    """What the next foot is put down for; it holds until that touchdown.
+    """Target of the next foothold; it holds until that touchdown.
 
     Args:
         lateral: the gait's step map.
         cycle: its periodic motion.
-        stance: side of the foot beside which the next one lands.
-        learnt: what the robot's own part is.
+        stance: side of the foot next to which the next one lands.
+        learnt: the robot's own part of the motion.
         options: scaled to the template.
     """
     near, far = options.widths

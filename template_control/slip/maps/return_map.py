@@ -33,12 +33,7 @@ RESULTS = 6
 
 
 class Derivatives(NamedTuple):
-    """What :func:`section_jacobian` writes.
-
-    Attributes:
-        result: (RESULTS,) of the map.
-        jacobian: (RESULTS, c) its derivatives.
-    """
+    """Result (RESULTS,) of the map and its Jacobian (RESULTS, c), by :func:`section_jacobian`."""
 
     result: Array
     jacobian: Array
@@ -91,9 +86,8 @@ def one_stride(
         z: (3,) dx/dt, y, dy/dt at the section [m/s, m, m/s]; dy/dt is 0 at apex.
         controls: (NUM_SLOTS,) u by Slot.
         scratch: overwritten.
-        result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance
-            covered [m], lengths of rear and front leg at the (virtual) bottom [m], NaN if
-            there was none.
+        result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance covered
+            [m], lengths of rear and front leg at the (virtual) bottom [m], NaN if there was none.
     """
     state, toes, bottom = scratch.state, scratch.toes, scratch.bottom
     state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
@@ -114,11 +108,7 @@ def section_map(
     scratch: Scratch,
     result: Array,
 ) -> int:
-    """:func:`one_stride` for Python; compiled functions call that.
-
-    Args:
-        The rest as in :func:`one_stride`.
-    """
+    """:func:`one_stride` for Python; compiled functions call that."""
     return one_stride(kernel, kind, z, controls, scratch, result)
 
 
@@ -132,14 +122,9 @@ def map_many(
     result: Array,
     outcome: IntArray,
 ) -> None:
-    """As :func:`one_stride`, stride by stride.
+    """As :func:`one_stride`, stride by stride: (n, 3) ``z``, (n, NUM_SLOTS) ``controls``.
 
-    Args:
-        kernel, kind, scratch: as for :func:`one_stride`.
-        z: (n, 3) states at the section.
-        controls: (n, NUM_SLOTS) u of each stride.
-        result: (n, RESULTS) overwritten.
-        outcome: (n,) overwritten with the Outcomes' values.
+    ``result`` (n, RESULTS) and ``outcome`` (n,), values of the Outcomes, are overwritten.
     """
     for i in range(z.shape[0]):
         outcome[i] = one_stride(kernel, kind, z[i], controls[i], scratch, result[i])
@@ -157,14 +142,9 @@ def section_jacobian(
 ) -> int:
     """:func:`one_stride` with its derivatives, exact to rounding, by complex steps.
 
-    The imaginary part of each event's time is the derivative that the saltation matrix
-    accounts for; nothing is differenced.
-
-    Args:
-        columns: (c,) what to differentiate by: 0 to 2 the state, 3 + slot the controls.
-        scratch: complex, from ``new_scratch(complex)``.
-        found: overwritten.
-        The rest as in :func:`one_stride`.
+    The imaginary part of each event's time is the derivative that the saltation matrix accounts
+    for; nothing is differenced. ``columns`` (c,) are differentiated by: 0 to 2 the state, 3 + slot
+    the controls. ``scratch`` is complex, from ``new_scratch(complex)``; ``found`` is overwritten.
     """
     result, jacobian = found
     zc, uc = np.empty(z.shape[0], np.complex128), np.empty(controls.shape[0], np.complex128)
@@ -195,7 +175,7 @@ def section_jacobian(
 
 
 class Mapped(NamedTuple):
-    """Where strides end; NaN where one fails.
+    """Ends of strides; NaN where one fails.
 
     Attributes:
         state: (..., m) at the next section.

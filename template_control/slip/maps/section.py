@@ -23,7 +23,7 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 @dataclass(frozen=True)
 class Section:
-    """Where one stride ends and the next begins; :data:`VLO`, :data:`APEX`, :data:`REST`.
+    """Section at which a stride ends and the next begins: :data:`VLO`, :data:`APEX`, :data:`REST`.
 
     A state z at the section is (n,): dx/dt, y, dy/dt [m/s, m, m/s] at VLO (8), where the
     stance leg is vertical, and at :data:`REST`; dx/dt, y [m/s, m] at apex (4), where dy/dt is 0.
@@ -156,11 +156,7 @@ _SECTIONS = {section.event: section for section in (VLO, APEX, REST)}
 
 
 def section_of(event: Event) -> Section:
-    """The section that ``event`` is.
-
-    Raises:
-        ParameterError: if it is none.
-    """
+    """The section that ``event`` is; a ParameterError if it is none."""
     if event not in _SECTIONS:
         names = " or ".join(section.name for section in _SECTIONS.values())
         raise ParameterError(f"{event.name} is no section: give {names}")

@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StrideGoal:
-    """What a route asks for at a section.
+    """Stride that a route asks for at a section, and its target.
 
     Attributes:
         stride: the kind of stride that comes next, a key of ``STRIDE_START``.
@@ -52,7 +52,7 @@ class StrideGoal:
 
 @runtime_checkable
 class Route(Protocol):
-    """Which stride comes next, at every section."""
+    """Choice of the next stride at every section."""
 
     @property
     def parameters(self) -> SlipParameters:
@@ -68,7 +68,7 @@ class Route(Protocol):
 
     @property
     def endless(self) -> bool:
-        """Whether :meth:`next` always knows a stride."""
+        """True if :meth:`next` always knows a stride."""
 
     def reset(self) -> None:
         """Go back to the beginning; a run calls it first."""
@@ -86,7 +86,7 @@ class Route(Protocol):
         """
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
-        """What :meth:`next` would return here; the route does not go on.
+        """Goal that :meth:`next` would return here; the route does not go on.
 
         Arguments as for :meth:`next`.
         """

@@ -112,7 +112,7 @@ class ScenarioRecord:
 
     @property
     def completed(self) -> bool:
-        """Whether every segment was gone through."""
+        """True if every segment was gone through."""
         return not self.metadata["failure"]
 
     @property

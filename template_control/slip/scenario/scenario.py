@@ -65,7 +65,7 @@ class Segment(Checked):
 
 @dataclass(frozen=True)
 class Scenario(Checked):
-    """What the template is to do, from a VLO or a stand on; the defaults are Table IV's.
+    """Gaits and speeds of the template from a VLO or a stand on; the defaults are Table IV's.
 
     Attributes:
         segments: the profile.
@@ -132,12 +132,12 @@ class Scenario(Checked):
 
     @property
     def stands(self) -> bool:
-        """Whether a segment is a stand."""
+        """True if a segment is a stand."""
         return STAND in self.gaits
 
     @property
     def only_walks(self) -> bool:
-        """Whether all segments are walks."""
+        """True if all segments are walks."""
         return self.gaits == {"walk"}
 
     def in_motion(self) -> Scenario | None:
@@ -192,7 +192,7 @@ def _check_stands(segments: tuple[Segment, ...]) -> None:
 def _check_profile(segments: tuple[Segment, ...]) -> None:
     """Check that every segment ends, and the whole scenario within an hour.
 
-    Where a segment ends after some steps, nobody knows how fast the next one begins.
+    Where a segment ends after some steps, the speed at which the next one begins is not known.
     """
     total, speed = 0.0, None
     for i, segment in enumerate(segments, 1):

@@ -71,7 +71,7 @@ _LONGEST = 2.0  # of that guess: what took longer was no stride alone, but one t
 
 @dataclass(frozen=True)
 class _Progress:
-    """Where in a scenario a run is.
+    """Progress of a run in its scenario.
 
     Attributes:
         speed: of the profile where the segment begins [m/s].
@@ -81,7 +81,7 @@ class _Progress:
         duration: of the last stride of each kind [s].
         last: kind of the stride under way, and when it began; None at the start.
         walking: the walk has come to its speed since the last stand.
-        took: how long it took, None if the times are to tell [s].
+        took: how long it took, None if it follows from the times [s].
         over: past the last segment.
     """
 
@@ -124,7 +124,7 @@ class _Progress:
         return max(value, 0.0)
 
     def ends(self, segment: Segment, now: float, speed: float) -> bool:
-        """Whether the segment ends at a section passed at ``now`` with ``speed``."""
+        """True if the segment ends at a section passed at ``now`` with ``speed``."""
         if segment.duration is not None and now - (self.began or 0.0) >= segment.duration:
             return True
         if segment.steps is not None and self.strides >= segment.steps:
@@ -182,7 +182,7 @@ class ScenarioRoute:
 
     @property
     def pushes_off(self) -> bool:
-        """Whether its walking steps have a push-off."""
+        """True if its walking steps have a push-off."""
         return self.walks != StrideKind.WALK
 
     def reset(self) -> None:
