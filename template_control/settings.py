@@ -318,7 +318,7 @@ def to_table(options: Any, where: str = "") -> dict[str, Any]:
 
 
 def _fits(hint: Any, value: Any) -> bool:
-    """Whether a field's dataclass is one that its table can be read as."""
+    """True if a field's dataclass is one that its table can be read as."""
     if not is_dataclass(value) or isinstance(value, type):
         return True
     return type(value) in (get_args(hint) if _is_union(hint) else (hint,))

@@ -1,4 +1,4 @@
-"""``template-control reproduce``: a table or figure of the paper, ours beside it."""
+"""``template-control reproduce``: a table or figure of the paper, with ours."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A table with the paper's numbers beside ours, and figures.
+    """A table with the paper's numbers and ours, and figures.
 
     Attributes:
         title: what is reproduced.

@@ -74,7 +74,7 @@ class PlantOptions(Checked):
 
     @cached_property
     def ground(self) -> Terrain:
-        """The ground, however it was told."""
+        """The ground, given as a terrain or as a step."""
         if self.ground_step is not None:
             return self.ground_step.terrain
         return self.terrain or Terrain.flat()

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 FOOT = "foot"
 TRUNK = "trunk"
-"""What the names of shapes that touch the ground begin with."""
+"""Beginnings of the names of shapes that touch the ground."""
 
 _MASSLESS = 1e-12  # of the robot's mass
 _HELD = 0.9999  # MuJoCo's largest impedance

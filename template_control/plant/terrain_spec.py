@@ -38,7 +38,7 @@ _SHORTEST, _LONGEST = 0.3, 0.6  # of random treads [m]
 
 @checked
 def terrain_from(text: str) -> Terrain:
-    """The terrain that a text tells.
+    """The terrain that a text describes.
 
     Args:
         text: a kind of ground with its numbers, such as ``step:height=0.03,x=2.5``,

@@ -68,12 +68,12 @@ class DisturbanceDistribution(Checked):
     """Ranges of the disturbances; a trial draws one number uniformly from each, by its seed.
 
     Numbers with a dimension are those of the reference template (80 kg, 1 m); another robot gets
-    them scaled by dynamic similarity. The controller is told of none of them.
+    them scaled by dynamic similarity. The controller does not know them.
 
     Attributes:
         speed: of the start's dx/dt, a share of the gait's.
         height: of the start's y at the section [m].
-        friction: coefficient of the ground; the controller reckons with 0.9 of 0.7.
+        friction: coefficient of the ground; the controller counts on 0.9 of 0.7.
         mass: of every link, a share too much.
         push: impulse on the trunk over 0.1 s, forward positive [N s].
         ground_step: height of one step of the ground, up positive [m].
@@ -372,7 +372,7 @@ def run_campaign(
         TemplateControlError: if robot or gait is not to be had.
         SweepError: if a trial ends otherwise than by its steps or a fall, or files do not fit.
     """
-    _, where = conditions.trial(0)  # a mistake is told before a worker meets it
+    _, where = conditions.trial(0)  # a mistake is reported before a worker meets it
     table = settings.to_table(conditions)
     items: list[Item] = [{"conditions": table, "number": i} for i in range(trials)]
     stem = fingerprint(where.robot, table)

@@ -140,7 +140,7 @@ _SOON = 4  # steps of a robot that starts off its gait before a step of the grou
 _EDGES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the way between two footholds
 _STARTS = 5  # seeds of the starts off the gait
 PUSH_SECONDS = 0.1
-"""How long a push lasts on the reference template."""
+"""Duration of a push on the reference template [s]."""
 
 _TIME_STEP = PlantOptions().time_step
 
@@ -320,4 +320,4 @@ LATERAL_PUSHES: tuple[Disturbance, ...] = tuple(
 """In the step they come in the left foot stands, and then the right one."""
 
 ALL = (*DISTURBANCES, *LATERAL_PUSHES)
-"""What a free robot is disturbed by, in the order shown; a planar one by ``DISTURBANCES``."""
+"""Disturbances of a floating-base robot, in the order shown; of a planar one ``DISTURBANCES``."""

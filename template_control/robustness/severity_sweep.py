@@ -75,7 +75,7 @@ def _returns(where: PreparedExperiment, z: Array, strides: int, settled: float) 
 
 
 SETTLED = 0.02
-"""How near to the gait's mean speed and height at its section a robot must be to be back on it."""
+"""Relative error of mean speed and height at the section below which a robot is on its gait."""
 
 _LAST = 5  # steps these are averaged over
 _QUICK_LEVELS, _QUICK_TRIALS = 2, 2
