@@ -1,27 +1,35 @@
-"""Time of a control tick, split into its parts, over a walk, a run or a walk in space, in PyBullet.
+"""Control ticks over steps of the physics, for a walk, a run and a walk on a floating base.
 
-Run: python benchmarks/control_tick.py [steps] [--gait walk] [--gait run] [--gait free] [--whole]
+Run: python benchmarks/control_tick.py [steps] [--gait walk] [--gait run] [--gait free] [--json]
 
-Times are those of the thread: whatever else the machine does in between does not count. The gaits
-take turns every few ticks, so that a machine which is slow for a while is so to all of them. A last
-table compares their ticks. A clock costs time as well: with --whole there is none within a tick.
+All gaits in PyBullet. Ticks and physics steps take turns in one process, and the gaits take turns
+every few ticks, so that a machine which is slow for a while is so to all of them: only ratios of
+medians are told. For each gait:
+
+tick_over_step: a whole control tick over the engine's own step.
+loop_over_step: a simulated millisecond of ``simulate``, with its full record, over that step.
+real_time_factor: simulated seconds per second of ``simulate``, plans and record included. Both are
+    times of the thread.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+import template_control as tc
 from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
 from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.robot_template import default_gait, template_for
 from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
@@ -39,218 +47,160 @@ from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import SteadyRoute
 
-GAITS = ("walk", "run", "free")
 _WARM_UP = 3  # steps, while the compiled kernels load
 _TURN = 20  # ticks
-_TICK, _PHYSICS = "whole tick", "physics step (not in the tick)"
+_RUN = 20  # steps of the run whose loop is timed
+_DT = 1e-3  # [s]
 
-Times = dict[str, np.ndarray[Any, Any]]
+
+class Start(NamedTuple):
+    """A controller that has been started, and the state that it starts from."""
+
+    controller: EmbeddingController
+    q: Any
+    v: Any
 
 
-def _plant(robot: Biped, options: PlantOptions) -> BulletPlant | FloatingBaseBulletPlant:
+def _walk_planner(robot: Biped) -> LqrPlanner:
+    return LqrPlanner(default_gait(robot))
+
+
+def _run_planner(robot: Biped) -> Planner:
+    return RunningPlanner(running_gait(SlipParameters(mass=robot.mass), 3.0))
+
+
+def _free_planner(robot: Biped) -> Planner:
+    return LqrPlanner(gait_at(template_for(robot), np.radians(68.0), 0.6), FREE_PLANNER)
+
+
+def _walk() -> Start:
+    robot = load_robot("five-link")
+    planner = _walk_planner(robot)
+    controller = EmbeddingController(robot, planner)
+    swing = np.array([0.0, 0.05]), np.array([2.2, 0.0])
+    q, v = state_at_vlo(robot, default_gait(robot).vlo, 0, *swing)
+    controller.start(0)
+    return Start(controller, q, v)
+
+
+def _run() -> Start:
+    robot = load_robot("five-link")
+    planner = _run_planner(robot)
+    controller = EmbeddingController(robot, planner)
+    controller.supervisor.begin(APEX)
+    swing, pitch = controller.swings.other, controller.first_pitch()
+    pose = apex_pose(robot, ApexStart(planner.gait.state, planner.gait, swing, pitch, AUTOMATON))
+    q, v = state_in(robot, pose)
+    controller.start(pose.rear, pose.swung)
+    return Start(controller, q, v)
+
+
+def _free() -> Start:
+    backend = FloatingBackend(load_floating_robot("bolt"))
+    planner = _free_planner(backend.robot)
+    route = SteadyRoute.of(planner.gait)
+    controller = backend.controller(planner, FreeOptions(), route, AUTOMATON)
+    return Start(controller, *backend.start(controller, Experiment()))
+
+
+GAITS: dict[str, tuple[Callable[[], Start], Callable[[Biped], Planner]]] = {
+    "walk": (_walk, _walk_planner),
+    "run": (_run, _run_planner),
+    "free": (_free, _free_planner),
+}
+
+
+def _plant(robot: Biped) -> BulletPlant | FloatingBaseBulletPlant:
+    options = PlantOptions(time_step=_DT)
     if isinstance(robot, FloatingBaseBiped):
         return FloatingBaseBulletPlant(robot, options)
     assert isinstance(robot, PlanarBiped)
     return BulletPlant(robot, options)
 
 
-def _timed(function: Callable[..., Any], into: list[float]) -> Callable[..., Any]:
-    def call(*arguments: Any) -> Any:
-        start = time.thread_time()
-        result = function(*arguments)
-        into[-1] += time.thread_time() - start
-        return result
-
-    return call
-
-
-def _walking(robot: PlanarBiped) -> tuple[EmbeddingController, Any, Any]:
-    """A controller that walks, started, and the state that it starts from."""
-    gait = default_gait(robot)
-    controller = EmbeddingController(robot, LqrPlanner(gait))
-    q, v = state_at_vlo(robot, gait.vlo, 0, np.array([0.0, 0.05]), np.array([2.2, 0.0]))
-    controller.start(0)
-    return controller, q, v
-
-
-def _running(robot: PlanarBiped, speed: float) -> tuple[EmbeddingController, Any, Any]:
-    """As :func:`_walking`, at ``speed`` [m/s]."""
-    gait = running_gait(SlipParameters(mass=robot.mass), speed)
-    controller = EmbeddingController(robot, RunningPlanner(gait))
-    controller.supervisor.begin(APEX)
-    swing, automaton = controller.swings.other, controller.supervisor.automaton
-    start = ApexStart(gait.apex, gait, swing, controller.first_pitch(), automaton)
-    pose = apex_pose(robot, start)
-    q, v = state_in(robot, pose)
-    controller.start(pose.rear, pose.swung)
-    return controller, q, v
-
-
-def _free() -> tuple[EmbeddingController, Any, Any]:
-    """As :func:`_walking`, of Bolt in space."""
-    kind = FloatingBackend(load_floating_robot("bolt"))
-    gait = gait_at(template_for(kind.robot), np.radians(68.0), 0.6)
-    route = SteadyRoute.of(gait)
-    controller = kind.controller(LqrPlanner(gait), FreeOptions(), route, AUTOMATON)
-    q, v = kind.start(controller, Experiment())
-    return controller, q, v
-
-
-class Parts(NamedTuple):
-    """Seconds of each part of a tick, a number a tick."""
-
-    update: list[float]
-    quadratic: list[float]
-    solves: list[float]
-    plans: list[float]
-    ticks: list[float]
-    physics: list[float]
-
-    def times(self) -> Times:
-        """The table's rows."""
-        model, whole, solve, plan, tick, physics = (np.array(x) for x in self)
-        return {
-            "Pinocchio update": model,
-            "references, events": tick - model - whole - plan,
-            "plans": plan,
-            "QP assembly": whole - solve,
-            f"ProxQP, in {(solve > 0.0).mean():.1%} of the ticks": solve[solve > 0.0],
-            _TICK: tick,
-            _PHYSICS: physics,
-        }
-
-
-def _time_parts(controller: EmbeddingController, parts: Parts) -> None:
-    """Put clocks into a controller, from outside: the library carries none."""
-    robot, supervisor = controller.robot, controller.supervisor
-    robot.update = _timed(robot.update, parts.update)  # type: ignore[method-assign]
-    controller.qp.solve = _timed(controller.qp.solve, parts.quadratic)  # type: ignore[method-assign]
-    for name in ("decide", "replan"):
-        setattr(supervisor, name, _whole(getattr(supervisor, name), parts.plans))
-    for workspace in (*controller.qp._workspaces, *controller.qp._braked):
-        workspace.solve = _timed(workspace.solve, parts.solves)  # type: ignore[method-assign]
-
-
-def _ticks(gait: str, speed: float, split: bool, parts: Parts) -> Generator[int, None, None]:
-    """Tick by tick, without an end; yields how many steps are over, less those of the warm-up.
-
-    Args:
-        gait: walk, run, or free: a walk in space.
-        speed: of a run [m/s].
-        split: time the parts of a tick too.
-        parts: to which the times are added, once it is warm.
-    """
-    if gait == "free":
-        controller, q, v = _free()
-    else:
-        planar = load_robot("five-link")
-        controller, q, v = _walking(planar) if gait == "walk" else _running(planar, speed)
-    robot = controller.robot
-    if split:
-        _time_parts(controller, parts)
-    forces, dt, done = np.zeros((2, robot.directions)), 1e-3, 0
+def _ticks(start: Start, ticks: list[float], steps: list[float]) -> Generator[int, None, None]:
+    """Tick by tick, without an end; yields how many strides are over, less those of the warm-up."""
+    controller, q, v = start
+    robot, clock = controller.robot, time.perf_counter
+    forces = np.zeros((2, robot.directions))
     touching = 5e-3 * robot.mass * robot.gravity
-    with _plant(robot, PlantOptions(time_step=dt)) as plant:
+    with _plant(robot) as plant:
         plant.reset(q, v)
         while True:
             plant.read(q, v)
             plant.contact_forces(forces)
-            for part in parts:
-                if done <= 0:
-                    part.clear()
-                part.append(0.0)
-            start = time.thread_time()
-            solution = controller.tick(q, v, forces[:, -1] > touching, dt, forces)
-            parts.ticks[-1] = time.thread_time() - start
-            start = time.thread_time()
+            touch = forces[:, -1] > touching
+            begin = clock()
+            solution = controller.tick(q, v, touch, _DT, forces)
+            between = clock()
             plant.step(solution.torque)
-            parts.physics[-1] = time.thread_time() - start
-            done = len(controller.reports) - _WARM_UP
+            end = clock()
+            done = len(controller.supervisor.log) + 1 - _WARM_UP
+            if done > 0:
+                ticks.append(between - begin)
+                steps.append(end - between)
             yield done
 
 
-def measure(steps: int, gaits: Sequence[str], speed: float, split: bool) -> dict[str, Times]:
-    """Seconds of every tick by part, of each gait.
+def _loop(gait: str, robot: Biped) -> float:
+    """Seconds that a tick of ``simulate`` takes this thread, whatever else the machine does."""
+    experiment = Experiment(robot=robot, motion=GAITS[gait][1](robot), steps=_RUN)
+    begin = time.thread_time()
+    record = tc.simulate(experiment)
+    assert not record.fell, record.fall_reason
+    return (time.thread_time() - begin) / (float(record.time[-1]) / _DT)
+
+
+def measure(count: int, gaits: list[str]) -> dict[str, dict[str, float]]:
+    """Ratios of each gait.
 
     Args:
-        steps: of the first gait; the others make about as many ticks.
+        count: strides of the first gait; the others make about as many ticks.
         gaits: that take turns.
-        speed: of a run [m/s].
-        split: time the parts of a tick too.
     """
-    parts = {gait: Parts([], [], [], [], [], []) for gait in gaits}
-    under_way = [_ticks(gait, speed, split, parts[gait]) for gait in gaits]
+    starts = {gait: GAITS[gait][0]() for gait in gaits}
+    times: dict[str, tuple[list[float], list[float]]] = {gait: ([], []) for gait in gaits}
+    under_way = [_ticks(starts[gait], *times[gait]) for gait in gaits]
     done = 0
-    while done <= steps:
+    while done <= count:
         for ticks in reversed(under_way):
             for _ in range(_TURN):
                 done = next(ticks)
     for ticks in under_way:
         ticks.close()
-    return {gait: times.times() for gait, times in parts.items()}
-
-
-def _whole(function: Callable[..., Any], into: list[float]) -> Callable[..., Any]:
-    """As :func:`_timed`, for functions that call each other: the outermost counts."""
-    inside = False
-    timed = _timed(function, into)
-
-    def call(*arguments: Any) -> Any:
-        nonlocal inside
-        if inside:
-            return function(*arguments)
-        inside = True
-        try:
-            return timed(*arguments)
-        finally:
-            inside = False
-
-    return call
-
-
-def _print(title: str, parts: Times) -> None:
-    whole = np.median(parts[_TICK])
-    table = Table(title=f"{title}, {len(parts['whole tick'])} ticks")
-    for name in ("part", "mean us", "median us", "p99 us", "median over whole tick"):
-        table.add_column(name, justify="left" if name == "part" else "right")
-    for name, seconds in parts.items():
-        median, p99 = np.percentile(seconds, [50, 99])
-        mean = f"{1e6 * seconds.mean():.1f}"
-        table.add_row(
-            name, mean, f"{1e6 * median:.1f}", f"{1e6 * p99:.1f}", f"{median / whole:.2f}"
-        )
-    Console().print(table)
-
-
-def _compare(gaits: dict[str, Times]) -> None:
-    """Ticks in units of the physics step, and of the first gait's tick."""
-    table = Table(title="ticks compared")
-    table.add_column("gait")
-    for name in ("mean over physics step", "mean over the first", "median over the first"):
-        table.add_column(name, justify="right")
-    physics = np.concatenate([parts[_PHYSICS] for parts in gaits.values()]).mean()
-    ticks = {gait: parts[_TICK] for gait, parts in gaits.items()}
-    first = next(iter(ticks.values()))
-    for gait, tick in ticks.items():
-        means = tick.mean() / physics, tick.mean() / first.mean()
-        ratios = *means, np.median(tick) / np.median(first)
-        table.add_row(gait, *(f"{ratio:.3f}" for ratio in ratios))
-    Console().print(table)
+    found = {}
+    for gait, (tick, step) in times.items():
+        step_time = float(np.median(step))
+        loop = min(_loop(gait, starts[gait].controller.robot) for _ in range(2))
+        found[gait] = {
+            "tick_over_step": float(np.median(tick)) / step_time,
+            "mean_tick_over_step": float(np.mean(tick)) / step_time,
+            "loop_over_step": loop / step_time,
+            "real_time_factor": _DT / loop,
+            "tick_microseconds": 1e6 * float(np.median(tick)),
+            "step_microseconds": 1e6 * step_time,
+        }
+    return found
 
 
 def main() -> None:
-    """Print a table for each gait, and one of all."""
+    """Print the ratios of each gait."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("steps", nargs="?", type=int, default=200)
-    parser.add_argument("--gait", action="append", choices=GAITS, help="walk, run if none")
-    parser.add_argument("--speed", type=float, default=3.0, help="of the run [m/s]")
-    parser.add_argument("--whole", action="store_true", help="time whole ticks only")
+    parser.add_argument("steps", nargs="?", type=int, default=40)
+    parser.add_argument("--gait", action="append", choices=GAITS, help="all if none")
+    parser.add_argument("--json", action="store_true", help="print JSON")
     options = parser.parse_args()
-    gaits = measure(options.steps, options.gait or GAITS[:2], options.speed, not options.whole)
-    if not options.whole:
-        for gait, parts in gaits.items():
-            _print(f"control tick, {gait}", parts)
-    _compare(gaits)
+    found = measure(options.steps, options.gait or list(GAITS))
+    if options.json:
+        print(json.dumps(found, indent=1))
+        return
+    table = Table(title="control ticks in units of the physics step")
+    table.add_column("gait")
+    for name in next(iter(found.values())):
+        table.add_column(name, justify="right")
+    for gait, numbers in found.items():
+        table.add_row(gait, *(f"{number:.3g}" for number in numbers.values()))
+    Console().print(table)
 
 
 if __name__ == "__main__":
