@@ -144,7 +144,8 @@ def _ticks(start: Start, ticks: list[float], steps: list[float]) -> Generator[in
 
 def _loop(gait: str, robot: Biped) -> float:
     """Seconds that a tick of ``simulate`` takes this thread, whatever else the machine does."""
-    experiment = Experiment(robot=robot, motion=GAITS[gait][1](robot), steps=_RUN)
+    planner = GAITS[gait][1](robot)
+    experiment = Experiment(robot=robot, motion=planner.gait, planner=planner, steps=_RUN)
     begin = time.thread_time()
     record = tc.simulate(experiment)
     assert not record.fell, record.fall_reason

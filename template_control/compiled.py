@@ -112,6 +112,15 @@ def inner(function: Function) -> Any:
     return _cached(function, _LEAN)
 
 
+def unfused(function: Any) -> Any:
+    """An :func:`inner` function again, whose operations are rounded one by one, as Python's are.
+
+    Only compiled functions call it: the cache has one place for a function, and this one's
+    code is part of theirs.
+    """
+    return numba.njit(function.py_func, **_ALLOCATING)
+
+
 def inner_by_type(function: Function) -> Callable[[Function], Any]:
     """Decorator of what chooses code for ``function`` by its arguments' types, as Numba's overload.
 

@@ -14,6 +14,7 @@ DEPRECATED = {
     "template_control.embedding.ChangePlanner": "template_control.embedding:CurvePlanner",
     "template_control.embedding.ForgettingPlanner": "template_control.embedding:Planner",
     "template_control.embedding.Free": "template_control.embedding:RestContext",
+    "template_control.embedding.FreeController": "template_control.embedding:EmbeddingController",
     "template_control.embedding.FreeControls": "template_control.embedding:RestContext",
     "template_control.embedding.LandingPlanner": "template_control.embedding:Planner",
     "template_control.embedding.PricingPlanner": "template_control.embedding:Planner",

@@ -26,14 +26,14 @@ def run(options: argparse.Namespace) -> int:
         options: of the command line, none.
     """
     from template_control.compiled import cache_folder
-    from template_control.embedding.free.controller import FREE
     from template_control.embedding.planners.ahead import AHEAD
     from template_control.embedding.planners.walk_kernels import WALK
     from template_control.embedding.standing.curves import STAND
+    from template_control.slip.lateral.placing import LATERAL
     from template_control.warm_up import Part, ready
 
     other = (Part(scenarios, 6.0), Part(basins, 1.5), Part(floating_base, 1.0))
-    ready((*WALK, *AHEAD, *STAND, *FREE, *other, Part(ideal_plant, 2.0)))
+    ready((*WALK, *AHEAD, *STAND, *LATERAL, *other, Part(ideal_plant, 2.0)))
     plain_console().print(f"everything is compiled, in {cache_folder()}", soft_wrap=True)
     return 0
 

@@ -2,7 +2,6 @@ from .apex_pose import ApexStart as ApexStart
 from .apex_pose import apex_pose as apex_pose
 from .contacts import ContactOptions as ContactOptions
 from .controller import EmbeddingController as EmbeddingController
-from .free.controller import FreeController as FreeController
 from .free.options import FREE_PHASES as FREE_PHASES
 from .free.options import FREE_PLANNER as FREE_PLANNER
 from .free.options import FreeOptions as FreeOptions

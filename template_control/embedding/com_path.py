@@ -13,7 +13,7 @@ along its leg.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.embedding.phases import Clock
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.model import ORDER
@@ -248,12 +247,6 @@ def at_time(
     """As :func:`at_direction`, but the time is ``guess`` itself, wherever the robot is."""
     return guess, sample(coefficients, meta, look, guess, out)
 
-
-Locate = Callable[[Array, Array, Array, float, float, float, Array], tuple[float, int]]
-"""Arguments and results of :func:`at_direction`."""
-
-LOCATE: dict[Clock, Locate] = {Clock.DIRECTION: at_direction, Clock.TIME: at_time}
-"""Search for the robot's place on the path, by the phase's clock."""
 
 TERMS = 6
 """Coefficients of a quintic."""

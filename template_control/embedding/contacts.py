@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
+from template_control.compiled import compiled
 from template_control.slip.similarity import TIME, tuned
 
 Array = NDArray[np.float64]
@@ -45,6 +47,56 @@ class ContactOptions(Checked):
     linger: NotNegative = tuned(0.015, TIME)
 
 
+_F, _I = np.float64, np.int64
+
+CONTACTS = np.dtype(
+    [
+        ("least", _F),  # horizontal force that a wall has at least [N]
+        ("doubt", _F),  # [s], of the options
+        ("linger", _F),  # [s], of the options
+        ("expected", _I, (2,)),  # by foot: IN_AIR, ON_GROUND or DUE
+        ("flags", _I, (2,)),  # of the last tick; 0 where a wall is pressed
+        ("held", _F, (2,)),  # time that each flag has been as it is [s]
+        ("wall", _F, (2,)),  # time that each foot's wall still counts [s]
+        ("standing", np.uint8, (2,)),  # whether each foot is on ground to stand on
+    ],
+    align=True,
+)
+"""State of the contacts."""
+
+IN_AIR, ON_GROUND, DUE = 0, 1, 2
+"""What the path expects of a foot; one that is due to land may do either."""
+
+NO_FORCE: Array = np.zeros((0, 0))
+"""In place of forces that are not measured."""
+
+
+@compiled
+def update_contacts(c: Any, flags: NDArray[np.bool_], force: Array, dt: float) -> None:
+    """Take in the flags of a tick.
+
+    Args:
+        c: of ``CONTACTS``, overwritten but for ``expected``.
+        flags: (2,) whether each foot touches anything, as its sensor says.
+        force: (2, d) force on each foot, forward first and up last [N]; ``NO_FORCE``: walls are
+            not looked for.
+        dt: since the last tick [s].
+    """
+    for foot in range(2):
+        flag = 1 if flags[foot] else 0
+        if force.shape[0] > 0:
+            along, up = force[foot, 0], force[foot, force.shape[1] - 1]
+            presses = abs(along) > max(c.least, _STEEPNESS * up)
+            c.wall[foot] = c.linger if presses and along < 0.0 else c.wall[foot] - dt
+            if presses:
+                flag = 0
+        c.held[foot] = c.held[foot] + dt if flag == c.flags[foot] else dt
+        c.flags[foot] = flag
+        expected = c.expected[foot]
+        if expected in (DUE, flag) or c.held[foot] >= c.doubt:
+            c.standing[foot] = flag
+
+
 class ContactMonitor:
     """Debounced contact state of both feet.
 
@@ -55,27 +107,27 @@ class ContactMonitor:
     Args:
         options: tuning.
         weight: of the robot [N].
+        data: (1,) of ``CONTACTS``; own memory if not given.
 
     Attributes:
         standing: (2,) whether each foot is on ground to stand on.
     """
 
-    def __init__(self, options: ContactOptions, weight: float) -> None:
-        self._options = options
-        self._least = _FORCE * weight
-        self.standing = np.zeros(2, dtype=bool)
+    def __init__(self, options: ContactOptions, weight: float, data: Any = None) -> None:
+        self.data = np.zeros(1, CONTACTS) if data is None else data
+        now = self.data[0]
+        now["least"], now["doubt"], now["linger"] = _FORCE * weight, options.doubt, options.linger
+        self.standing: NDArray[np.bool_] = self.data["standing"][0].view(bool)
         self.begin()
 
     def begin(self) -> None:
         """Forget an earlier run; no foot is said to stand yet."""
-        self.standing[:] = False
-        self._wall = [0.0, 0.0]  # so much longer each foot's wall counts [s]
-        self._flags = [False, False]
-        self._held = [0.0, 0.0]  # for so long each flag has been as it is [s]
+        for name in ("standing", "wall", "flags", "held"):
+            self.data[name] = 0
 
     def blocked(self, foot: int) -> bool:
         """Whether a wall is in front of a foot."""
-        return self._wall[foot] > 0.0
+        return bool(self.data["wall"][0, foot] > 0.0)
 
     def update(
         self,
@@ -84,27 +136,11 @@ class ContactMonitor:
         expected: Sequence[bool | None],
         dt: float,
     ) -> None:
-        """Take in the flags of a tick.
+        """Take in the flags of a tick; see :func:`update_contacts`.
 
         Args:
-            flags: (2,) whether each foot touches anything, as its sensor says.
-            force: (2, d) force on each foot, forward first and up last [N]; None: walls are not
-                looked for.
+            flags, force, dt: as there, but for ``force`` None.
             expected: whether each foot is to touch the ground now; None: it is due to land.
-            dt: since the last tick [s].
         """
-        # Number by number: arrays of two would take five times as long, at every tick.
-        for foot, flag in enumerate(flags.tolist()):
-            if force is not None and self._presses(foot, force[foot].tolist(), dt):
-                flag = False
-            self._held[foot] = self._held[foot] + dt if flag is self._flags[foot] else dt
-            self._flags[foot] = flag
-            if expected[foot] in (None, flag) or self._held[foot] >= self._options.doubt:
-                self.standing[foot] = flag
-
-    def _presses(self, foot: int, force: list[float], dt: float) -> bool:
-        """Whether a foot presses against a wall now; one before it counts for a while."""
-        along, up = force[0], force[-1]
-        wall = abs(along) > max(self._least, _STEEPNESS * up)
-        self._wall[foot] = self._options.linger if wall and along < 0.0 else self._wall[foot] - dt
-        return wall
+        self.data["expected"] = [DUE if due is None else int(due) for due in expected]
+        update_contacts(self.data[0], flags, NO_FORCE if force is None else force, dt)

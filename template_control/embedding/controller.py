@@ -9,34 +9,53 @@ clock, is looked up in the table of phases: the controller knows no gait.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.embedding.contacts import EARLY, SINKING, ContactMonitor
+from template_control.embedding.contacts import EARLY, NO_FORCE, SINKING, ContactMonitor
+from template_control.embedding.free.motion import LateralMotion
+from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.ground import SlopingGround
 from template_control.embedding.learners.learners import Learners
-from template_control.embedding.leg_forces import unload_cap
-from template_control.embedding.modes import PLACED, Mode, PathClock, RobotGuards, modes
+from template_control.embedding.modes import PLACED, PathClock, RobotGuards, modes
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Cause, Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
 from template_control.embedding.recovery import NEEDED, Recovery
-from template_control.embedding.state import SectionReport, Snapshot, StateObserver, rolled
+from template_control.embedding.state import (
+    FloatingSnapshot,
+    SectionReport,
+    Snapshot,
+    StateObserver,
+)
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet
+from template_control.embedding.tick import (
+    DIVERGED,
+    QUIET,
+    TICK,
+    act,
+    advance,
+    feel_in_space,
+    fired_edge,
+    sense,
+)
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.terms import UP
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Event, Leg, Slot
+from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
-from template_control.whole_body.solver import Solution, Stance, WholeBodyQp
+from template_control.whole_body.problem import solve_free
+from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.task import References
 
 Array = NDArray[np.float64]
@@ -61,7 +80,7 @@ class EmbeddingController:
         supervisor: the stride's decision and the path that follows it.
         swings: shapes of the swings in phases that have none of their own.
         feet: roles and swings of the feet.
-        place: the robot's place on that path, and the template there.
+        path_clock: the robot's place on that path, and the template there.
         learners: what is learnt from stride to stride.
         contacts: which feet stand.
         ground: its slope, as the feet tell it.
@@ -70,6 +89,7 @@ class EmbeddingController:
         references: what the tasks read.
         time: since the start [s].
         qp: the whole-body problem.
+        lateral: heading, and footholds to the left and right; None in the plane.
     """
 
     @checked
@@ -89,30 +109,52 @@ class EmbeddingController:
         if route is None:
             raise ParameterError("several planners and no route: say which stride comes next")
         scale = Scale.of(route.parameters)
-        given = options or EmbeddingOptions()
+        given = options or (FreeOptions() if robot.directions > UP else EmbeddingOptions())
         o = scaled(replace(given, phases=given.phase_table(), tasks={}), scale)
         self.robot, self.options, self.parameters = robot, o, route.parameters
-        self.learners = Learners(o, self.parameters, robot)
+        self._tick = tick = np.zeros(1, TICK)
+        now = tick[0]
+        now["early"], now["sinking"] = EARLY * scale.time, SINKING * scale.speed
+        now["friction_margin"] = o.friction_margin
+        self.learners = Learners(o, self.parameters, robot, tick)
         self.ground = SlopingGround(robot, self.parameters.rest_length)
         self.frame = self.ground.frame
         self.references = References(pitch=o.trunk_pitch)
         self.swings = o.swings(robot, scale)
-        self.feet = Feet(self.swings.other, self.references.foot)
-        self.path_clock = PathClock(self.parameters, self.references.com)
-        self.time = 0.0
-        self.observer = StateObserver(robot, self.feet, self.references.com[4:])
-        self._early, self._sinking = EARLY * scale.time, SINKING * scale.speed
-        self.contacts = ContactMonitor(o.contacts, robot.mass * robot.gravity)
-        self._guards = RobotGuards(self.parameters, o.guards)
+        self.feet = Feet(self.swings.other, self.references.foot, tick["feet"])
+        com = self.references.com
+        self.path_clock = PathClock(self.parameters, o.replan, com, tick["path"])
+        weight = robot.mass * robot.gravity
+        self.contacts = ContactMonitor(o.contacts, weight, tick["contacts"])
+        standing = self.contacts.standing
+        self.observer = StateObserver(robot, self.feet, standing, com[4:], tick["sensed"])
+        self._guards = RobotGuards(self.parameters, o.guards, tick["guards"])
         self._modes = modes(automaton, robot.nv, o.phases)
+        for mode in self._modes.values():
+            mode.tasks.check(robot)
         curved = {name for name, mode in self._modes.items() if mode.control.follow_curve}
         recovers = o.catches and automaton is AUTOMATON and planners.keys() >= NEEDED
         recovery = Recovery(self.parameters) if recovers else None
         self.supervisor = StrideSupervisor(route, planners, o.replan, automaton, curved, recovery)
-        self.mode = next(iter(self._modes.values()))
+        self._enter(next(iter(self._modes)))
         self._slope_unknown = False  # the ground under feet that both stand where a run begins
         self.qp = WholeBodyQp(robot, o)
-        self._swing_controller = SwingController(robot, self.feet, self.contacts, self.references)
+        self.lateral: LateralMotion | None = None
+        if isinstance(robot, FloatingBaseBiped):
+            if not isinstance(given, FreeOptions):
+                raise ParameterError(
+                    f"{robot.name} walks free, and its embedding has EmbeddingOptions: give"
+                    " FreeOptions"
+                )
+            keeps = self.feet, self.references, tick["lateral"]
+            self.lateral = LateralMotion.of(robot, self.parameters, given, *keeps)
+        self._terms = robot.data, robot.arrays
+        self._memory = self.references.data, self.qp.data
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return float(self._tick["time"][0])
 
     @property
     def node(self) -> Node:
@@ -136,7 +178,7 @@ class EmbeddingController:
         swing = np.full((2, 2), np.nan)
         for leg in self.mode.swings:
             swing[feet[leg]] = frame.world(self.references.foot[feet[leg], :, 0])
-        return Snapshot(
+        planar = Snapshot(
             time=self.time,
             node=self.mode.node.name,
             phase=clock.time,
@@ -147,6 +189,13 @@ class EmbeddingController:
             template_force=frame.outward(clock.forces).copy(),
             swing_reference=swing,
         )
+        if self.lateral is None:
+            return planar
+        side = np.full(2, np.nan)
+        for leg in self.mode.swings:
+            side[feet[leg]] = self.references.side[feet[leg], 0]
+        sway = self.lateral_state() - (self.lateral.side(planar.rear), 0.0)
+        return FloatingSnapshot(**vars(planar), sway=sway, side_reference=side)
 
     @property
     def _origin(self) -> float:
@@ -181,6 +230,8 @@ class EmbeddingController:
         planner, node = first or self.supervisor.begin(section)
         self.learners.lean.reset()
         self.frame.reset()
+        if self.lateral is not None:
+            self.lateral.begin(planner.gait)
         self._enter(node.name)
         self.feet.begin(rear)
         half = 0.5 * planner.gait.step_duration
@@ -192,9 +243,10 @@ class EmbeddingController:
         self.observer.begin(bool(node.stance))
         self.ground.begin(self.feet.landed)
         self.contacts.begin()
-        self._sense()
+        self._read()
         self._decide(section)
         self._slope_unknown = len(self.mode.stance) > 1
+        self._publish()
 
     def tick(
         self,
@@ -213,36 +265,71 @@ class EmbeddingController:
             dt: control period [s].
             force: (2, d) the ground's force on each foot, forward first and up last [N], by which
                 a foot in the air tells a wall, and one that slides how slippery the ground is;
-                None: they tell neither.
+                None: they tell neither. Feet that also swing sideways tell no walls.
 
         Raises:
             DivergedError: if the state is not finite.
             ParameterError: if a planner, the route or a task answers with nonsense.
         """
         self.robot.update(*self.ground.enter(q, v))
-        if force is not None:
-            force = self.frame.inward(force)
-        self.contacts.update(contact, force, self._expected(), dt)
-        if force is not None:
-            self._update_friction(force, dt)
-        self.feet.swing_time += dt
-        self._sense()
+        if self._sense(contact, force, dt):
+            self._decide_anew()
+        solution = self._act(dt)
+        if force is not None and self.lateral is not None:
+            robot = self.lateral.robot
+            feel_in_space(self._tick, robot.data, self.qp.data, force, robot.axes, dt)
+        return solution
+
+    def _sense(self, contact: NDArray[np.bool_], force: Array | None, dt: float) -> bool:
+        """Take in what was measured; whether there is anything to decide."""
+        felt = NO_FORCE if force is None or self.lateral is not None else force
+        if self.frame.angle != 0.0:
+            felt = self.frame.inward(felt)
+        found = sense(self._tick, self.robot.data, *self._memory, contact, felt, dt)
+        if found == DIVERGED:
+            raise self.observer.diverged()
+        return bool(found != QUIET) or self._slope_unknown
+
+    def lateral_state(self) -> Array:
+        """(2,) y of a floating-base robot's CoM, and dy/dt as the forward speed has it."""
+        assert self.lateral is not None
+        flag = self.mode.control.momentum_speed
+        return self.lateral.state(self.observer.now.state[1], flag)
+
+    def _decide_anew(self) -> None:
+        """See to what has happened: an edge of the present node, or a plan that is due."""
         if self._slope_unknown:
             self._find_first_slope()
-        self._advance()
-        q, v = self.frame.enter(q, v)
+        edge = fired_edge(self._tick)
+        if edge >= 0:
+            self._traverse(self.mode.outgoing_edges[edge])
         self._replan()
-        speed = self.robot.com_velocity[0]
-        self.path_clock.move(self.mode, self.supervisor, self.observer.now, speed, dt)
-        self._swing(q, v, dt)
-        self._track(q, v, dt)
-        self.observer.predict_velocity(dt)
-        self.time += dt
-        solution = self.qp.solve(self.mode.tasks, self._stance(), self.learners.load.factor)
-        if self.frame.angle != 0.0:
-            outward = self.frame.outward(solution.acceleration)
-            solution = solution._replace(acceleration=outward)
-        return solution
+        self._publish()
+
+    def _publish(self) -> None:
+        """Write the plan to where ticks read it."""
+        now = self._tick[0]
+        self.path_clock.take(self.supervisor)
+        now["tilt"], now["trim"] = self.frame.angle, self.learners.trim.acceleration
+        sideways = None if self.lateral is None else self.lateral.arrays(self.supervisor)
+        self._path: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
+
+    def _act(self, dt: float) -> Solution:
+        """References, rows and torques."""
+        qp, tasks = self.qp, self.mode.tasks
+        room = qp.room(len(self.mode.stance), self.learners.load.factor)
+        parts = self._tick, self._terms, *self._memory, *self._path
+        rows = tasks.program, tasks.table, dt
+        if tasks.others:
+            advance(*parts, rows)
+            tasks.write_others(self.robot, self.references)
+            kind = solve_free(qp.data, *self._terms, tasks.table, room)
+        else:
+            kind = act(*parts, (*rows, room))
+        solution = qp.finish(kind, tasks, room)
+        if self.frame.angle == 0.0:
+            return solution
+        return solution._replace(acceleration=self.frame.outward(solution.acceleration))
 
     # -- modes and plans ----
 
@@ -254,35 +341,10 @@ class EmbeddingController:
         if self._tilt_axes(self.ground.slope.slope, landed):
             self.supervisor.follow(self.node, self.observer.now, self.time)
             self.path_clock.restart()
+            self._publish()
 
-    def _expected(self) -> list[bool | None]:
-        """Whether each foot is to touch the ground now; None: it is due to land.
-
-        An overdue foot is no longer due: where it meets the ground then, nothing has foretold.
-        """
-        expected: list[bool | None] = [False, False]
-        for stance in self.mode.stance:
-            expected[self.feet.foot_of_leg[stance]] = True
-        supervisor, leg = self.supervisor, self.mode.next_touchdown_leg
-        if leg is not None and not supervisor.without_touchdown:
-            foot = self.feet.foot_of_leg[leg]
-            due = supervisor.time_of(Event.TOUCHDOWN) - self.path_clock.time
-            if due <= self._early and self.robot.foot_velocity[foot, 1] >= -self._sinking:
-                expected[foot] = None
-        return expected
-
-    def _sense(self) -> None:
-        control, standing = self.mode.control, self.contacts.standing
-        stands = bool(self.mode.stance)
-        self.observer.read(standing, stands, control.momentum_speed, control.rolling_contact)
-
-    def _advance(self) -> None:
-        """Take the first edge of the present node that the robot fires."""
-        for edge in self.mode.outgoing_edges:
-            due = self.supervisor.event_times[edge.event] - self.path_clock.time
-            if self._guards.fired(edge, self.observer.now, due):
-                self._traverse(edge)
-                return
+    def _read(self) -> None:
+        self.observer.read(self.mode.data)
 
     def _traverse(self, edge: Edge) -> None:
         """Go along an edge: roles and swings of the feet, plan, node."""
@@ -302,11 +364,10 @@ class EmbeddingController:
             # A step back: the other foot is the one on the ground.
             observer.stand_on(self.feet.foot_of_leg[stance[0]])
         if lifted or self.feet.foot_of_leg != roles:
-            observer.take_roles(self.mode.control.rolling_contact)
+            observer.take_roles(self.mode.data)
             self.supervisor.set_rear_toe(self.feet.foot_of_leg[Leg.REAR])
-        momentum = self.mode.control.momentum_speed
-        if momentum is not before.control.momentum_speed:
-            observer.read_speed(momentum)
+        if self.mode.control.momentum_speed is not before.control.momentum_speed:
+            observer.read_speed(self.mode.data)
         if leans or (lifted and not stance):
             # In flight no force moves the CoM: its path, and all footholds on it, are certain.
             self.supervisor.follow(self.node, observer.now, self.time)
@@ -319,6 +380,7 @@ class EmbeddingController:
 
     def _enter(self, node: str) -> None:
         self.mode = self._modes[node]
+        self._tick["mode"] = self.mode.data
 
     def _lift(self, foot: int, swung: float = 0.0) -> None:
         """A swing keeps the shape with which it began, whatever the next stride's is."""
@@ -326,6 +388,8 @@ class EmbeddingController:
         goal = supervisor.goal if supervisor.deciding else supervisor.first_goal()
         self.feet.swing[foot].options = self.mode.swing or self.swings.towards(goal)
         self.feet.lift(foot, self.robot, swung)
+        if self.lateral is not None:
+            self.lateral.lift(foot)
 
     def _standing(self) -> set[int]:
         return {self.feet.foot_of_leg[leg] for leg in self.mode.stance}
@@ -335,6 +399,8 @@ class EmbeddingController:
 
         Where the table says ``use_pre_impact_velocity``, the path goes on with the speed before it.
         """
+        if self.lateral is not None:
+            self.lateral.touch_down(self.time - self.supervisor.begun_at)
         leans = self._update_slope(self.feet.foot_of_leg[leg])
         higher, s = self.observer.land(leg), self.observer.now
         if leans:
@@ -358,15 +424,23 @@ class EmbeddingController:
         """Turn the axes about a foot, as far as the planner knows slopes; whether they turned."""
         leans = self.ground.tilt(slope, foot, self.supervisor, self.observer)
         if leans:
-            self._sense()
+            self._read()
         return leans
 
     def _decide(self, section: Section) -> None:
-        s, learners = self.observer.now, self.learners
-        if self.supervisor.deciding:
-            learners.end_stride(section, s.state, self.supervisor.decision.nominal)
-        self._enter(self.supervisor.decide(section, s, self.time, learners.state).name)
-        learners.begin_stride(self.supervisor, self.mode.trimmed)
+        s, learners, lateral = self.observer.now, self.learners, self.lateral
+        supervisor = self.supervisor
+        if supervisor.deciding:
+            nominal = supervisor.decision.nominal
+            if lateral is not None and lateral.end_stride(self.lateral_state(), nominal):
+                self.robot.update(*self.ground.raw_state)
+                self._read()
+            learners.end_stride(section, s.state, nominal)
+        self._enter(supervisor.decide(section, s, self.time, learners.state).name)
+        learners.begin_stride(supervisor, self.mode.trimmed)
+        if lateral is not None:
+            now = self.node, s, self.lateral_state(), self.time
+            self._enter(lateral.begin_stride(section, supervisor, *now).name)
         self.path_clock.restart()
 
     def _replan(self) -> None:
@@ -380,110 +454,3 @@ class EmbeddingController:
         self._enter(node.name)
         self.learners.lean.aim(supervisor.goal)
         self.path_clock.restart()
-
-    # -- references and forces ----
-
-    def _update_friction(self, force: Array, dt: float) -> None:
-        """Let the cones be as narrow as the friction that sliding feet have felt."""
-        friction = self.learners.friction
-        if friction.update(self.contacts.standing, force, self.robot.contact_velocity, dt):
-            self.qp.friction = replace(self.options, friction=friction.coefficient).cone
-
-    def _swing(self, q: Array, v: Array, dt: float) -> None:
-        """Move the references of the feet in the air towards their footholds."""
-        hips, self.references.hip_speed = self.robot.hips(q, v)
-        mode, time = self.mode, self.path_clock.time
-        self._swing_controller.advance(mode, self.supervisor, self.observer, time, hips, dt)
-
-    def _track(self, q: Array, v: Array, dt: float) -> None:
-        """Let the phase's tasks write what they ask for."""
-        s, references, mode = self.observer.now, self.references, self.mode
-        references.com_now[:] = s.state
-        references.com_now[0] -= s.toes[0]
-        references.com_push = self.learners.trim.acceleration if mode.control.trim_momentum else 0.0
-        pitch, turning = self.robot.trunk(q, v)
-        references.pitch_now[0], references.pitch_now[1] = pitch, turning
-        tilt = self.frame.angle  # the trunk is held by the vertical
-        references.pitch = self.learners.lean.advance(pitch - tilt, dt) + tilt
-        references.feet = self.feet.foot_of_leg
-        mode.tasks.write(self.robot, references)
-        if mode.control.estimate_load and mode.com is not None:
-            self.learners.load.observe(mode.com.lift(references), dt)
-
-    def _stance(self) -> Stance:
-        """The feet on the ground, the template's forces on them, and how far they unload."""
-        mode, forces, feet = self.mode, self.path_clock.forces, self.feet.foot_of_leg
-        for leg in mode.control.unload_legs:
-            weight = self.robot.mass * self.robot.gravity
-            mode.cap[leg] = unload_cap(forces[leg, 1], weight)
-        legs = mode.stance
-        return Stance(tuple([feet[leg] for leg in legs]), forces[: len(legs)].ravel(), mode.cap)
-
-
-class SwingController:
-    """Moves the swings' references from tick to tick.
-
-    Args:
-        robot: the model; every tick updates it.
-        feet: their roles and swings.
-        contacts: which walls they have met.
-        references: where it is kept how far each foot may be moved.
-    """
-
-    def __init__(
-        self, robot: Biped, feet: Feet, contacts: ContactMonitor, references: References
-    ) -> None:
-        self._robot, self._feet = robot, feet
-        self._contacts, self._references = contacts, references
-
-    def advance(
-        self,
-        mode: Mode,
-        supervisor: StrideSupervisor,
-        observer: StateObserver,
-        time: float,
-        hips: Array,
-        dt: float,
-    ) -> None:
-        """Move the references of the feet that swing.
-
-        Args:
-            mode: of the robot.
-            supervisor: which knows where the feet land.
-            observer: the robot's state, and the ground's height.
-            time: along the path [s].
-            hips: (2,) x and y [m].
-            dt: duration of the tick [s].
-        """
-        robot, feet = self._robot, self._feet
-        late, hip = self._late_foot(mode, supervisor), hips.tolist()
-        for leg in mode.swings:
-            foot = feet.foot_of_leg[leg]
-            swing = feet.swing[foot]
-            landing = supervisor.landing(foot)
-            foothold, due = landing.x, landing.time - time
-            overdue = foot == late
-            if self._contacts.blocked(foot):
-                # The path goes on as if an overdue foot had time; it has none to go up again.
-                swing.meet_wall(robot.foot_position[foot], foothold, 0.0 if overdue else due, dt)
-            elif overdue:
-                swing.drop(dt)
-            else:
-                if not isfinite(foothold):
-                    # The template cannot complete the stride; the gait's own foothold is the
-                    # best guess.
-                    gait = supervisor.planner.gait
-                    foothold = observer.now.toes[Leg.REAR] + gait.step_length
-                    due = gait.step_duration - feet.swing_time[foot]
-                if mode.control.rolling_contact:
-                    angle = float(supervisor.decision.controls[Slot.TOUCHDOWN_ANGLE])
-                    foothold = rolled(foothold, angle, robot.foot_radius)
-                swing.advance(foothold, due, dt, observer.ground)
-            self._references.furthest[foot] = swing.furthest(hip, robot.leg_length)
-
-    def _late_foot(self, mode: Mode, supervisor: StrideSupervisor) -> int | None:
-        """The foot that should have found the ground by now."""
-        leg = mode.next_touchdown_leg
-        return (
-            None if leg is None or not supervisor.without_touchdown else self._feet.foot_of_leg[leg]
-        )

@@ -16,6 +16,7 @@ _UNLOADED = 1.3
 _FLOOR = 0.025  # of the weight: it leaves a foot no load to lift off with, and the QP some room
 
 
+@compiled
 def unload_cap(template_force: float, weight: float) -> float:
     """Largest normal force of a foot that is about to lift off [N]: near the template's.
 

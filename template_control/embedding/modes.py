@@ -13,31 +13,38 @@ centimetres.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Range
-from template_control.embedding.com_path import LOCATE, Locate
+from template_control.compiled import compiled, unfused
+from template_control.embedding.com_path import at_direction, at_time
 from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.phases import Clock, PhaseControl, Phases, phase_control
-from template_control.embedding.state import TemplateState
+from template_control.embedding.rollout import ReplanOptions
+from template_control.embedding.state import SENSED, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
-from template_control.embedding.swing import SwingOptions
+from template_control.embedding.swing import FEET, SwingOptions
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Event, Leg, Phase, Reset
+from template_control.slip.automaton.vocabulary import (
+    NUM_EVENTS,
+    Event,
+    Leg,
+    Phase,
+    Reset,
+    Slot,
+)
 from template_control.slip.dynamics.guards import guard
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, tuned
-from template_control.whole_body.task import TaskStack
-from template_control.whole_body.tasks import ComTask
+from template_control.structured import Number
+from template_control.whole_body.stack import TaskStack
 
 Array = NDArray[np.float64]
 
@@ -71,78 +78,139 @@ class GuardOptions(Checked):
     liftoff_angle: Annotated[float, Range(0.0, np.pi, above=True, below=True)] | None = tuned(None)
 
 
-@dataclass(frozen=True)
+_F, _I = np.float64, np.int64
+_MOST_EDGES = 8  # of a node, to other nodes
+
+GUARDS = np.dtype(
+    [
+        ("rest_length", _F),  # l0 [m]
+        ("liftoff_angle", _F),  # of the options [rad]; NaN: the template's
+        ("shortest_swing", _F),  # [s]
+        ("earliest", _F),  # touchdown behind the CoM before it is due [s]
+        ("overstretch", _F),  # of a rear leg that is let go [m]
+    ],
+    align=True,
+)
+"""Constants of the robot's guards."""
+
+# The template's may fuse a product with a sum. Here its sign alone decides, the same one as in
+# Python.
+_value = unfused(guard)
+
+_TOUCHDOWN, _REAR_LIFTOFF = int(Event.TOUCHDOWN), int(Event.REAR_LIFTOFF)
+_FRONT_LIFTOFF, _REST = int(Event.FRONT_LIFTOFF), int(Event.REST)
+
+
+@compiled
+def fired(
+    g: Any, edge: tuple[int, int], s: Any, f: Any, contact: NDArray[np.uint8], time_to_go: float
+) -> bool:
+    """Whether an edge's event has happened.
+
+    Args:
+        g: of ``GUARDS``.
+        edge: its event, and the leg that it puts on the ground.
+        s: of :data:`~.state.SENSED`.
+        f: of :data:`~.swing.FEET`.
+        contact: (2,) whether each foot stands.
+        time_to_go: time until the template's path comes to that event [s].
+    """
+    event, leg = edge
+    if event == _TOUCHDOWN:
+        foot = f.roles[leg]
+        if not contact[foot] or f.swing_time[foot] <= g.shortest_swing:
+            return False
+        return s.toes[leg] > s.state[0] or time_to_go <= g.earliest
+    if event in (_FRONT_LIFTOFF, _REST):
+        return time_to_go <= 0.0
+    value = _value(event, s.state, s.toes, g.rest_length, 0.0)
+    if event != _REAR_LIFTOFF:
+        return value >= 0.0
+    if value > g.overstretch:
+        return True
+    if value > 0.0 and time_to_go == np.inf:
+        return True  # the template's leg would not push any more
+    if np.isnan(g.liftoff_angle):
+        return time_to_go <= 0.0
+    return np.arctan2(s.state[1], s.state[0] - s.toes[0]) <= g.liftoff_angle
+
+
+@compiled
+def first_fired(g: Any, mode: Any, path: Any, s: Any, f: Any, c: Any) -> int:
+    """Number of the first edge of a mode that the robot fires; -1: none.
+
+    Args:
+        g, s, f: as for :func:`fired`.
+        mode: of ``MODE``.
+        path: of ``PATH``.
+        c: of :data:`~.contacts.CONTACTS`.
+    """
+    for i in range(mode.edges):
+        event = mode.event[i]
+        due = path.event_times[event] - path.time
+        if fired(g, (event, mode.placed[i]), s, f, c.standing, due):
+            return i
+    return -1
+
+
 class RobotGuards:
     """The automaton's guards, as the robot feels them.
 
-    Attributes:
+    Args:
         parameters: the template.
         options: tuning.
+        data: (1,) of ``GUARDS``; own memory if not given.
     """
 
-    parameters: SlipParameters
-    options: GuardOptions
-
-    @cached_property
-    def _shortest_time(self) -> float:
-        """Of a swing [s]."""
-        p = self.parameters
-        return float(_SHORTEST_SWING * np.sqrt(p.rest_length / p.gravity))
-
-    @cached_property
-    def _earliest(self) -> float:
-        """Of a touchdown, before it is due [s]."""
-        return _EARLIEST * Scale.of(self.parameters).time
+    def __init__(self, parameters: SlipParameters, options: GuardOptions, data: Any = None) -> None:
+        p, angle = parameters, options.liftoff_angle
+        self.data = np.zeros(1, GUARDS) if data is None else data
+        now = self.data[0]
+        now["rest_length"] = p.rest_length
+        now["liftoff_angle"] = np.nan if angle is None else angle
+        now["shortest_swing"] = _SHORTEST_SWING * np.sqrt(p.rest_length / p.gravity)
+        now["earliest"] = _EARLIEST * Scale.of(p).time
+        now["overstretch"] = _OVERSTRETCH * p.rest_length
 
     def fired(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
         """Whether the edge's event has happened.
 
         Args:
-            edge: a way out of the present node.
-            sensed: the robot now.
+            edge: a way out of a node.
+            sensed: the robot.
             time_to_go: time until the template's path comes to that event [s].
         """
-        felt = _FELT[edge.event]
-        if felt is not None:
-            return felt(self, edge, sensed, time_to_go)
-        return self._value(edge.event, sensed) >= 0.0
-
-    def _value(self, event: Event, sensed: TemplateState) -> float:
-        # In Python, on its own numbers: quicker than passing arrays to compiled code.
-        state, toes = sensed.state.tolist(), sensed.toes.tolist()
-        return float(guard.py_func(int(event), state, toes, self.parameters.rest_length, 0.0))
-
-    def _touchdown(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
-        leg = PLACED[edge.reset]
-        foot = sensed.feet[leg]
-        if not sensed.contact[foot] or sensed.swing_time[foot] <= self._shortest_time:
-            return False
-        return bool(sensed.toes[leg] > sensed.state[0]) or time_to_go <= self._earliest
-
-    def _rear_liftoff(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
-        stretch = self._value(edge.event, sensed)
-        if stretch > _OVERSTRETCH * self.parameters.rest_length:
-            return True
-        if stretch > 0.0 and time_to_go == np.inf:
-            return True  # the template's leg would not push any more
-        angle = self.options.liftoff_angle
-        if angle is None:
-            return time_to_go <= 0.0
-        beta = np.arctan2(sensed.state[1], sensed.state[0] - sensed.toes[0])
-        return bool(beta <= angle)
-
-    def _due(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
-        return time_to_go <= 0.0
+        state, feet = np.zeros(1, SENSED), np.zeros(1, FEET)
+        state["state"], state["toes"] = sensed.state, sensed.toes
+        feet["roles"], feet["swing_time"] = sensed.feet, sensed.swing_time
+        number, contact = _numbered(edge), sensed.contact.astype(np.uint8)
+        return bool(fired(self.data[0], number, state[0], feet[0], contact, time_to_go))
 
 
-_NOT_GEOMETRIC: dict[Event, Callable[[RobotGuards, Edge, TemplateState, float], bool]] = {
-    Event.TOUCHDOWN: RobotGuards._touchdown,
-    Event.REAR_LIFTOFF: RobotGuards._rear_liftoff,
-    Event.FRONT_LIFTOFF: RobotGuards._due,
-    Event.REST: RobotGuards._due,
-}
-_FELT = [_NOT_GEOMETRIC.get(event) for event in Event]
-"""By Event: how the robot feels what it does not read off the template's geometry."""
+def _numbered(edge: Edge) -> tuple[int, int]:
+    """Event of an edge, and the leg that it puts on the ground; -1: none."""
+    return int(edge.event), int(PLACED.get(edge.reset, -1))
+
+
+MODE = np.dtype(
+    [
+        ("stances", _I),  # legs that carry: the rear one, or both
+        ("swings", _I),  # legs in the air that have a foothold to go to
+        ("swing_leg", _I, (2,)),  # which
+        ("next_touchdown_leg", _I),  # the leg that is to touch down; -1: none
+        ("edges", _I),  # to other nodes
+        ("event", _I, (_MOST_EDGES,)),  # of each
+        ("placed", _I, (_MOST_EDGES,)),  # the leg that each puts on the ground; -1: none
+        ("by_direction", _I),  # whether the clock is the direction of the CoM, not the time
+        ("momentum_speed", _I),  # flags of the phase's entry in the table
+        ("rolling_contact", _I),
+        ("trim_momentum", _I),
+        ("estimate_load", _I),  # and a task tells the feedback
+        ("unloads", _I, (2,)),  # whether each leg has its normal force kept near the template's
+    ],
+    align=True,
+)
+"""A mode, as compiled code reads it."""
 
 
 @dataclass(frozen=True)
@@ -153,30 +221,56 @@ class Mode:
         node: the automaton's node.
         control: the phase's entry in the table.
         tasks: the rows of the phase's tasks.
-        com: the task that follows the template's CoM; None where there is none.
         outgoing_edges: edges to other nodes, in order.
         stance: legs that carry.
         swings: legs in the air that have a foothold to go to.
         swing: shape of their swings; None: the robot's.
-        locate: finds the robot's place on the path.
-        cap: (len(stance),) largest normal force of each stance foot, inf without [N]; the
-            controller overwrites those of the legs that unload.
-        next_touchdown_leg: the leg that is to touch down; None where none is.
         trimmed: whether the momentum trim acts somewhere in the stride.
+        data: of ``MODE``.
     """
 
     node: Node
     control: PhaseControl
     tasks: TaskStack
-    com: ComTask | None
     outgoing_edges: tuple[Edge, ...]
     stance: tuple[int, ...]
     swings: tuple[int, ...]
     swing: SwingOptions | None
-    locate: Locate
-    cap: Array
-    next_touchdown_leg: Leg | None
     trimmed: bool
+    data: Any
+
+
+def _mode(node: Node, control: PhaseControl, nv: int, trimmed: bool) -> Mode:
+    """The mode of a node."""
+    touchdown, tasks = node.edge(Event.TOUCHDOWN), TaskStack(control.tasks, nv)
+    edges = tuple(edge for edge in node.edges if isinstance(edge.target, str))
+    if len(edges) > _MOST_EDGES:
+        raise ParameterError(
+            f"node {node.name} has {len(edges)} edges to other nodes: give at most {_MOST_EDGES}"
+        )
+    data = np.zeros(1, MODE)[0]
+    data["stances"], data["swings"], data["edges"] = map(len, (node.stance, control.swings, edges))
+    data["swing_leg"][: len(control.swings)] = control.swings
+    data["next_touchdown_leg"] = -1 if touchdown is None else PLACED[touchdown.reset]
+    for i, edge in enumerate(edges):
+        data["event"][i], data["placed"][i] = _numbered(edge)
+    data["by_direction"] = control.clock is Clock.DIRECTION
+    for name in ("momentum_speed", "rolling_contact", "trim_momentum"):
+        data[name] = getattr(control, name)
+    data["estimate_load"] = control.estimate_load and tasks.follows_com
+    data["unloads"][list(control.unload_legs)] = 1
+    return Mode(
+        node=node,
+        control=control,
+        tasks=tasks,
+        outgoing_edges=edges,
+        # Plain numbers: an enumeration's members are slow to index with.
+        stance=tuple(int(leg) for leg in node.stance),
+        swings=tuple(int(leg) for leg in control.swings),
+        swing=control.swing,
+        trimmed=trimmed,
+        data=data,
+    )
 
 
 def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:
@@ -204,26 +298,93 @@ def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:
         if any(phase_control(phases, other).trim_momentum for other in automaton.stride(start))
         for node in automaton.stride(start)
     }
-    found = {}
-    for node in automaton.nodes:
-        control = phase_control(phases, node)
-        touchdown = node.edge(Event.TOUCHDOWN)
-        found[node.name] = Mode(
-            node=node,
-            control=control,
-            tasks=TaskStack(control.tasks, nv),
-            com=next((task for task in control.tasks if isinstance(task, ComTask)), None),
-            outgoing_edges=tuple(edge for edge in node.edges if isinstance(edge.target, str)),
-            # Plain numbers: an enumeration's members are slow to index with.
-            stance=tuple(int(leg) for leg in node.stance),
-            swings=tuple(int(leg) for leg in control.swings),
-            swing=control.swing,
-            locate=LOCATE[control.clock],
-            cap=np.full(len(node.stance), np.inf),
-            next_touchdown_leg=PLACED[touchdown.reset] if touchdown is not None else None,
-            trimmed=node.name in trimmed,
-        )
-    return found
+    return {
+        node.name: _mode(node, phase_control(phases, node), nv, node.name in trimmed)
+        for node in automaton.nodes
+    }
+
+
+PATH = np.dtype(
+    [
+        # -- the robot's place on it --
+        ("time", _F),  # along the path [s]
+        ("offset", _F),  # of the point whose direction is the phase, ahead of the CoM [m]
+        ("fresh", _I),  # whether the path begins at this tick
+        ("forces", _F, (2, 2)),  # leg forces of the template there, rear and front [N]
+        # -- the plan, written when it changes --
+        ("body", _F, (5,)),  # m, g towards the ground and back along it, l0, assist of two legs
+        ("event_times", _F, (NUM_EVENTS,)),  # of each event's next occurrence [s]; inf: none
+        ("landing_x", _F, (2,)),  # of each foot's next foothold [m]; NaN: none
+        ("landing_time", _F, (2,)),  # [s]; inf: never
+        ("touchdown_angle", _F),  # of the stride [rad]
+        ("step_length", _F),  # of the planner's gait [m]
+        ("step_duration", _F),  # of it [s]
+        ("planned_at", _F),  # when the path began [s]
+        ("viable", _I),  # whether the template completes the path's strides
+        ("without_touchdown", _I),  # whether an overdue touchdown has been taken off the path
+        # -- when it is planned anew --
+        ("patience", _F),  # with a touchdown [s]
+        ("interval", _F),  # between plans [s]
+        ("speed", _F),  # deviation of the forward speed [m/s]
+    ],
+    align=True,
+)
+"""The path, and the robot's place on it."""
+
+
+@compiled
+def move_clock(
+    path: Any, curve: tuple[Array, Array, Array], s: Any, mode: Any, want: Any, motion: Array
+) -> None:
+    """Go on along the path to where the robot is now.
+
+    Args:
+        path: of ``PATH``, overwritten.
+        curve: of the path.
+        s: of :data:`~.state.SENSED`.
+        mode: of ``MODE``.
+        want: of ``REFERENCES``; ``com`` is overwritten.
+        motion: dx/dt of the CoM [m/s], and the time since the last tick [s].
+    """
+    speed, dt = motion
+    coefficients, meta, look = curve
+    x, y = s.state[0] + path.offset - s.toes[0], s.state[1]
+    # Since the last tick, unless the path begins at this one. A direction needs a guess only.
+    guess = path.time + (0.0 if path.fresh and not mode.by_direction else dt)
+    path.fresh = 0
+    if mode.by_direction:
+        path.time, row = at_direction(coefficients, meta, look, x, y, guess, want.com)
+    else:
+        path.time, row = at_time(coefficients, meta, look, x, y, guess, want.com)
+    path.offset += (s.state[2] - speed) * dt
+    toe, forces = look[0], path.forces
+    leg_forces(meta[row], toe, want.com, path.body, forces)
+    if meta[row, 3] != toe:
+        # Template and robot are on either side of liftoff: to each foot its own force.
+        for axis in range(2):
+            forces[0, axis], forces[1, axis] = forces[1, axis], forces[0, axis]
+
+
+@compiled
+def plan_is_due(path: Any, mode: Any, speed: float, reference: float, now: float) -> bool:
+    """Whether the supervisor is to be asked for a new plan.
+
+    Args:
+        path: of ``PATH``.
+        mode: of ``MODE``.
+        speed: forward, as the phase senses it [m/s].
+        reference: the path's [m/s].
+        now: time [s].
+    """
+    if path.without_touchdown:
+        return False
+    late = path.time > path.event_times[_TOUCHDOWN] + path.patience
+    if late and mode.next_touchdown_leg >= 0:
+        return True
+    if now - path.planned_at <= path.interval:
+        return False
+    off = abs(speed - reference) > path.speed and path.time > path.interval
+    return off or not path.viable
 
 
 class PathClock:
@@ -231,57 +392,48 @@ class PathClock:
 
     Args:
         parameters: the template.
-        reference: (6,) which is overwritten.
+        options: when to plan again.
+        reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives, which
+            the ticks write.
+        data: (1,) of ``PATH``.
 
     Attributes:
         time: along the path [s].
-        offset: the point whose direction is the phase is this far ahead of the CoM [m].
-        reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives.
+        reference: see above.
         forces: (2, 2) leg forces of the template there [N], rear and front.
     """
 
-    def __init__(self, parameters: SlipParameters, reference: Array) -> None:
-        p = parameters
-        self.reference = reference
-        self.forces = np.zeros((2, 2))
-        self._ground = p
-        self._body = np.array([p.mass, *p.gravity_parts, p.rest_length, p.assist])
+    time = Number("time")
+
+    def __init__(
+        self, parameters: SlipParameters, options: ReplanOptions, reference: Array, data: Any
+    ) -> None:
+        self.reference, self.data = reference, data
+        self.forces: Array = data["forces"][0]
+        self._body: Array = data["body"][0]
+        self._body[0], self._body[3] = parameters.mass, parameters.rest_length
+        for name in ("patience", "interval", "speed"):
+            data[name] = getattr(options, name)
         self.restart()
 
     def restart(self) -> None:
         """A new path starts where the robot is."""
-        self.time = self.offset = 0.0
-        self._fresh = True
+        for name, value in (("time", 0.0), ("offset", 0.0), ("fresh", 1)):
+            self.data[name] = value
 
-    def move(
-        self,
-        mode: Mode,
-        supervisor: StrideSupervisor,
-        sensed: TemplateState,
-        speed: float,
-        dt: float,
-    ) -> None:
-        """Go on to where the robot is now.
+    def take(self, supervisor: StrideSupervisor) -> None:
+        """Take what the supervisor has planned.
 
         Args:
-            mode: of the robot.
             supervisor: whose path is followed.
-            sensed: the robot's state.
-            speed: dx/dt of its CoM [m/s].
-            dt: since the last tick [s].
         """
-        s, path, toe = sensed, supervisor.path, supervisor.toe
-        x, y = s.state[0] + self.offset - s.toes[0], s.state[1]
-        # Since the last tick, unless the path begins at this one. A direction needs a guess only.
-        passed = 0.0 if self._fresh and mode.control.clock is Clock.TIME else dt
-        self._fresh = False
-        self.time, row = mode.locate(*path.curve, x, y, self.time + passed, self.reference)
-        self.offset += (s.state[2] - speed) * dt
-        segment = path.curve.meta[row]
-        if supervisor.ground is not self._ground:
-            self._ground = ground = supervisor.ground
-            self._body[1:3], self._body[4] = ground.gravity_parts, ground.assist
-        leg_forces(segment, toe, self.reference, self._body, self.forces)
-        if segment[3] != toe:
-            # Template and robot are on either side of liftoff: to each foot its own force.
-            self.forces[:] = np.flipud(self.forces.copy())
+        now, s = self.data[0], supervisor
+        gait, controls = s.planner.gait, s.decision.controls
+        now["event_times"] = s.event_times
+        for foot in range(2):
+            now["landing_x"][foot], now["landing_time"][foot] = s.landing(foot)
+        now["touchdown_angle"] = controls[Slot.TOUCHDOWN_ANGLE]
+        now["step_length"], now["step_duration"] = gait.step_length, gait.step_duration
+        now["planned_at"], now["viable"] = s.planned_at, s.viable
+        now["without_touchdown"] = s.without_touchdown
+        self._body[1:3], self._body[4] = s.ground.gravity_parts, s.ground.assist

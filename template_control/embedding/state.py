@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan2, isfinite, pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.embedding.planners.planner import Decision
 from template_control.embedding.swing import Feet
 from template_control.errors import DivergedError
 from template_control.robot.biped import Biped
+from template_control.robot.terms import UP
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import StrideGoal
+from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
 
+@compiled
 def unrolled(lowest: float, state: Array, radius: float) -> float:
     """Place of a rolling foot's lowest point as the CoM is over it.
 
@@ -33,9 +37,10 @@ def unrolled(lowest: float, state: Array, radius: float) -> float:
     Returns:
         x of the template's toe [m].
     """
-    return float(lowest - radius * atan2(state[0] - lowest, state[1]))
+    return lowest - radius * np.arctan2(state[0] - lowest, state[1])
 
 
+@compiled
 def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
     """Landing place of the lowest point of a foot whose toe is to be at ``toe``.
 
@@ -46,7 +51,83 @@ def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
         touchdown_angle: from the ground to the leg [rad].
         radius: of the foot [m].
     """
-    return toe - radius * (0.5 * pi - touchdown_angle)
+    return toe - radius * (0.5 * np.pi - touchdown_angle)
+
+
+_F, _I = np.float64, np.int64
+
+SENSED = np.dtype(
+    [
+        ("state", _F, (4,)),  # x, y, dx/dt, dy/dt of the CoM, y over the template's ground
+        ("toes", _F, (2,)),  # x of the rear and the front foot [m]
+        ("ground", _F),  # height of the template's ground [m]
+        ("rear_shift", _F),  # of the template's rear toe from the foot [m]
+        ("pre_impact_velocity", _F, (2,)),  # this tick's, if nothing has hit the robot [m/s]
+    ],
+    align=True,
+)
+"""The robot in the template's terms; :class:`TemplateState` explains the first two."""
+
+
+@compiled
+def read_state(s: Any, f: Any, r: Any, mode: Any) -> bool:
+    """Read the state of this tick.
+
+    Args:
+        s: of ``SENSED``, overwritten.
+        f: of :data:`~.swing.FEET`.
+        r: of ``ROBOT_DATA``.
+        mode: of :data:`~.modes.MODE`.
+
+    Returns:
+        Whether the forward speed is finite.
+    """
+    if mode.stances > 0:
+        s.ground = r.foot_position[f.landed, UP]
+    s.state[0], s.state[1] = r.com[0], r.com[UP] - s.ground
+    s.state[3] = r.com_velocity[UP]
+    read_toes(s, f, r, mode)
+    return read_speed(s, r, mode)
+
+
+@compiled
+def read_speed(s: Any, r: Any, mode: Any) -> bool:
+    """Read the forward speed as the phase has it.
+
+    Arguments as for :func:`read_state`, and what is returned.
+
+    The swing leg's angular momentum makes dx/dt of the CoM swing within a step while the
+    momentum about the foot, which is what the template predicts, does not.
+    """
+    s.state[2] = r.com_velocity[0]
+    if mode.momentum_speed:
+        s.state[2] += r.momentum[1] / (r.mass * s.state[1])
+    return np.isfinite(s.state[2])
+
+
+@compiled
+def read_toes(s: Any, f: Any, r: Any, mode: Any) -> None:
+    """Read the template's toes.
+
+    Arguments as for :func:`read_state`.
+    """
+    for leg in range(2):
+        toe = r.foot_position[f.roles[leg], 0]
+        s.toes[leg] = unrolled(toe, s.state, r.foot_radius) if mode.rolling_contact else toe
+    s.toes[0] += s.rear_shift
+
+
+@compiled
+def predict_velocity(s: Any, acceleration: Array, dt: float) -> None:
+    """Predict the velocity that the next tick has if nothing hits the robot.
+
+    Args:
+        s: of ``SENSED``, overwritten.
+        acceleration: (2,) wanted of the CoM [m/s^2].
+        dt: duration of the tick [s].
+    """
+    for axis in range(2):
+        s.pre_impact_velocity[axis] = s.state[2 + axis] + acceleration[axis] * dt
 
 
 @dataclass
@@ -80,7 +161,9 @@ class StateObserver:
     Args:
         robot: the model; every tick updates it.
         feet: their roles.
+        contact: (2,) whether each foot touches the ground; others write it.
         acceleration: (2,) wanted of the CoM, which others write [m/s^2].
+        data: (1,) of ``SENSED``; own memory if not given.
 
     Attributes:
         now: what was read last.
@@ -89,79 +172,68 @@ class StateObserver:
             the last one.
     """
 
-    def __init__(self, robot: Biped, feet: Feet, acceleration: Array) -> None:
+    ground = Number("ground")
+    _rear_shift = Number("rear_shift")
+
+    def __init__(
+        self,
+        robot: Biped,
+        feet: Feet,
+        contact: NDArray[np.bool_],
+        acceleration: Array,
+        data: Any = None,
+    ) -> None:
         self._robot, self._feet = robot, feet
-        self.now = TemplateState(swing_time=feet.swing_time, acceleration=acceleration)
-        self.ground = 0.0
-        self.pre_impact_velocity = np.zeros(2)
-        self._rear_shift = 0.0
+        self.data = np.zeros(1, SENSED) if data is None else data
+        self.now = TemplateState(
+            state=self.data["state"][0],
+            toes=self.data["toes"][0],
+            contact=contact,
+            swing_time=feet.swing_time,
+            acceleration=acceleration,
+        )
+        self.pre_impact_velocity: Array = self.data["pre_impact_velocity"][0]
+        self._terms = self.data[0], feet.data[0], robot.data[0]
 
     def begin(self, stands: bool) -> None:
         """Begin a run; where no foot stands, the ground is at height 0."""
         self.now.feet = self._feet.foot_of_leg
         self.ground = self._height(self._feet.landed) if stands else 0.0
 
-    def read(
-        self, contact: NDArray[np.bool_], stands: bool, momentum: bool, rolling_contact: bool
-    ) -> None:
+    def read(self, mode: Any) -> None:
         """Read the state of this tick.
 
         Args:
-            contact: (2,) whether each foot touches the ground.
-            stands: whether a foot carries; the ground is under the one that landed last.
-            momentum: as for :meth:`read_speed`.
-            rolling_contact: whether the toes stay in one place while the feet roll.
-        """
-        r, s = self._robot, self.now
-        if stands:
-            self.ground = self._height(self._feet.landed)
-        s.state[0], s.state[1] = r.com[0], r.com[1] - self.ground
-        s.state[3] = r.com_velocity[1]
-        self._read_toes(rolling_contact)
-        s.contact = contact
-        self.read_speed(momentum)
-
-    def read_speed(self, momentum: bool) -> None:
-        """Read the forward speed as the phase has it.
-
-        The swing leg's angular momentum makes dx/dt of the CoM swing within a step while the
-        momentum about the foot, which is what the template predicts, does not.
-
-        Args:
-            momentum: whether the speed includes the angular momentum about the CoM.
+            mode: of :data:`~.modes.MODE`.
 
         Raises:
             DivergedError: if the speed is not finite.
         """
-        r, s = self._robot, self.now
-        s.state[2] = r.com_velocity[0]
-        if momentum:
-            s.state[2] += r.angular_momentum / (r.mass * s.state[1])
-        if not isfinite(s.state[2]):  # the robot's own state is, but for its height over the foot
-            raise DivergedError(f"the forward speed of {r.name} is not finite")
+        if not read_state(*self._terms, mode):
+            raise self.diverged()
 
-    def predict_velocity(self, dt: float) -> None:
-        """Predict the velocity that the next tick has in ``dt`` if nothing hits the robot."""
-        _, _, dx, dy = self.now.state.tolist()
-        ddx, ddy = self.now.acceleration.tolist()
-        self.pre_impact_velocity[0], self.pre_impact_velocity[1] = dx + ddx * dt, dy + ddy * dt
+    def read_speed(self, mode: Any) -> None:
+        """Read the forward speed as the phase has it; see :meth:`read`."""
+        sensed, _, robot = self._terms
+        if not read_speed(sensed, robot, mode):
+            raise self.diverged()
 
-    def take_roles(self, rolling_contact: bool) -> None:
+    def diverged(self) -> DivergedError:
+        """The error of a speed that is not finite.
+
+        The robot's own state is, but for its height over the foot.
+        """
+        return DivergedError(f"the forward speed of {self._robot.name} is not finite")
+
+    def take_roles(self, mode: Any) -> None:
         """The feet have changed their roles, or one of them has lifted off.
 
         Args:
-            rolling_contact: as for :meth:`read`.
+            mode: as for :meth:`read`.
         """
         self._rear_shift = 0.0
         self.now.feet = self._feet.foot_of_leg
-        self._read_toes(rolling_contact)
-
-    def _read_toes(self, rolling_contact: bool) -> None:
-        r, s = self._robot, self.now
-        for leg, foot in enumerate(self._feet.foot_of_leg):
-            toe = float(r.foot_position[foot, 0])
-            s.toes[leg] = unrolled(toe, s.state, r.foot_radius) if rolling_contact else toe
-        s.toes[Leg.REAR] += self._rear_shift
+        read_toes(*self._terms, mode)
 
     def stand_on(self, foot: int) -> None:
         """Put the ground under a foot: the one that landed last has lifted off."""

@@ -59,6 +59,8 @@ class StrideSupervisor:
         feet: that were the rear and the front leg's where the path starts.
         without_touchdown: the swing foot is overdue, and the path goes on without it.
         arrived: the route has ended.
+        planned_at: when the path began [s].
+        viable: whether the template completes the path's strides, and goes on.
         height_error: of the ground under a foot that has landed, from which on it is unexpected
             [m].
     """
@@ -89,8 +91,8 @@ class StrideSupervisor:
         self.arrived = False
         self._begun: SectionReport | None = None  # the present stride, as it was decided first
         self._passed = 0  # so many of the path's events are over
-        self._planned_at = 0.0
-        self._viable = True  # the template completes the path's strides, and goes on
+        self.planned_at = 0.0
+        self.viable = True
         self._recovering = False  # into the present stride
         self._knows_slopes = False  # the present stride's planner
         # Speed at the stride's section less the wanted, and what came on top.
@@ -216,12 +218,12 @@ class StrideSupervisor:
         late = phase_time > self.event_times[_TOUCHDOWN] + o.patience
         if late and node.edge(Event.TOUCHDOWN) is not None:
             return Cause.OVERDUE
-        if now - self._planned_at <= o.interval:
+        if now - self.planned_at <= o.interval:
             return None
         if abs(deviation) > o.speed and phase_time > o.interval:
             self._speed_excess += deviation
             return Cause.DEVIATION
-        stuck = not self._viable and (self._recovering or self._retries())
+        stuck = not self.viable and (self._recovering or self._retries())
         return Cause.NO_FUTURE if stuck else None
 
     def _retries(self) -> bool:
@@ -267,7 +269,7 @@ class StrideSupervisor:
         self.set_decision(decision)
         node = self.follow(node, sensed, now, rule.angle_drop)
         lasts = not s.whole or decision is None or decision.lasting
-        if not rule.recovers or (lasts and self._viable):
+        if not rule.recovers or (lasts and self.viable):
             return node
         return self._recover(self._situation(node, sensed), now) or node
 
@@ -372,10 +374,10 @@ class StrideSupervisor:
             node = self.automaton.node(first.start)
         else:
             first = self._rollout.forward(node.name, sensed, state, u)
-        strides, self._viable = self._rollout.strides(node, first, self.goal, now)
+        strides, self.viable = self._rollout.strides(node, first, self.goal, now)
         self.path, self.feet = join(strides, self._rollout.scale.time), sensed.feet
         self._look_ahead(0)
-        self._planned_at = now
+        self.planned_at = now
         return node
 
     def time_of(self, event: Event) -> float:

@@ -14,11 +14,9 @@ the leg is heavy: only light legs swing high.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from math import inf, sqrt
-from typing import NamedTuple
+from dataclasses import dataclass, fields
+from math import inf
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +25,7 @@ from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.compiled import compiled
 from template_control.robot.biped import Biped
+from template_control.robot.terms import UP
 from template_control.slip.automaton.vocabulary import Leg, Reset
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, Scale, scaled, tuned
@@ -73,11 +72,22 @@ class SwingOptions(Checked):
     drop_acceleration: Positive = tuned(10.0, ACCELERATION)
     leg_share: Share = tuned(0.98)
 
-    @cached_property
-    def shape(self) -> tuple[float, float, float, float, float, float]:
-        """Numbers for :func:`swing_step`: a tuple, which is quick to hand over."""
-        descent = inf if self.descent is None else self.descent
-        return self.clearance, self.rise, descent, self.landing_speed, self.horizon, self.early
+
+_F, _I = np.float64, np.int64
+_SHAPE = tuple(f.name for f in fields(SwingOptions))
+
+FEET = np.dtype(
+    [
+        ("roles", _I, (2,)),  # the foot that is the rear leg's, and the front leg's
+        ("landed", _I),  # the foot that landed last; the template's ground is there
+        ("swing_time", _F, (2,)),  # time since each foot lifted off [s]
+        ("elapsed", _F, (2,)),  # duration of the reference's swing so far [s]
+        ("over", _F, (2,)),  # height that the reference keeps, above a wall it met [m]
+        *((name, _F, (2,)) for name in _SHAPE),  # of each foot's ``SwingOptions``
+    ],
+    align=True,
+)
+"""Roles and swings of the feet; the references themselves are among those of the tasks."""
 
 
 @compiled
@@ -96,40 +106,85 @@ def quintic_step(state: Array, target: float, speed: float, time: float, dt: flo
 
 @compiled
 def swing_step(
-    x: Array,
-    y: Array,
-    foothold: tuple[float, float, float],
-    shape: tuple[float, float, float, float, float, float],
-    so_far: tuple[float, float],
-    dt: float,
+    f: Any, foot: int, x: Array, y: Array, foothold: tuple[float, float, float], dt: float
 ) -> None:
     """Advance a foot's reference by ``dt`` towards its foothold.
 
     Args:
+        f: of ``FEET``.
+        foot: which.
         x, y: (3,) position, velocity, acceleration of either [m, m/s, m/s^2]; overwritten.
         foothold: x and y of the foothold [m], and the time until the foot is due there [s].
-        shape: of the swing, from :attr:`SwingOptions.shape`.
-        so_far: time since the foot left the ground [s]; the height that it keeps at least [m].
         dt: how far to advance [s].
     """
     place, ground, to_go = foothold
-    clearance, rise, descent, landing_speed, horizon, early = shape
+    horizon, landing_speed, elapsed = f.horizon[foot], f.landing_speed[foot], f.elapsed[foot]
+    f.elapsed[foot] += dt
     if to_go <= horizon or not np.isfinite(place):
         # Nearly there: hold the horizontal position, keep coming down.
         x[1] = x[2] = y[2] = 0.0
         y[1] = -landing_speed
         y[0] -= landing_speed * dt
         return
-    _advance(x, place, 0.0, max(to_go - early, horizon), dt)
-    top = max(ground + clearance, so_far[1])
-    rising = rise * to_go - (1.0 - rise) * so_far[0]
+    _advance(x, place, 0.0, max(to_go - f.early[foot], horizon), dt)
+    top = max(ground + f.clearance[foot], f.over[foot])
+    rising = f.rise[foot] * to_go - (1.0 - f.rise[foot]) * elapsed
     if rising > horizon:
         _advance(y, top, 0.0, rising, dt)
-    elif to_go > descent:
+    elif to_go > f.descent[foot]:
         # Up: stay there, and come to rest where the rise was cut short.
         _advance(y, top, 0.0, max(2.0 * horizon, dt), dt)
     else:
         _advance(y, ground, -landing_speed, to_go, dt)
+
+
+@compiled
+def meet_wall(
+    f: Any, foot: int, x: Array, y: Array, at: Array, aim: tuple[float, float], dt: float
+) -> None:
+    """Go up along a wall that a foot has met, and stay above it from then on; or down.
+
+    Args:
+        f, foot, x, y, dt: as for :func:`swing_step`.
+        at: (3,) the foot: forward first and up last [m].
+        aim: x of the foothold in the world [m], not finite where there is none; time until the
+            foot is due [s].
+    """
+    x[0], x[1], x[2] = at[0], 0.0, 0.0
+    near = y[1] < 0.0 and abs(aim[0] - at[0]) < f.near[foot]
+    if near or aim[1] < f.late[foot]:
+        drop(f, foot, x, y, dt)
+        return
+    y[0] = max(y[0], at[UP]) + f.lift_speed[foot] * dt
+    y[1], y[2] = f.lift_speed[foot], 0.0
+    f.over[foot] = y[0] + f.margin[foot]
+    f.elapsed[foot] += dt
+
+
+@compiled
+def drop(f: Any, foot: int, x: Array, y: Array, dt: float) -> None:
+    """Let an overdue foot fall: the ground is lower than was thought.
+
+    Arguments as for :func:`swing_step`.
+    """
+    x[1], x[2] = 0.0, 0.0
+    y[2] = -f.drop_acceleration[foot]
+    y[0] += (y[1] + 0.5 * y[2] * dt) * dt
+    y[1] += y[2] * dt
+
+
+@compiled
+def furthest(share: float, hip: tuple[float, float], height: float, leg_length: float) -> float:
+    """The furthest x that a leg reaches at a height [m].
+
+    Args:
+        share: of the leg's length that is used.
+        hip: x and y of the hip [m].
+        height: of the foot [m].
+        leg_length: of the straight leg [m].
+    """
+    below, reach = hip[1] - height, share * leg_length
+    return hip[0] + np.sqrt(max(reach * reach - below * below, 0.0))
 
 
 @compiled
@@ -155,17 +210,43 @@ class SwingFoot:
     Args:
         options: shape of the swing.
         reference: (2, 3) where it is kept; own memory if not given.
+        data: (1,) of ``FEET``; own memory if not given.
+        foot: of those.
 
     Attributes:
-        options: shape of the swing from now on.
         x, y: (3,) position, velocity, acceleration [m, m/s, m/s^2] in the world.
     """
 
-    def __init__(self, options: SwingOptions, reference: Array | None = None) -> None:
-        self.options = options
+    def __init__(
+        self,
+        options: SwingOptions,
+        reference: Array | None = None,
+        data: Any = None,
+        foot: int = 0,
+    ) -> None:
+        self.data = np.zeros(1, FEET) if data is None else data
+        self._foot = foot
         self.x, self.y = np.zeros((2, 3)) if reference is None else reference
-        self._elapsed = 0.0
-        self._over = -inf
+        self._place = self.data[0], foot, self.x, self.y
+        self.options = options
+        self._begin(0.0)
+
+    @property
+    def options(self) -> SwingOptions:
+        """Shape of the swing from now on."""
+        return self._options
+
+    @options.setter
+    def options(self, options: SwingOptions) -> None:
+        """Take another shape."""
+        self._options = options
+        for name in _SHAPE:
+            value = getattr(options, name)
+            self.data[name][0, self._foot] = inf if value is None else value
+
+    def _begin(self, elapsed: float) -> None:
+        self.data["elapsed"][0, self._foot] = elapsed
+        self.data["over"][0, self._foot] = -inf
 
     def start(self, position: Array, velocity: Array, elapsed: float = 0.0) -> None:
         """Begin a swing where the foot is now.
@@ -177,8 +258,7 @@ class SwingFoot:
         """
         self.x[:] = position[0], velocity[0], 0.0
         self.y[:] = position[1], velocity[1], 0.0
-        self._elapsed = elapsed
-        self._over = -inf
+        self._begin(elapsed)
 
     def advance(self, foothold: float, time_to_go: float, dt: float, ground: float) -> None:
         """Move the reference by ``dt`` towards its foothold.
@@ -189,47 +269,7 @@ class SwingFoot:
             dt: control period [s].
             ground: height of the foothold [m].
         """
-        aim, so_far = (foothold, ground, time_to_go), (self._elapsed, self._over)
-        swing_step(self.x, self.y, aim, self.options.shape, so_far, dt)
-        self._elapsed += dt
-
-    def meet_wall(self, position: Array, foothold: float, time_to_go: float, dt: float) -> None:
-        """Go up along a wall that the foot has met, and stay above it from then on; or down.
-
-        Args:
-            position: (2,) of the foot [m].
-            foothold: x of the foothold in the world [m]; not finite where there is none.
-            time_to_go: time until the foot is due [s].
-            dt: control period [s].
-        """
-        o = self.options
-        self.x[:] = position[0], 0.0, 0.0
-        near = self.y[1] < 0.0 and abs(foothold - position[0]) < o.near
-        if near or time_to_go < o.late:
-            self.drop(dt)
-            return
-        self.y[0] = max(self.y[0], position[1]) + o.lift_speed * dt
-        self.y[1], self.y[2] = o.lift_speed, 0.0
-        self._over = self.y[0] + o.margin
-        self._elapsed += dt
-
-    def drop(self, dt: float) -> None:
-        """Let an overdue foot fall: the ground is lower than was thought."""
-        self.x[1], self.x[2] = 0.0, 0.0
-        self.y[2] = -self.options.drop_acceleration
-        self.y[0] += (self.y[1] + 0.5 * self.y[2] * dt) * dt
-        self.y[1] += self.y[2] * dt
-
-    def furthest(self, hip: Sequence[float], leg_length: float) -> float:
-        """The furthest x that the leg reaches at the reference's height [m].
-
-        Args:
-            hip: (2,) position of the hip [m]; numbers, as arithmetic on an array's is slow.
-            leg_length: of the straight leg [m].
-        """
-        height = hip[1] - float(self.y[0])
-        reach = self.options.leg_share * leg_length
-        return hip[0] + sqrt(max(reach**2 - height**2, 0.0))
+        swing_step(*self._place, (foothold, ground, time_to_go), dt)
 
 
 HIGH_SWING = SwingOptions(clearance=0.06, rise=0.3, descent=0.12, early=0.02)
@@ -276,19 +316,44 @@ class Feet:
     Args:
         options: shape of the swings.
         reference: (2, 2, 3) where the swings' references are kept, by foot.
+        data: (1,) of ``FEET``; own memory if not given.
 
     Attributes:
-        of: the foot that is the rear leg's, and the front leg's.
+        foot_of_leg: the foot that is the rear leg's, and the front leg's.
         swing: each foot's reference in the air.
         swing_time: (2,) time since each foot lifted off [s].
         landed: the foot that landed last; the template's ground is there.
     """
 
-    def __init__(self, options: SwingOptions, reference: Array) -> None:
-        self.foot_of_leg: tuple[int, int] = (0, 1)
-        self.swing = tuple(SwingFoot(options, place) for place in reference)
-        self.swing_time = np.full(2, np.inf)
-        self.landed = 0
+    def __init__(self, options: SwingOptions, reference: Array, data: Any = None) -> None:
+        self.data = np.zeros(1, FEET) if data is None else data
+        self.swing = tuple(
+            SwingFoot(options, place, self.data, foot) for foot, place in enumerate(reference)
+        )
+        self.swing_time: Array = self.data["swing_time"][0]
+        self.swing_time[:] = inf
+        self.begin(0)
+
+    @property
+    def landed(self) -> int:
+        """See the class."""
+        return int(self.data["landed"][0])
+
+    @landed.setter
+    def landed(self, foot: int) -> None:
+        """A foot has landed."""
+        self.data["landed"] = foot
+
+    @property
+    def foot_of_leg(self) -> tuple[int, int]:
+        """See the class."""
+        return self._roles
+
+    @foot_of_leg.setter
+    def foot_of_leg(self, roles: tuple[int, int]) -> None:
+        """Take other roles."""
+        self._roles = roles
+        self.data["roles"] = roles
 
     def begin(self, rear: int) -> None:
         """Make foot ``rear`` the rear leg's, and put the template's ground under it."""

@@ -14,12 +14,17 @@ from numpy.typing import NDArray
 from template_control.errors import DivergedError
 from template_control.robot.legs import HINGES, foot_frame, leg_joints, middle, straight_legs
 from template_control.robot.requirements import add_feet, check_size
+from template_control.robot.terms import ROBOT_DATA, UP, Jacobians, sources
 from template_control.robot.urdf import with_masses
+from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
 _BENT = np.array([-0.4, 0.8])  # of hip and knee [rad]
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+_SAGITTAL = {2: 1, 3: UP}  # by directions: from forward to up
 
 
 class Biped(ABC):
@@ -72,9 +77,15 @@ class Biped(ABC):
         foot_bias: (2, 2) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
         contact_velocity, contact_jacobian, contact_bias: of each foot in all ``directions``.
         joint_angle, joint_velocity: (nu,) of the actuated joints [rad, rad/s].
+        hips: (2,) the point the legs hang from [m].
+        hip_speed: its forward velocity [m/s].
+        pitch, pitch_rate: of the trunk in the sagittal plane [rad, rad/s].
         fastest: the largest share of its limit that a joint's speed has.
         soonest_stop: the shortest time in which a joint would come to its stop at its speed [s]; 0
             of one that is there, inf where none moves.
+        data, jacobians: all of these for compiled code, which reads the same memory: (1,) of
+            ``ROBOT_DATA``, and :class:`~.terms.Jacobians`.
+        arrays: the latter as a plain tuple, which a compiled function takes in half the time.
     """
 
     base_dof: int
@@ -108,9 +119,9 @@ class Biped(ABC):
     com_velocity: Array
     com_jacobian: Array
     com_bias: Array
-    angular_momentum: float
+    angular_momentum = Number("momentum", 1)
     angular_momentum_jacobian: Array
-    angular_momentum_bias: float
+    angular_momentum_bias = Number("momentum_bias", 1)
     foot_position: Array
     foot_velocity: Array
     foot_jacobian: Array
@@ -120,8 +131,12 @@ class Biped(ABC):
     contact_bias: Array
     joint_angle: Array
     joint_velocity: Array
-    fastest: float
-    soonest_stop: float
+    hips: Array
+    hip_speed = Number("hip_speed")
+    pitch = Number("attitude", 1)
+    pitch_rate = Number("turning", 1)
+    fastest = Number("fastest")
+    soonest_stop = Number("soonest_stop")
 
     def __init__(
         self,
@@ -142,13 +157,10 @@ class Biped(ABC):
         self.torque_limit = np.array(model.effortLimit[self.base_dof :])
         self.velocity_limit = np.array(model.velocityLimit[self.base_dof :])
         nu = len(self.joint_names)
-        limits = (model.lowerPositionLimit, model.upperPositionLimit)
-        self.joint_range = np.column_stack(limits)[-nu:]
+        stops = (model.lowerPositionLimit, model.upperPositionLimit)
+        self.joint_range = np.column_stack(stops)[-nu:]
         self.joint_damping = np.array(model.damping[self.base_dof :])
         self.joint_friction = np.array(model.upperDryFrictionLimit[self.base_dof :])
-        self._damped = bool(self.joint_damping.any())
-        self.joint_angle = np.zeros(nu)
-        self.fastest, self.soonest_stop = 0.0, np.inf
         self._foot_ids = tuple(foot_frame(model, foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
@@ -160,10 +172,36 @@ class Biped(ABC):
             float(sum(model.inertias[j].mass for j in leg)) for leg in self._leg_joints
         )
         self._data = data = model.createData()
-        # Pinocchio keeps these arrays in place, so the views stay good.
-        self.mass_matrix, self.nonlinear_effects = data.M, data.nle
         self._joint_places = [data.oMi[j].translation for j in range(first, model.njoints)]
+        self.data = np.zeros(1, ROBOT_DATA)
+        for name in ("mass", "gravity", "foot_radius", "leg_length"):
+            self.data[name] = getattr(self, name)
+        self.jacobians = Jacobians.zeros(data, self.directions, self.base_dof)
+        self.arrays = tuple(self.jacobians)
+        limits = (self.velocity_limit, *self.joint_range.T, self.joint_damping)
+        self._sources = sources(model, data, self._foot_ids, np.vstack(limits))
+        self._look()
         self._prepare()
+
+    def _look(self) -> None:
+        """Take the views that Python reads; Pinocchio keeps its arrays in place."""
+        j, now, step = self.jacobians, self.data, _SAGITTAL[self.directions]
+        self.mass_matrix, self.nonlinear_effects = j.mass_matrix, j.nonlinear_effects
+        self.com, self.com_velocity, self.com_bias = (
+            now[name][0, ::UP] for name in ("com", "com_velocity", "com_bias")
+        )
+        self.com_jacobian = j.com[::step]
+        self.angular_momentum_jacobian = j.momentum[len(j.momentum) // 2]
+        self.foot_position, self.foot_velocity, self.foot_bias = (
+            now[name][0, :, ::UP] for name in ("foot_position", "foot_velocity", "foot_bias")
+        )
+        self.foot_jacobian = j.contact[:, ::step]
+        every = UP // step
+        self.contact_velocity = now["foot_velocity"][0, :, ::every]
+        self.contact_bias = now["foot_bias"][0, :, ::every]
+        self.contact_jacobian = j.contact
+        self.joint_angle, self.joint_velocity = j.joints
+        self.hips = now["hips"][0, ::UP]
 
     def __repr__(self) -> str:
         joints = ", ".join(self.joint_names)
@@ -206,10 +244,7 @@ class Biped(ABC):
             the world's axes [m/s^2, rad/s^2].
         """
         model, data = self.model, self._data
-        self.joint_angle[:] = q[-len(self.joint_angle) :]
         pin.computeAllTerms(model, data, q, v)
-        if self._damped:
-            self.nonlinear_effects[self.base_dof :] += self.joint_damping * v[self.base_dof :]
         pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
         left, right = self._foot_ids
         pin.updateFramePlacement(model, data, left)
@@ -219,11 +254,10 @@ class Biped(ABC):
             pin.getFrameClassicalAcceleration(model, data, right, _WORLD_ALIGNED).vector,
         )
 
-    def _check_finite(self, finite: bool, q: Array, v: Array) -> None:
-        if not finite:
-            raise DivergedError(
-                f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
-            )
+    def _diverged(self, q: Array, v: Array) -> DivergedError:
+        return DivergedError(
+            f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
+        )
 
     @abstractmethod
     def update(self, q: Array, v: Array) -> None:
@@ -272,22 +306,6 @@ class Biped(ABC):
     @abstractmethod
     def hip_height(self, q: Array) -> float:
         """Height of the point the legs hang from [m], of the last update's ``q``."""
-
-    @abstractmethod
-    def hips(self, q: Array, v: Array) -> tuple[Array, float]:
-        """(2,) position of that point [m], and its forward speed [m/s].
-
-        Args:
-            q, v: of the last update.
-        """
-
-    @abstractmethod
-    def trunk(self, q: Array, v: Array) -> tuple[float, float]:
-        """Pitch of the trunk [rad] and its rate [rad/s].
-
-        Args:
-            q, v: of the last update.
-        """
 
     @abstractmethod
     def tilt(self, q: Array) -> float:

@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import atan2, cos, isfinite, sin, sqrt
+from math import cos, isfinite, sin, sqrt
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -26,12 +27,7 @@ from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.legs import HINGES
 from template_control.robot.requirements import add_feet, check_floating
-from template_control.robot.terms import (
-    FLOATING_DOF,
-    FloatingTerms,
-    floating_sources,
-    gather_floating,
-)
+from template_control.robot.terms import FLOATING_DOF, UP, Jacobians, Trunk, gather_floating
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import (
     check_joint_names,
@@ -68,6 +64,60 @@ class JointLimits(Checked):
     ranges: tuple[Interval, ...] = ()
 
 
+class SpaceTerms(NamedTuple):
+    """Terms of a robot with three directions, in its heading frame: x forward, y left, z up.
+
+    Attributes:
+        com, com_velocity, com_bias: (3,) [m, m/s, m/s^2].
+        com_jacobian: (3, nv).
+        momentum: (3,) angular, about the CoM [N m s].
+        momentum_jacobian: (3, nv).
+        momentum_bias: (3,) [N m].
+        foot: (2, 3) lowest points of the feet [m].
+        foot_jacobian: (2, 3, nv).
+        foot_bias: (2, 3) [m/s^2].
+        turning: (3,) angular velocity of the trunk [rad/s].
+        turning_jacobian: (3, nv); its bias is 0.
+    """
+
+    com: Array
+    com_velocity: Array
+    com_bias: Array
+    com_jacobian: Array
+    momentum: Array
+    momentum_jacobian: Array
+    momentum_bias: Array
+    foot: Array
+    foot_jacobian: Array
+    foot_bias: Array
+    turning: Array
+    turning_jacobian: Array
+
+    @classmethod
+    def of(cls, data: Any, j: Jacobians) -> SpaceTerms:
+        """Views of a robot's terms.
+
+        Args:
+            data: (1,) of ``ROBOT_DATA``.
+            j: its Jacobians.
+        """
+        now = {name: data[name][0] for name in data.dtype.names}
+        return cls(
+            com=now["com"],
+            com_velocity=now["com_velocity"],
+            com_bias=now["com_bias"],
+            com_jacobian=j.com,
+            momentum=now["momentum"],
+            momentum_jacobian=j.momentum,
+            momentum_bias=now["momentum_bias"],
+            foot=now["foot_position"],
+            foot_jacobian=j.contact,
+            foot_bias=now["foot_bias"],
+            turning=now["turning"],
+            turning_jacobian=j.turning,
+        )
+
+
 class FloatingBaseBiped(Biped):
     """Model of a floating-base biped, and its kinematics and dynamics at the last :meth:`update`.
 
@@ -85,6 +135,7 @@ class FloatingBaseBiped(Biped):
     Attributes:
         heading: angle from the world's x to the heading frame's, to the left positive [rad].
         origin: (2,) x and y of the heading frame's origin in the world [m].
+        axes: (3, 3) turns vectors into the heading frame: ``vector @ axes``.
         space: all terms with three directions, in the heading frame.
         spare: of each leg with four hinges, the joint above the hip whose axis is nearest to the
             vertical: its index into ``joint_names``, and its angle in :meth:`neutral` [rad].
@@ -101,24 +152,25 @@ class FloatingBaseBiped(Biped):
         return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
 
     def _prepare(self) -> None:
-        model = self.model
-        data = self._data
+        model, data = self.model, self._data
         self.rotation: Array = data.oMi[_ROOT].rotation
         self._hips = [data.oMi[leg[-HINGES]] for leg in self._leg_joints]
-        self._in_leg = [np.zeros(3), np.zeros(3)]
-        limits = self.velocity_limit, self.joint_range
-        self._sources = floating_sources(model, data, self._foot_ids, self.foot_radius, limits)
-        self.space = FloatingTerms.zeros(self.nv)
-        self._terms = tuple(self.space)
-        self._frame = np.array([0.0, 0.0, 1.0, 0.0])
+        self._in_leg = np.zeros((2, 3))
+        left, right = self._hips
+        places = (left.translation, right.translation, left.rotation, right.rotation)
+        self._trunk = tuple(Trunk(self.rotation, *places, self._in_leg))
+        self.space = SpaceTerms.of(self.data, self.jacobians)
+        self._frame = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
+        self.axes = np.eye(3)
+        self._base, self._out = (self._frame, self._trunk), self.arrays[1:]
         self.origin = self._frame[:2]
         self.heading = 0.0
-        self._look()
         self.update(self._neutral, np.zeros(self.nv))
         # A hip is the point of its axis that is in the plane in which the leg swings.
         for hip, foot, point in zip(self._hips, self._foot_ids, self._in_leg, strict=True):
             away = data.oMf[foot].translation[1] - hip.translation[1]
             point[:] = hip.rotation.T @ (0.0, away, 0.0)
+        self.update(self._neutral, np.zeros(self.nv))
         lever = model.inertias[_ROOT].lever[2]
         self.trunk_com = float(lever - self.hip_height(self._neutral))
         axes = pin.computeJointJacobians(model, model.createData(), self._neutral)[5]
@@ -128,24 +180,11 @@ class FloatingBaseBiped(Biped):
             if len(leg) > _PLACING
             for joint in [max(leg[:-HINGES], key=lambda j: abs(axes[FLOATING_DOF + j]))]
         )
-        self._aside = float(self._middle()[1])  # of the trunk's origin
-
-    def _look(self) -> None:
-        """The sagittal terms are the space's x and z."""
-        s = self.space
-        self.com, self.com_velocity, self.com_bias = (
-            s.com[::2],
-            s.com_velocity[::2],
-            s.com_bias[::2],
-        )
-        self.com_jacobian = s.com_jacobian[::2]
-        self.angular_momentum_jacobian = s.momentum_jacobian[1]
-        self.angular_momentum = self.angular_momentum_bias = 0.0
-        self.contact_jacobian, self.contact_bias = s.foot_jacobian, s.foot_bias
-        self.contact_velocity = np.zeros((2, 3))
-        self.foot_position, self.foot_velocity = s.foot[:, ::2], self.contact_velocity[:, ::2]
-        self.foot_jacobian, self.foot_bias = s.foot_jacobian[:, ::2], s.foot_bias[:, ::2]
-        self.joint_velocity = s.joint_velocity
+        now = self.data[0]
+        now["spare"] = len(self.spare)
+        for i, (joint, angle) in enumerate(self.spare):
+            now["spare_joint"][i], now["spare_angle"][i] = joint, angle
+        self._frame[4] = now["hips"][1]  # of the trunk's origin
 
     @classmethod
     @checked
@@ -216,13 +255,9 @@ class FloatingBaseBiped(Biped):
         square = x * x + y * y + z * z + w * w
         if abs(square - 1.0) > _UNIT:  # NaN and infinity are told below
             q = self._with_unit(q, sqrt(square))
-        finite, self.fastest, self.soonest_stop = gather_floating(
-            self._sources, q, v, self._compute(q, v), self._frame, self._terms
-        )
-        self._check_finite(finite, q, v)
-        s = self.space
-        self.angular_momentum, self.angular_momentum_bias = s.momentum[1], s.momentum_bias[1]
-        np.matmul(s.foot_jacobian, v, out=self.contact_velocity)
+        drift, out = self._compute(q, v), (self.data, self._out)
+        if not gather_floating(self._sources, q, v, drift, *out, self._base):
+            raise self._diverged(q, v)
 
     def _with_unit(self, q: Array, length: float) -> Array:
         """A configuration whose quaternion is as long as 1.
@@ -239,11 +274,6 @@ class FloatingBaseBiped(Biped):
         q[3:7] /= length
         return q
 
-    def faced(self, vector: Array) -> Array:
-        """(..., 3) vectors in the heading frame, from the world's axes."""
-        c, s = cos(self.heading), sin(self.heading)
-        return vector @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
     def face(self, heading: float, origin: Array) -> None:
         """Put the heading frame somewhere; takes effect at the next :meth:`update`.
 
@@ -252,7 +282,9 @@ class FloatingBaseBiped(Biped):
             origin: (2,) x and y of its origin in the world [m].
         """
         self.heading = heading
-        self._frame[:] = origin[0], origin[1], cos(heading), sin(heading)
+        c, s = cos(heading), sin(heading)
+        self._frame[:4] = origin[0], origin[1], c, s
+        self.axes[:2, :2] = (c, -s), (s, c)
 
     def turn(self, angle: float, about: Array) -> None:
         """Turn the heading frame; takes effect at the next :meth:`update`.
@@ -274,7 +306,7 @@ class FloatingBaseBiped(Biped):
         Args:
             point: (..., 2) or (..., 3) [m].
         """
-        x0, y0, c, s = self._frame
+        x0, y0, c, s = self._frame[:4]
         x, y = point[..., 0], point[..., 1]
         out = np.array(point)
         out[..., 0], out[..., 1] = x0 + c * x - s * y, y0 + s * x + c * y
@@ -292,37 +324,15 @@ class FloatingBaseBiped(Biped):
         """
         return np.asarray(pin.difference(self.model, q, other))
 
-    def _middle(self) -> Array:
-        """(3,) between the hips, in the world, at the last update [m]."""
-        left, right = (
-            hip.translation + hip.rotation @ point
-            for hip, point in zip(self._hips, self._in_leg, strict=True)
-        )
-        return np.asarray(0.5 * (left + right))
-
     def joint_positions(self, out: Array) -> None:
         """See :meth:`~template_control.robot.biped.Biped.joint_positions`."""
-        x0, y0, c, s = self._frame
+        x0, y0, c, s = self._frame[:4]
         for i, place in enumerate(self._joint_places):
             out[i, 0], out[i, 1] = c * (place[0] - x0) + s * (place[1] - y0), place[2]
 
     def hip_height(self, q: Array) -> float:
         """Mean height of the hips that swing the legs forward [m], at the last update."""
-        return float(self._middle()[2])
-
-    def hips(self, q: Array, v: Array) -> tuple[Array, float]:
-        """See :meth:`~template_control.robot.biped.Biped.hips`: their mean."""
-        x0, y0, c, s = self._frame
-        x, y, z = self._middle().tolist()
-        away = z - float(q[2])
-        # The hips move with the trunk, whose origin is elsewhere.
-        moving, turning = self.rotation @ v[:3], self.space.turning
-        speed = c * moving[0] + s * moving[1] + turning[1] * away - turning[2] * self._aside
-        return np.array([c * (x - x0) + s * (y - y0), z]), float(speed)
-
-    def trunk(self, q: Array, v: Array) -> tuple[float, float]:
-        """See :meth:`~template_control.robot.biped.Biped.trunk`: in the sagittal plane."""
-        return self.roll_pitch_yaw()[1], float(self.space.turning[1])
+        return float(self.data[0]["hips"][UP])
 
     def roll_pitch_yaw(self) -> tuple[float, float, float]:
         """Attitude of the trunk in the heading frame, at the last update [rad].
@@ -330,10 +340,8 @@ class FloatingBaseBiped(Biped):
         Roll and pitch are the angles of its upward axis from the vertical, about the heading
         frame's x and y; yaw is that of its forward axis about the vertical.
         """
-        (xx, _, xz), (yx, _, yz), (_, _, zz) = self.rotation.tolist()
-        c, s = float(self._frame[2]), float(self._frame[3])
-        ahead, left = c * xz + s * yz, c * yz - s * xz
-        return atan2(-left, zz), atan2(ahead, zz), atan2(c * yx - s * xx, c * xx + s * yx)
+        roll, pitch, yaw = self.data[0]["attitude"].tolist()
+        return roll, pitch, yaw
 
     def tilt(self, q: Array) -> float:
         """See :meth:`~template_control.robot.biped.Biped.tilt`."""

@@ -25,7 +25,7 @@ from template_control.robot.requirements import (
     check_planar,
     check_planar_legs,
 )
-from template_control.robot.terms import PLANAR_DOF, PlanarTerms, gather_planar, planar_sources
+from template_control.robot.terms import PLANAR_DOF, gather_planar
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import complete, drop_world
 
@@ -69,23 +69,8 @@ class PlanarBiped(Biped):
         self.foot_turning[:, _PITCH] = 1.0
         for row, leg in zip(self.foot_turning, self.legs, strict=True):
             row[[PLANAR_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
-        limits = self.velocity_limit, self.joint_range
-        self._sources = planar_sources(model, self._data, self._foot_ids, self.foot_radius, limits)
-        terms = PlanarTerms.zeros(self.nv)
-        self._terms = tuple(terms)
-        self.com, self.com_velocity, self.com_bias = terms[:3]
-        self.com_jacobian = terms.com_jacobian
-        self.angular_momentum = 0.0
-        self.angular_momentum_jacobian = terms.angular_momentum_jacobian
-        self.angular_momentum_bias = 0.0
-        self.foot_position = terms.foot_position
-        self.foot_velocity = np.zeros((2, 2))
-        self.foot_jacobian = terms.foot_jacobian
-        self.foot_bias = terms.foot_bias
-        self.contact_velocity = self.foot_velocity
-        self.contact_jacobian = self.foot_jacobian
-        self.contact_bias = self.foot_bias
-        self.joint_velocity = terms.joint_velocity
+        effects, com, momentum, contact, _, joints = self.arrays[1:]
+        self._out = effects, com, momentum, contact, joints
 
     @classmethod
     @checked
@@ -156,11 +141,9 @@ class PlanarBiped(Biped):
         Raises:
             DivergedError: if a value is NaN or infinite.
         """
-        found = gather_planar(self._sources, q, v, self._compute(q, v), self._terms)
-        finite, self.angular_momentum, self.angular_momentum_bias = found[:3]
-        self.fastest, self.soonest_stop = found[3:]
-        self._check_finite(finite, q, v)
-        np.matmul(self.foot_jacobian, v, out=self.foot_velocity)
+        drift = self._compute(q, v)
+        if not gather_planar(self._sources, q, v, drift, self.data, self._out):
+            raise self._diverged(q, v)
 
     def turn_gravity(self, angle: float) -> None:
         """Let the model stand in axes that are turned with a slope.
@@ -182,14 +165,6 @@ class PlanarBiped(Biped):
     def hip_height(self, q: Array) -> float:
         """Height of the point the legs hang from [m]; the base joint is placed there."""
         return float(q[1])
-
-    def hips(self, q: Array, v: Array) -> tuple[Array, float]:
-        """See :meth:`~.biped.Biped.hips`."""
-        return q[:2], v[0]
-
-    def trunk(self, q: Array, v: Array) -> tuple[float, float]:
-        """See :meth:`~.biped.Biped.trunk`; the third coordinate."""
-        return q[_PITCH], v[_PITCH]
 
     def tilt(self, q: Array) -> float:
         """See :meth:`~.biped.Biped.tilt`."""

@@ -2,9 +2,9 @@
 
 Pinocchio works in space and its arrays are read one at a time from Python, which takes ten
 times as long as computing them. It keeps them in place, so views are taken once
-(:func:`planar_sources`, :func:`floating_sources`), and compiled code reads all of them: of a planar
-robot the sagittal part, of a floating-base one all in its heading frame, which is the world's,
-turned about the vertical and shifted.
+(:func:`sources`), and compiled code reads all of them: of a planar robot the sagittal part, of a
+floating-base one all in its heading frame, which is the world's, turned about the vertical and
+shifted.
 """
 
 from __future__ import annotations
@@ -26,29 +26,117 @@ PLANAR_DOF = 3
 FLOATING_DOF = 6
 """Degrees of freedom of a floating base."""
 
-PlanarSources = tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]
-"""Views into Pinocchio's data: of the whole robot, of its feet, and what does not change.
+UP = 2
+"""Index of the vertical direction; 0 is forward, 1 to the left."""
 
-Plain tuples: a compiled function is called with a named one in twice the time.
-"""
+_F, _I = np.float64, np.int64
 
-FloatingSources = tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]
-"""Views into Pinocchio's data: vectors, matrices, the feet's centres; and what is constant."""
+ROBOT_DATA = np.dtype(
+    [
+        # -- constant --
+        ("mass", _F),  # of the whole robot [kg]
+        ("gravity", _F),  # [m/s^2]
+        ("foot_radius", _F),  # of the foot spheres [m]
+        ("leg_length", _F),  # from hip to the foot sphere's centre with a straight knee [m]
+        ("spare", _I),  # number of spare joints
+        ("spare_joint", _I, (2,)),  # their indices among the actuated joints
+        ("spare_angle", _F, (2,)),  # where they rest [rad]
+        # -- at the last update: forward, left, up; a planar robot's left is 0 --
+        ("com", _F, (3,)),  # centre of mass [m]
+        ("com_velocity", _F, (3,)),  # [m/s]
+        ("com_bias", _F, (3,)),  # dJ/dt v of its Jacobian [m/s^2]
+        ("momentum", _F, (3,)),  # angular, about the CoM, by axis: pitch is 1 [N m s]
+        ("momentum_bias", _F, (3,)),  # dA/dt v of its matrix [N m]
+        ("foot_position", _F, (2, 3)),  # lowest points of the foot spheres [m]
+        ("foot_velocity", _F, (2, 3)),  # of the material points there [m/s]
+        ("foot_bias", _F, (2, 3)),  # dJ/dt v of their Jacobians, for rolling feet [m/s^2]
+        ("attitude", _F, (3,)),  # roll, pitch and yaw of the trunk [rad]
+        ("turning", _F, (3,)),  # angular velocity of the trunk, by axis [rad/s]
+        ("hips", _F, (3,)),  # the point the legs hang from [m]
+        ("hip_speed", _F),  # its forward velocity [m/s]
+        ("fastest", _F),  # largest share of its limit that a joint's speed has
+        ("soonest_stop", _F),  # shortest time to a joint's stop at its speed [s]; inf: none moves
+    ],
+    align=True,
+)
+"""State of a robot in its sagittal or heading frame, for compiled code and Python alike."""
+
+
+class Jacobians(NamedTuple):
+    """Matrices of the model at its last update, which Pinocchio or :func:`gather_planar` writes.
+
+    Attributes:
+        mass_matrix: (nv, nv) M(q).
+        nonlinear_effects: (nv,) C(q, v) v + g(q), and the joints' damping [N, N m].
+        com: (d, nv) maps v to the CoM's velocity, d the directions.
+        momentum: (1, nv) or (3, nv) angular momentum about the CoM: pitch, or all axes.
+        contact: (2, d, nv) maps v to each foot's velocity.
+        turning: (0, nv) or (3, nv) angular velocity of a floating trunk; its bias is 0.
+        joints: (2, nu) angles and velocities of the actuated joints [rad, rad/s].
+    """
+
+    mass_matrix: Array
+    nonlinear_effects: Array
+    com: Array
+    momentum: Array
+    contact: Array
+    turning: Array
+    joints: Array
+
+    @classmethod
+    def zeros(cls, data: Any, directions: int, base_dof: int) -> Jacobians:
+        """All zero but for what Pinocchio writes.
+
+        Args:
+            data: Pinocchio's.
+            directions: of a contact.
+            base_dof: unactuated degrees of freedom.
+        """
+        nv, axes = len(data.nle), 3 if directions > UP else 1
+        shapes = ((directions, nv), (axes, nv), (2, directions, nv), (axes // 3 * 3, nv))
+        found = [np.zeros(shape) for shape in (*shapes, (2, nv - base_dof))]
+        return cls(data.M, data.nle, *found)
+
+
+Sources = tuple[Array, ...]
+"""Views into Pinocchio's data: a plain tuple, with which a call takes half of the time."""
+
+
+def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array) -> Sources:
+    """Views of what :func:`gather_planar` reads.
+
+    Args:
+        model: the robot's.
+        data: written by Pinocchio at every update.
+        frames: of the two feet.
+        limits: (4, nu) of the joints: largest speeds [rad/s], lower and upper stops [rad], damping
+            [N m s/rad].
+    """
+    whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.g)
+    feet = tuple(data.oMf[frame].translation for frame in frames)
+    return (*whole, *feet, data.Jcom, data.Ag, data.J, carrying(model, frames), limits)
 
 
 @compiled
-def joint_reserve(q: Array, speeds: Array, limits: Array, ranges: Array) -> tuple[float, float]:
-    """Largest share of its limit that a joint's speed has, and the soonest arrival at a stop [s].
+def joint_reserve(q: Array, speeds: Array, limits: Array) -> tuple[float, float]:
+    """The fastest joint, and the one that is soonest at a stop.
 
-    The latter is 0 of a joint that is at its stop, inf where none moves. ``q`` ends in the nu
-    angles; ``speeds``, ``limits`` (nu,) [rad/s]; ``ranges`` (nu, 2) [rad].
+    Args:
+        q: (nq,) configuration; its last nu entries are the joints' angles [rad].
+        speeds: (nu,) of the joints [rad/s].
+        limits: (3 or more, nu) of these speeds [rad/s], and the joints' lower and upper stops
+            [rad].
+
+    Returns:
+        The largest share of its limit that a speed has. The shortest time in which a joint would
+        come to its stop at its speed [s]: 0 of one that is there, inf where none moves.
     """
     fastest, soonest = 0.0, np.inf
     first = q.shape[0] - speeds.shape[0]
     for k in range(speeds.shape[0]):
         speed = speeds[k]
-        fastest = max(fastest, abs(speed) / limits[k])
-        down, up = q[first + k] - ranges[k, 0], ranges[k, 1] - q[first + k]
+        fastest = max(fastest, abs(speed) / limits[0, k])
+        down, up = q[first + k] - limits[1, k], limits[2, k] - q[first + k]
         if down <= 0.0 or up <= 0.0:
             soonest = 0.0
         elif speed > 0.0:
@@ -58,195 +146,137 @@ def joint_reserve(q: Array, speeds: Array, limits: Array, ranges: Array) -> tupl
     return fastest, soonest
 
 
-class PlanarTerms(NamedTuple):
-    """Arrays that :func:`gather_planar` overwrites; those of a :class:`~.planar_biped.PlanarBiped`.
-
-    Attributes:
-        com, com_velocity, com_bias: (2,) [m, m/s, m/s^2].
-        com_jacobian: (2, nv).
-        angular_momentum_jacobian: (nv,).
-        foot_position: (2, 2) [m].
-        foot_jacobian: (2, 2, nv).
-        foot_bias: (2, 2) [m/s^2].
-        joint_velocity: (nv - 3,) [rad/s].
-    """
-
-    com: Array
-    com_velocity: Array
-    com_bias: Array
-    com_jacobian: Array
-    angular_momentum_jacobian: Array
-    foot_position: Array
-    foot_jacobian: Array
-    foot_bias: Array
-    joint_velocity: Array
-
-    @classmethod
-    def zeros(cls, nv: int) -> PlanarTerms:
-        """All zero."""
-        shapes = ((2,), (2,), (2,), (2, nv), (nv,), (2, 2), (2, 2, nv), (2, 2), (nv - PLANAR_DOF,))
-        return cls(*(np.zeros(shape) for shape in shapes))
-
-
-def planar_sources(
-    model: pin.Model,
-    data: Any,
-    frames: tuple[int, ...],
-    radius: float,
-    limits: tuple[Array, Array],
-) -> PlanarSources:
-    """Views that :func:`gather_planar` reads; ``limits``: (nu,) [rad/s], (nu, 2) stops [rad]."""
-    whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.nle, data.g)
-    jacobians = (data.Jcom, data.Ag, data.J)
-    feet = tuple(data.oMf[frame].translation for frame in frames)
-    constants = (carrying(model, frames), np.array([radius]), *limits)
-    return (*whole, *jacobians), feet, constants
+@compiled
+def _gather_joints(
+    q: Array, v: Array, limits: Array, state: Any, effects: Array, joints: Array
+) -> bool:
+    """Write the joints' state and reserve, and add their damping; whether all is finite."""
+    finite, nu, nv = True, joints.shape[1], v.shape[0]
+    for k in range(q.shape[0]):
+        finite = finite and np.isfinite(q[k])
+    for k in range(nv):
+        finite = finite and np.isfinite(v[k])
+    for k in range(nu):
+        joints[0, k], joints[1, k] = q[q.shape[0] - nu + k], v[nv - nu + k]
+        if limits[3, k] != 0.0:
+            effects[nv - nu + k] += limits[3, k] * v[nv - nu + k]
+    state.fastest, state.soonest_stop = joint_reserve(q, joints[1], limits)
+    return finite
 
 
 @compiled
 def gather_planar(
-    views: PlanarSources, q: Array, v: Array, drift: tuple[Array, Array], out: tuple[Array, ...]
-) -> tuple[bool, float, float, float, float]:
+    views: Sources, q: Array, v: Array, drift: tuple[Array, Array], data: Any, out: tuple[Any, ...]
+) -> bool:
     """Write the planar terms at the state that Pinocchio has last computed.
 
     Args:
-        views: from :func:`planar_sources`.
+        views: from :func:`sources`.
         q, v: (nv,) the state.
         drift: of each foot's frame the (6,) classical acceleration dJ/dt v, linear then angular,
             in the world's axes [m/s^2, rad/s^2].
-        out: the arrays of :class:`PlanarTerms`, overwritten.
+        data: (1,) of ``ROBOT_DATA``, overwritten.
+        out: of :class:`Jacobians`, as a plain tuple: ``nonlinear_effects``, ``com``, ``momentum``,
+            ``contact`` and ``joints``, overwritten.
 
     Returns:
-        Whether the state is finite; the angular momentum about the CoM, forward pitch
-        positive [kg m^2/s], and its Jacobian's time derivative times v [N m]; what
-        :func:`joint_reserve` returns.
+        Whether the state is finite.
     """
-    whole, feet, (carries, radius, limit, stops) = views
-    centre, speed, pull, momentum, effects, weight, com_jacobian, centroidal, jacobian = whole
-    com, com_velocity, com_bias, jcom, jl, foot_position, foot_jacobian, foot_bias, turning = out
-    finite = True
-    for k in range(q.shape[0]):
-        finite = finite and np.isfinite(q[k]) and np.isfinite(v[k])
-    for k in range(limit.shape[0]):
-        turning[k] = v[PLANAR_DOF + k]
-    fastest, soonest = joint_reserve(q, turning, limit, stops)
-    com[0], com[1] = centre[0], centre[2]
-    com_velocity[0], com_velocity[1] = speed[0], speed[2]
-    com_bias[0], com_bias[1] = pull[0], pull[2]
+    centre, speed, pull, momentum, weight, left, right = views[:7]
+    com_jacobian, centroidal, jacobian, carries, limits = views[7:]
+    effects, jcom, jspin, contact, joints = out
+    s = data[0]
+    finite = _gather_joints(q, v, limits, s, effects, joints)
+    s.com[0], s.com[UP] = centre[0], centre[2]
+    s.com_velocity[0], s.com_velocity[UP] = speed[0], speed[2]
+    s.com_bias[0], s.com_bias[UP] = pull[0], pull[2]
     for k in range(q.shape[0]):
         jcom[0, k], jcom[1, k] = com_jacobian[0, k], com_jacobian[2, k]
-        jl[k] = centroidal[4, k]
-    r = radius[0]
+        jspin[0, k] = centroidal[4, k]
+    r = s.foot_radius
     for i in range(2):
-        x, z = feet[i][0], feet[i][2]
-        foot_position[i, 0], foot_position[i, 1] = x, z - r
+        place = left if i == 0 else right
+        x, z = place[0], place[2]
+        s.foot_position[i, 0], s.foot_position[i, UP] = x, z - r
         for k in range(q.shape[0]):
             turn = jacobian[4, k]
             # Rolling without slip: the material point below the sphere's centre is at rest.
-            foot_jacobian[i, 0, k] = (jacobian[0, k] + turn * z - r * turn) * carries[i, k]
-            foot_jacobian[i, 1, k] = (jacobian[2, k] - turn * x) * carries[i, k]
-        foot_bias[i, 0] = drift[i][0] - r * drift[i][4]
-        foot_bias[i, 1] = drift[i][2]
+            contact[i, 0, k] = (jacobian[0, k] + turn * z - r * turn) * carries[i, k]
+            contact[i, 1, k] = (jacobian[2, k] - turn * x) * carries[i, k]
+        s.foot_bias[i, 0] = drift[i][0] - r * drift[i][4]
+        s.foot_bias[i, UP] = drift[i][2]
+        moving = np.dot(contact[i], v)
+        s.foot_velocity[i, 0], s.foot_velocity[i, UP] = moving[0], moving[1]
     # The base coordinates' rows of C v are the rates of linear momentum and of the angular
     # momentum about the base at zero acceleration; move the latter to the CoM.
     force_x = effects[0] - weight[0]
     force_z = effects[1] - weight[1]
     moment = effects[PLANAR_DOF - 1] - weight[PLANAR_DOF - 1]
-    rate = moment - (com[1] - q[1]) * force_x + (com[0] - q[0]) * force_z
-    return finite, momentum[4], rate, fastest, soonest
+    s.momentum[1] = momentum[4]
+    s.momentum_bias[1] = moment - (s.com[UP] - q[1]) * force_x + (s.com[0] - q[0]) * force_z
+    s.attitude[1], s.turning[1] = q[PLANAR_DOF - 1], v[PLANAR_DOF - 1]
+    s.hips[0], s.hips[UP], s.hip_speed = q[0], q[1], v[0]
+    return finite
 
 
-class FloatingTerms(NamedTuple):
-    """Arrays that :func:`gather_floating` overwrites, in the heading frame, x forward and y left.
+class Trunk(NamedTuple):
+    """Views into Pinocchio's data of a floating base and its hips, and where they are.
 
     Attributes:
-        com, com_velocity, com_bias: (3,) [m, m/s, m/s^2].
-        com_jacobian: (3, nv).
-        momentum: (3,) angular, about the CoM [N m s].
-        momentum_jacobian: (3, nv).
-        momentum_bias: (3,) [N m].
-        foot: (2, 3) lowest points of the feet [m].
-        foot_jacobian: (2, 3, nv).
-        foot_bias: (2, 3) [m/s^2].
-        turning: (3,) angular velocity of the trunk [rad/s].
-        turning_jacobian: (3, nv); its bias is 0.
-        joint_velocity: (nv - 6,) [rad/s].
+        rotation: (3, 3) of the trunk, to the world.
+        left, right: (3,) places of the hips' joints in the world [m].
+        left_axes, right_axes: (3, 3) of these joints.
+        points: (2, 3) of each hip's axis, from its joint, in the joint's axes: in the plane in
+            which the leg swings [m].
     """
 
-    com: Array
-    com_velocity: Array
-    com_bias: Array
-    com_jacobian: Array
-    momentum: Array
-    momentum_jacobian: Array
-    momentum_bias: Array
-    foot: Array
-    foot_jacobian: Array
-    foot_bias: Array
-    turning: Array
-    turning_jacobian: Array
-    joint_velocity: Array
-
-    @classmethod
-    def zeros(cls, nv: int) -> FloatingTerms:
-        """All zero."""
-        three, rows = (3,), (3, nv)
-        shapes: tuple[tuple[int, ...], ...] = (three, three, three, rows, three, rows, three)
-        shapes = (*shapes, (2, 3), (2, 3, nv), (2, 3), three, rows, (nv - FLOATING_DOF,))
-        return cls(*(np.zeros(shape) for shape in shapes))
-
-
-def floating_sources(
-    model: pin.Model,
-    data: Any,
-    frames: tuple[int, ...],
-    radius: float,
-    limits: tuple[Array, Array],
-) -> FloatingSources:
-    """Views of what :func:`gather_floating` reads; ``limits`` as for :func:`planar_sources`."""
-    vectors = (data.com[0], data.vcom[0], data.hg.vector, data.nle, data.g)
-    matrices = (data.Jcom, data.Ag, data.J, data.oMi[1].rotation)
-    feet = tuple(data.oMf[frame].translation for frame in frames)
-    sizes = np.array([radius, pin.computeTotalMass(model)])
-    constants = (carrying(model, frames), sizes, *limits)
-    return vectors, matrices, feet, constants
+    rotation: Array
+    left: Array
+    right: Array
+    left_axes: Array
+    right_axes: Array
+    points: Array
 
 
 @compiled
 def gather_floating(
-    views: FloatingSources,
+    views: Sources,
     q: Array,
     v: Array,
     drift: tuple[Array, Array],
-    frame: Array,
-    out: tuple[Array, ...],
-) -> tuple[bool, float, float]:
-    """Write the terms at the state that Pinocchio has last computed.
+    data: Any,
+    out: tuple[Any, ...],
+    base: tuple[Any, ...],
+) -> bool:
+    """Write the terms at the state that Pinocchio has last computed, in the heading frame.
 
-    As :func:`gather_planar`; ``frame`` (4,) is the heading frame's: x and y of its origin in the
-    world [m], cosine and sine of the heading. Returns whether the state is finite, and
-    :func:`joint_reserve`'s two numbers.
+    Args:
+        views: from :func:`sources`.
+        q: (nq,) the configuration.
+        v: (nv,) the velocity.
+        drift, data: as for :func:`gather_planar`.
+        out: as there, with ``turning`` before the last.
+        base: (5,) of the heading frame: x and y of its origin in the world [m], cosine and sine of
+            the heading; y of the trunk's hips from its origin [m]. :class:`Trunk` as a plain tuple.
+
+    Returns:
+        Whether the state is finite.
     """
-    vectors, matrices, feet, (carries, constants, limit, stops) = views
-    centre, speed, momentum, effects, weight = vectors
-    jcom_world, centroidal, jacobian, rotation = matrices
-    com, com_velocity, com_bias, jcom, spin, jspin, spin_bias = out[:7]
-    foot_position, foot_jacobian, foot_bias, turning, jturning, joint_velocity = out[7:]
-    finite, nv = True, v.shape[0]
-    for k in range(q.shape[0]):
-        finite = finite and np.isfinite(q[k])
-    for k in range(nv):
-        finite = finite and np.isfinite(v[k])
-    for k in range(limit.shape[0]):
-        joint_velocity[k] = v[FLOATING_DOF + k]
-    fastest, soonest = joint_reserve(q, joint_velocity, limit, stops)
-    c, s, r, mass = frame[2], frame[3], constants[0], constants[1]
+    centre, speed, _, momentum, weight, left, right = views[:7]
+    jcom_world, centroidal, jacobian, carries, limits = views[7:]
+    effects, jcom, jspin, contact, jturning, joints = out
+    frame, trunk = base
+    rotation, st, nv = trunk[0], data[0], v.shape[0]
+    finite = _gather_joints(q, v, limits, st, effects, joints)
+    c, s, r = frame[2], frame[3], st.foot_radius
     x, y = centre[0] - frame[0], centre[1] - frame[1]
-    com[0], com[1], com[2] = c * x + s * y, c * y - s * x, centre[2]
-    com_velocity[0], com_velocity[1] = c * speed[0] + s * speed[1], c * speed[1] - s * speed[0]
-    com_velocity[2] = speed[2]
-    spin[0], spin[1] = c * momentum[3] + s * momentum[4], c * momentum[4] - s * momentum[3]
-    spin[2] = momentum[5]
+    st.com[0], st.com[1], st.com[2] = c * x + s * y, c * y - s * x, centre[2]
+    st.com_velocity[0] = c * speed[0] + s * speed[1]
+    st.com_velocity[1] = c * speed[1] - s * speed[0]
+    st.com_velocity[2] = speed[2]
+    st.momentum[0] = c * momentum[3] + s * momentum[4]
+    st.momentum[1] = c * momentum[4] - s * momentum[3]
+    st.momentum[2] = momentum[5]
     for k in range(nv):
         jcom[0, k] = c * jcom_world[0, k] + s * jcom_world[1, k]
         jcom[1, k] = c * jcom_world[1, k] - s * jcom_world[0, k]
@@ -265,32 +295,63 @@ def gather_floating(
     moment[0] -= ay * force[2] - az * force[1]
     moment[1] -= az * force[0] - ax * force[2]
     moment[2] -= ax * force[1] - ay * force[0]
-    com_bias[0] = (c * force[0] + s * force[1]) / mass
-    com_bias[1] = (c * force[1] - s * force[0]) / mass
-    com_bias[2] = force[2] / mass
-    spin_bias[0], spin_bias[1] = c * moment[0] + s * moment[1], c * moment[1] - s * moment[0]
-    spin_bias[2] = moment[2]
+    st.com_bias[0] = (c * force[0] + s * force[1]) / st.mass
+    st.com_bias[1] = (c * force[1] - s * force[0]) / st.mass
+    st.com_bias[2] = force[2] / st.mass
+    st.momentum_bias[0] = c * moment[0] + s * moment[1]
+    st.momentum_bias[1] = c * moment[1] - s * moment[0]
+    st.momentum_bias[2] = moment[2]
     for i in range(2):
-        px, py, pz = feet[i][0], feet[i][1], feet[i][2]
+        place = left if i == 0 else right
+        px, py, pz = place[0], place[1], place[2]
         x, y = px - frame[0], py - frame[1]
-        foot_position[i, 0], foot_position[i, 1] = c * x + s * y, c * y - s * x
-        foot_position[i, 2] = pz - r
+        st.foot_position[i, 0], st.foot_position[i, 1] = c * x + s * y, c * y - s * x
+        st.foot_position[i, 2] = pz - r
         for k in range(nv):
             wx, wy, wz = jacobian[3, k], jacobian[4, k], jacobian[5, k]
             # Rolling without slip: the material point below the sphere's centre is at rest.
             jx = (jacobian[0, k] + wy * (pz - r) - wz * py) * carries[i, k]
             jy = (jacobian[1, k] + wz * px - wx * (pz - r)) * carries[i, k]
-            foot_jacobian[i, 0, k], foot_jacobian[i, 1, k] = c * jx + s * jy, c * jy - s * jx
-            foot_jacobian[i, 2, k] = (jacobian[2, k] + wx * py - wy * px) * carries[i, k]
+            contact[i, 0, k], contact[i, 1, k] = c * jx + s * jy, c * jy - s * jx
+            contact[i, 2, k] = (jacobian[2, k] + wx * py - wy * px) * carries[i, k]
         bx, by = drift[i][0] - r * drift[i][4], drift[i][1] + r * drift[i][3]
-        foot_bias[i, 0], foot_bias[i, 1] = c * bx + s * by, c * by - s * bx
-        foot_bias[i, 2] = drift[i][2]
+        st.foot_bias[i, 0], st.foot_bias[i, 1] = c * bx + s * by, c * by - s * bx
+        st.foot_bias[i, 2] = drift[i][2]
+        moving = np.dot(contact[i], v)
+        for k in range(3):
+            st.foot_velocity[i, k] = moving[k]
     for k in range(3):
         jturning[0, 3 + k] = c * rotation[0, k] + s * rotation[1, k]
         jturning[1, 3 + k] = c * rotation[1, k] - s * rotation[0, k]
         jturning[2, 3 + k] = rotation[2, k]
     for i in range(3):
-        turning[i] = 0.0
+        st.turning[i] = 0.0
         for k in range(3):
-            turning[i] += jturning[i, 3 + k] * v[3 + k]
-    return finite, fastest, soonest
+            st.turning[i] += jturning[i, 3 + k] * v[3 + k]
+    _gather_trunk(q, v, st, frame, trunk)
+    return finite
+
+
+@compiled
+def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any, ...]) -> None:
+    """Write how the trunk stands, and where its hips are."""
+    rotation, left, right, left_axes, right_axes, points = trunk
+    c, s = frame[2], frame[3]
+    ahead = c * rotation[0, 2] + s * rotation[1, 2]
+    aside = c * rotation[1, 2] - s * rotation[0, 2]
+    state.attitude[0] = np.arctan2(-aside, rotation[2, 2])
+    state.attitude[1] = np.arctan2(ahead, rotation[2, 2])
+    state.attitude[2] = np.arctan2(
+        c * rotation[1, 0] - s * rotation[0, 0], c * rotation[0, 0] + s * rotation[1, 0]
+    )
+    one, other = np.dot(left_axes, points[0]), np.dot(right_axes, points[1])
+    middle = np.empty(3)
+    for k in range(3):
+        middle[k] = 0.5 * ((left[k] + one[k]) + (right[k] + other[k]))
+    state.hips[0] = c * (middle[0] - frame[0]) + s * (middle[1] - frame[1])
+    state.hips[1] = c * (middle[1] - frame[1]) - s * (middle[0] - frame[0])
+    state.hips[2] = middle[2]
+    # The hips move with the trunk, whose origin is elsewhere.
+    moving = np.dot(rotation, v[:3])
+    level = c * moving[0] + s * moving[1] + state.turning[1] * (middle[2] - q[2])
+    state.hip_speed = level - state.turning[2] * frame[4]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.free.controller import FreeController
 from template_control.embedding.free.lateral import SIDES
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.ground import LEVEL, STEEPEST
@@ -228,7 +227,7 @@ class FloatingBackend(RobotBackend):
         options: EmbeddingOptions,
         route: Route,
         automaton: Automaton,
-    ) -> FreeController:
+    ) -> EmbeddingController:
         """See :meth:`RobotBackend.controller`.
 
         Raises:
@@ -239,7 +238,7 @@ class FloatingBackend(RobotBackend):
                 f"{self.robot.name} walks free, and its embedding has EmbeddingOptions: give"
                 " FreeOptions"
             )
-        return FreeController(self.robot, planners, options, route, automaton)
+        return EmbeddingController(self.robot, planners, options, route, automaton)
 
     def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`: at VLO, in the sideways motion of the gait.
@@ -247,19 +246,19 @@ class FloatingBackend(RobotBackend):
         Raises:
             ParameterError: if the run begins elsewhere, or the options have a planar pose.
         """
-        route = controller.supervisor.route
-        if o.pose is not None or route.section != VLO or not isinstance(controller, FreeController):
+        route, motion = controller.supervisor.route, controller.lateral
+        if o.pose is not None or route.section != VLO or motion is None:
             raise ParameterError(
                 f"{self.robot.name} walks free: its run begins at VLO, without a pose"
             )
         z = route.start if o.start is None else np.array(o.start)
         planner, node = controller.supervisor.begin(VLO)
-        lateral, course = controller.lateral, o.course
+        lateral, course = motion.planner, o.course
         lateral.wish = LateralWish(
             course.step_width or lateral.wish.width,
             turn=course.rate(0.0) * planner.gait.step_duration,
         )
-        controller.turning = course.rate
+        motion.turning = course.rate
         lateral.reset(planner.gait)
         away, drift = lateral.cycle.states[SIDES[_REAR].row]
         width = lateral.wish.width
@@ -307,7 +306,8 @@ class FloatingBackend(RobotBackend):
                 " SensorOptions"
             )
         sensors = Sensors(o.sensors, self.robot, controller.parameters)
-        tuning = controller.options.noise_filter if isinstance(controller, FreeController) else None
+        options = controller.options
+        tuning = options.noise_filter if isinstance(options, FreeOptions) else None
         if sensors.exact or tuning is None:
             return sensors
         deviation = np.array(sensors.deviations)

@@ -2,10 +2,10 @@ from .solver import QpOptions as QpOptions
 from .solver import Solution as Solution
 from .solver import Stance as Stance
 from .solver import WholeBodyQp as WholeBodyQp
+from .stack import TaskStack as TaskStack
 from .task import References as References
 from .task import Rows as Rows
 from .task import Task as Task
-from .task import TaskStack as TaskStack
 from .tasks import ComTask as ComTask
 from .tasks import FootTask as FootTask
 from .tasks import MomentumTask as MomentumTask

@@ -19,12 +19,13 @@ there is nothing left to solve: so it is in about 19 of 20 ticks of a walk or a 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
+from template_control.robot.terms import UP
 from template_control.whole_body.elimination import cholesky, eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
@@ -33,8 +34,29 @@ Array = NDArray[np.float64]
 _FAR = 1e20  # ProxQP's infinity
 _GRID = 2.0**24  # steps of a torque up to its limit
 
-SINGULAR, BOUNDED, FREE = 0, 1, 2
-"""What :func:`assemble` finds: no problem, one whose constraints act, one where none does."""
+SINGULAR, BOUNDED, FREE, BRAKED = 0, 1, 2, 3
+"""No problem; one whose constraints act; one where none does; one that bounds accelerations."""
+
+_F, _I = np.float64, np.int64
+
+QP_DATA = np.dtype(
+    [
+        ("force_cost", _F),  # of the contact forces' distance from the wanted ones, per (m g)^2
+        ("torque_cost", _F),  # of the joint torques, per squared limit
+        ("friction", _F),  # coefficient that the cones are built with
+        ("contact_damping", _F),  # brings a foot that landed sliding to rest [1/s]
+        ("speed_share", _F),  # share of its limit from which on a joint's speed is bounded
+        ("stop_share", _F),  # share of its limit from which on a joint slows down before its stop
+        ("stop_time", _F),  # by which a stop is looked at before a joint is there [s]
+        ("load", _F),  # ratio of the real to the modelled inertia
+        ("feet", _I),  # number of feet on the ground
+        ("foot", _I, (2,)),  # which
+        ("force", _F, (2, 3)),  # to stay near, of each, by direction [N]
+        ("cap", _F, (2,)),  # largest normal force of each; inf: none [N]
+    ],
+    align=True,
+)
+"""The stance of a tick, and the constants of the QP."""
 
 
 @compiled
@@ -70,70 +92,93 @@ class Matrices(NamedTuple):
     upper: Array
     minimum: Array
 
-    @classmethod
-    def zeros(cls, nv: int, nu: int, forces: int, rows: int) -> Matrices:
-        """All zero.
 
-        Args:
-            nv, nu: degrees of freedom, and actuated ones.
-            forces: d c, numbers of all contact forces.
-            rows: constraints.
-        """
-        shapes = ((nv, nu + 1), (forces, nu + 1), (nu, nu), (nu,), (rows, nu), (rows,), (rows,))
-        return cls(*(np.zeros(shape) for shape in (*shapes, (nu,))))
+@compiled
+def matrices(work: Array, nv: int, nu: int, forces: int, rows: int) -> tuple[Array, ...]:
+    """:class:`Matrices`, as a plain tuple of views into one array: a call takes one in less time.
+
+    Args:
+        work: all their numbers; it may be longer.
+        nv, nu: degrees of freedom, and actuated ones.
+        forces: d c, numbers of all contact forces.
+        rows: constraints.
+    """
+    a = nv * (nu + 1)
+    b = a + forces * (nu + 1)
+    c = b + nu * nu
+    d = c + nu
+    e = d + rows * nu
+    return (
+        work[:a].reshape((nv, nu + 1)),
+        work[a:b].reshape((forces, nu + 1)),
+        work[b:c].reshape((nu, nu)),
+        work[c:d],
+        work[d:e].reshape((rows, nu)),
+        work[e : e + rows],
+        work[e + rows : e + 2 * rows],
+        work[e + 2 * rows : e + 2 * rows + nu],
+    )
+
+
+@compiled
+def sizes(p: Any, arrays: tuple[Any, ...], bounds: Array) -> tuple[int, int, int, int]:
+    """Arguments of :func:`matrices` after the first.
+
+    Args:
+        p, arrays, bounds: as for :func:`assemble`.
+    """
+    directions, nv, nu = arrays[4].shape[1], arrays[0].shape[0], arrays[6].shape[1]
+    rows = nu + rows_per_foot(directions) * p.feet + bounds.shape[1]
+    return nv, nu, directions * p.feet, rows
 
 
 @compiled
 def assemble(
-    mass_matrix: Array,
-    nonlinear_effects: Array,
-    contact: Array,
+    p: Any,
+    r: Any,
+    arrays: tuple[Any, ...],
     tasks: Array,
-    costs: Array,
-    limits: Array,
-    out: tuple[Array, ...],
+    torque_limit: Array,
+    bounds: Array,
+    work: Array,
 ) -> int:
     """Fill the QP's matrices in place.
 
     Args:
-        mass_matrix, nonlinear_effects: (nv, nv) M and (nv,) h.
-        contact: (c, d, nv + 2) a row for each direction of each stance foot, the last one normal
-            to the ground: Jacobian J, bias dJ/dt v, wanted force [N].
-        tasks: (t, nv + 3), the table of a :class:`~.task.TaskStack`.
-        costs: (2,) of the contact forces' distance from the wanted ones, per (m g)^2, and of
-            the joint torques, per squared limit.
-        limits: (nu + c + 2,) largest joint torques [N m], largest normal force of each stance foot
-            [N] (inf: none), coefficient of the friction cones, m g [N]. Where the joints'
-            accelerations are bounded, (2 nu,) more: the least and the greatest [rad/s^2]. One
-            array, as each one that a compiled function is handed costs time.
-        out: the arrays of :class:`Matrices`, overwritten; a plain tuple, as a compiled function
-            is called with a named one in twice the time.
+        p: of ``QP_DATA``.
+        r: of ``ROBOT_DATA``.
+        arrays: of the robot.
+        tasks: (t, nv + 3), the table of a :class:`~.stack.TaskStack`.
+        torque_limit: (nu,) largest joint torques [N m].
+        bounds: (2, nu) least and greatest accelerations of the joints [rad/s^2]; (2, 0): none.
+        work: of :func:`matrices`, overwritten.
 
     Returns:
         ``SINGULAR``, ``BOUNDED``, or ``FREE`` where ``minimum`` keeps all constraints. They are
         then left in z.
     """
+    nv, nu, forces, rows = sizes(p, arrays, bounds)
+    out = matrices(work, nv, nu, forces, rows)
     a_map, f_map, factor, gradient, constraint, lower, upper, minimum = out
-    nv = mass_matrix.shape[0]
-    nu = gradient.shape[0]
-    feet, directions = contact.shape[0], contact.shape[1]
-    per_foot = rows_per_foot(directions)
-    torque_limit, force_cap = limits[:nu], limits[nu : nu + feet]
-    friction, weight = limits[nu + feet], limits[nu + feet + 1]
-    # Copies without gaps, which the elimination reads faster.
+    mass_matrix, nonlinear_effects, contact = arrays[0], arrays[1], arrays[4]
+    feet, directions = p.feet, contact.shape[1]
+    per_foot, weight, friction = rows_per_foot(directions), r.mass * r.gravity, p.friction
     jacobian, bias = np.empty((directions * feet, nv)), np.empty(directions * feet)
-    for foot in range(feet):
+    for i in range(feet):
+        foot = p.foot[i]
         for d in range(directions):
+            axis = UP if d == directions - 1 else d
             for k in range(nv):
-                jacobian[foot * directions + d, k] = contact[foot, d, k]
-            bias[foot * directions + d] = contact[foot, d, nv]
+                jacobian[i * directions + d, k] = contact[foot, d, k]
+            sliding = p.contact_damping * r.foot_velocity[foot, axis]
+            bias[i * directions + d] = r.foot_bias[foot, axis] + sliding
     if not eliminate(mass_matrix, nonlinear_effects, jacobian, bias, nv - nu, a_map, f_map):
         return SINGULAR
     factor[:] = 0.0
     gradient[:] = 0.0
     row = np.empty(nu + 1)
     for i in range(nu):
-        factor[i, i] = costs[1]
+        factor[i, i] = p.torque_cost
     for t in range(tasks.shape[0]):
         if tasks[t, nv + WEIGHT] == 0.0:
             continue
@@ -148,8 +193,8 @@ def assemble(
         for d in range(directions):
             for j in range(nu + 1):
                 row[j] = f_map[foot * directions + d, j] / weight
-            row[nu] -= contact[foot, d, nv + 1] / weight
-            _add_square(row, costs[0], torque_limit, factor, gradient)
+            row[nu] -= p.force[foot, d] / weight
+            _add_square(row, p.force_cost, torque_limit, factor, gradient)
 
     constraint[:] = 0.0
     for i in range(nu):
@@ -173,14 +218,13 @@ def assemble(
         for j in range(nu):
             constraint[at, j] = f_map[normal, j] * torque_limit[j] / weight
         lower[at] = -f_map[normal, nu] / weight
-        upper[at] = min(_FAR, (force_cap[foot] - f_map[normal, nu]) / weight)
-    least = nu + feet + 2
-    for i in range((limits.shape[0] - least) // 2):
+        upper[at] = min(_FAR, (p.cap[foot] - f_map[normal, nu]) / weight)
+    for i in range(bounds.shape[1]):
         row_of, joint = nu + per_foot * feet + i, nv - nu + i
         for j in range(nu):
             constraint[row_of, j] = a_map[joint, j] * torque_limit[j]
-        lower[row_of] = limits[least + i] - a_map[joint, nu]
-        upper[row_of] = limits[least + nu + i] - a_map[joint, nu]
+        lower[row_of] = bounds[0, i] - a_map[joint, nu]
+        upper[row_of] = bounds[1, i] - a_map[joint, nu]
 
     if not cholesky(factor, nu):
         return SINGULAR
@@ -294,3 +338,62 @@ def _affine(matrix: Array, tau: Array, out: Array) -> None:
         for j in range(n):
             total += matrix[i, j] * tau[j]
         out[i] = total
+
+
+@compiled
+def answer(p: Any, work: Array, found: tuple[Array, ...]) -> None:
+    """Write the answer of a tick from the joint torques of the model.
+
+    Args:
+        p: of ``QP_DATA``.
+        work: of :func:`matrices`, which :func:`assemble` has filled.
+        found: (nu,) the model's torques; overwritten: (nu,) the robot's torques [N m], (d c,) the
+            force on each stance foot [N], (nv,) generalised accelerations [m/s^2, rad/s^2].
+    """
+    model, torque, force, acceleration = found
+    out = matrices(work, acceleration.shape[0], torque.shape[0], force.shape[0], 0)
+    follow(out[0], out[1], model, acceleration, force)
+    for i in range(torque.shape[0]):
+        torque[i] = p.load * model[i]
+
+
+@compiled
+def bounds_needed(p: Any, r: Any) -> bool:
+    """Whether a joint is near its limit of speed, or the one that it has before its stop.
+
+    Args:
+        p: of ``QP_DATA``.
+        r: of ``ROBOT_DATA``.
+    """
+    if r.fastest <= p.stop_share:
+        return False
+    return r.fastest > p.speed_share or r.soonest_stop <= p.stop_time
+
+
+@compiled
+def solve_free(
+    qp: Any, data: Any, arrays: tuple[Any, ...], tasks: Array, room: tuple[Any, ...]
+) -> int:
+    """Solve a tick in which no limit acts.
+
+    Args:
+        qp, data: (1,) of ``QP_DATA`` and of ``ROBOT_DATA``.
+        arrays, tasks: as for :func:`assemble`.
+        room: ``torque_limit``, ``bounds`` and ``work`` as for :func:`assemble`; ``found`` as for
+            :func:`answer`, overwritten where the tick is solved.
+
+    Returns:
+        ``FREE`` where it is; else what :func:`assemble` finds, or ``BRAKED`` where accelerations
+        are to be bounded and nothing has been assembled yet.
+    """
+    p, r = qp[0], data[0]
+    if bounds_needed(p, r):
+        return BRAKED
+    torque_limit, bounds, work, found = room
+    kind = assemble(p, r, arrays, tasks, torque_limit, bounds, work)
+    if kind == FREE:
+        nv, nu, forces, rows = sizes(p, arrays, bounds)
+        out = matrices(work, nv, nu, forces, rows)
+        torques(out[2], out[7], torque_limit, found[0])
+        answer(p, work, found)
+    return kind

@@ -32,16 +32,21 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import RATE, TIME, tuned
+from template_control.structured import Number
 from template_control.whole_body.problem import (
+    BRAKED,
     FREE,
+    QP_DATA,
     SINGULAR,
     Matrices,
+    answer,
     assemble,
-    follow,
+    matrices,
     rows_per_foot,
+    solve_free,
     torques,
 )
-from template_control.whole_body.task import TaskStack
+from template_control.whole_body.stack import TaskStack
 
 Array = NDArray[np.float64]
 
@@ -156,8 +161,8 @@ class Solution(NamedTuple):
     solve_seconds: float
 
 
-class JointBounds:
-    """Bounds of the joints' accelerations, near their limits of speed and before their stops.
+def bound_joints(robot: Biped, options: QpOptions, bounds: Array, slack: float) -> None:
+    """Write bounds of the joints' accelerations, near their limits of speed and before their stops.
 
     A leg that has pushed off trails behind hips that run on, and its knee straightens. One that
     goes straight hits its stop with tens of kilonewtons, which throws the leg back and the trunk
@@ -171,38 +176,19 @@ class JointBounds:
     Args:
         robot: the model; its last update is read.
         options: shares and horizons of speeds and stops.
+        bounds: (2, nu) least and greatest accelerations, overwritten [rad/s^2].
+        slack: what is allowed at least in either direction [rad/s^2]: -inf, or 0 where a joint
+            that is too fast may stay so.
     """
-
-    def __init__(self, robot: Biped, options: QpOptions) -> None:
-        self._robot = robot
-        self._options = options
-        self._low, self._high = robot.joint_range.T
-        self._stop_time = options.stop_horizon / options.speed_share
-
-    def needed(self) -> bool:
-        """Whether a joint is near its limit of speed, or the one that it has before its stop."""
-        fastest, o = self._robot.fastest, self._options
-        if fastest <= o.stop_share:
-            return False
-        return fastest > o.speed_share or self._robot.soonest_stop <= self._stop_time
-
-    def write(self, least: Array, most: Array, slack: float) -> None:
-        """Write the bounds.
-
-        Args:
-            least, most: (nu,) accelerations, overwritten [rad/s^2].
-            slack: what is allowed at least in either direction [rad/s^2]: -inf, or 0 where a joint
-                that is too fast may stay so.
-        """
-        robot, o = self._robot, self._options
-        place, speed, limit = robot.joint_angle, robot.joint_velocity, robot.velocity_limit
-        down = np.minimum((place - self._low) / o.stop_horizon, limit)
-        up = np.minimum((self._high - place) / o.stop_horizon, limit)
-        most[:] = np.maximum((up - speed) / o.speed_horizon, slack)
-        least[:] = -np.maximum((down + speed) / o.speed_horizon, slack)
+    o, limit = options, robot.velocity_limit
+    place, speed, (low, high) = robot.joint_angle, robot.joint_velocity, robot.joint_range.T
+    down = np.minimum((place - low) / o.stop_horizon, limit)
+    up = np.minimum((high - place) / o.stop_horizon, limit)
+    bounds[1] = np.maximum((up - speed) / o.speed_horizon, slack)
+    bounds[0] = -np.maximum((down + speed) / o.speed_horizon, slack)
 
 
-class _Workspace:
+class Workspace:
     """Matrices and ProxQP object for one number of stance feet.
 
     Args:
@@ -211,25 +197,19 @@ class _Workspace:
         bounded: how many accelerations of joints have bounds: none, or all.
 
     Attributes:
-        answer: (nu,) the last solution, w of :mod:`.problem`.
+        work: the numbers of the matrices, in one array.
+        bounds: (2, bounded) of the joints' accelerations [rad/s^2].
     """
 
     def __init__(self, robot: Biped, feet: int, bounded: int = 0) -> None:
         nv, nu, directions = robot.nv, len(robot.torque_limit), robot.directions
         rows = nu + rows_per_foot(directions) * feet + bounded
         self._identity = np.eye(nu)
-        self.matrices = Matrices.zeros(nv, nu, directions * feet, rows)
-        self.out = tuple(self.matrices)
-        self.limits = np.zeros(nu + feet + 2 + 2 * bounded)
-        self.limits[nu + feet + 1] = robot.mass * robot.gravity
-        self.torque_limit, self.cap = self.limits[:nu], self.limits[nu : nu + feet]
-        self.friction = self.limits[nu + feet : nu + feet + 1]
-        self.least, self.most = self.limits[nu + feet + 2 :].reshape(2, bounded)
-        self.contact = np.zeros((feet, directions, nv + 2))
-        self.jacobian = self.contact[:, :, :nv]
-        self.bias, self.force = self.contact[:, :, nv], self.contact[:, :, nv + 1]
+        numbers = (nu + 1) * (nv + directions * feet) + nu * (nu + 2) + rows * (nu + 2)
+        self.work = np.zeros(numbers)
+        self.matrices = Matrices(*matrices(self.work, nv, nu, directions * feet, rows))
+        self.bounds = np.zeros((2, bounded))
         self.rows = rows
-        self.answer: Array = self.matrices.minimum
         self._proxqp = load_proxqp()
         self._solved = self._proxqp.QPSolverOutput.PROXQP_SOLVED
         self.qp = self._new()
@@ -287,25 +267,41 @@ class WholeBodyQp:
 
     Attributes:
         torque_limit: (nu,) that may be used [N m].
-        friction: coefficient the cones are built with.
+        data: (1,) of ``QP_DATA``: the stance, for compiled code.
     """
+
+    friction = Number("friction")
 
     @checked
     def __init__(self, robot: Biped, options: QpOptions | None = None) -> None:
         o = options or QpOptions()
         self.robot = robot
-        self.friction = o.cone
-        self.torque_limit: Array = robot.torque_limit * o.torque_scale
-        self._contact_damping = o.contact_damping
-        self._costs = np.array([FORCE_COST, TORQUE_COST])
-        self._bounds = JointBounds(robot, o)
-        nu = len(self.torque_limit)
-        self._workspaces, self._braked = (
-            [_Workspace(robot, feet, bounded) for feet in range(3)] for bounded in (0, nu)
+        self.data = np.zeros(1, QP_DATA)
+        now = self.data[0]
+        now["force_cost"], now["torque_cost"] = FORCE_COST, TORQUE_COST
+        now["friction"], now["contact_damping"] = o.cone, o.contact_damping
+        now["speed_share"], now["stop_share"] = o.speed_share, o.stop_share
+        now["stop_time"], now["load"] = o.stop_horizon / o.speed_share, 1.0
+        self._options = o
+        nu = len(robot.torque_limit)
+        self.workspaces, self._braked = (
+            [Workspace(robot, feet, bounded) for feet in range(3)] for bounded in (0, nu)
         )
         self._torque = np.zeros(nu)
-        self._loaded = 1.0, self.torque_limit, self.torque_limit
+        self._load = 1.0
+        self.torque_limit = robot.torque_limit * o.torque_scale
         self._failing = False
+
+    @property
+    def torque_limit(self) -> Array:
+        """See the class."""
+        return self._torque_limit
+
+    @torque_limit.setter
+    def torque_limit(self, limit: Array) -> None:
+        """Use other limits from now on."""
+        self._torque_limit = limit
+        self._take_load(self._load)
 
     def solve(self, tasks: TaskStack, stance: Stance, load: float = 1.0) -> Solution:
         """Solve one tick.
@@ -319,83 +315,109 @@ class WholeBodyQp:
         Raises:
             ParameterError: naming a task that wrote a number which is not finite.
         """
-        robot, feet = self.robot, len(stance.feet)
-        limit = self._limit(load)
-        w, seconds, solved = self._workspaces[feet], 0.0, False
-        if self._bounds.needed():
-            w = self._braked[feet]
-            for slack in (-np.inf, 0.0):
-                self._bounds.write(w.least, w.most, slack)
-                regular, solved, more = self._attempt(w, tasks, stance, limit)
-                seconds += more
-                if solved:
-                    break
-        if not solved:
-            w = self._workspaces[feet]
-            regular, solved, more = self._attempt(w, tasks, stance, limit)
-            seconds += more
-        if not solved:
-            self._tell(regular, stance)
-        self._failing = not solved
-        if solved:
-            torques(w.matrices.factor, w.answer, limit, self._torque)
-        else:
-            np.clip(self._torque, -limit, limit, out=self._torque)
-        force = np.empty(robot.directions * feet)
-        acceleration = np.empty(robot.nv)
-        follow(w.matrices.a_map, w.matrices.f_map, self._torque, acceleration, force)
-        return Solution(load * self._torque, force, acceleration, solved, seconds)
+        now, feet = self.data[0], len(stance.feet)
+        now["feet"], now["foot"][:feet], now["cap"][:feet] = feet, stance.feet, stance.cap
+        directions = self.robot.directions
+        now["force"][:feet, :directions] = stance.force.reshape(feet, directions)
+        robot, room = self.robot, self.room(feet, load)
+        kind = solve_free(self.data, robot.data, robot.arrays, tasks.table, room)
+        return self.finish(kind, tasks, room)
 
-    def _limit(self, load: float) -> Array:
-        """(nu,) the model's limits of torque [N m]: times ``load`` they are within the robot's."""
-        known, whole, limit = self._loaded
-        if load != known or whole is not self.torque_limit:
-            limit = self.torque_limit / load
-            # The product is rounded once more, and may be a hair beyond.
-            beyond = load * limit > self.torque_limit
-            limit = np.where(beyond, np.nextafter(limit, 0.0), limit)
-            self._loaded = load, self.torque_limit, limit
-        return limit
+    def room(self, feet: int, load: float) -> tuple[Any, ...]:
+        """Arrays for :func:`.problem.solve_free`; those of the answer are new.
+
+        Args:
+            feet: on the ground.
+            load: as for :meth:`solve`.
+        """
+        robot, w, empty = self.robot, self.workspaces[feet], np.empty
+        torque, force = empty(len(self._torque)), empty(robot.directions * feet)
+        found = self._torque, torque, force, empty(robot.nv)
+        if load != self._load:
+            self._take_load(load)
+        return self._limit, w.bounds, w.work, found
+
+    def finish(self, kind: int, tasks: TaskStack, room: tuple[Any, ...]) -> Solution:
+        """The answer of a tick, by ProxQP where limits act.
+
+        Args:
+            kind: what :func:`.problem.solve_free` has found.
+            tasks: rows, desired accelerations and weights.
+            room: from :meth:`room`; that function has filled it where ``kind`` is ``FREE``.
+
+        Raises:
+            ParameterError: naming a task that wrote a number which is not finite.
+        """
+        seconds, solved, limit, found = 0.0, kind == FREE, room[0], room[-1]
+        if not solved:
+            seconds, solved = self._solve_limited(kind, tasks, limit, found)
+        self._failing = not solved
+        _, torque, force, acceleration = found
+        return Solution(torque, force, acceleration, solved, seconds)
+
+    def _take_load(self, load: float) -> None:
+        """Scale the model's limits of torque, which times ``load`` are within the robot's."""
+        limit = self.torque_limit / load
+        # The product is rounded once more, and may be a hair beyond.
+        beyond = load * limit > self.torque_limit
+        self._limit = np.where(beyond, np.nextafter(limit, 0.0), limit)
+        self._load = load
+        self.data["load"] = load
+
+    def _solve_limited(
+        self, kind: int, tasks: TaskStack, limit: Array, found: tuple[Array, ...]
+    ) -> tuple[float, bool]:
+        """Fill ``found`` where limits act; seconds in ProxQP, and whether it is solved."""
+        now, robot = self.data[0], self.robot
+        feet = int(now["feet"])
+        # With bounds, with bounds that let a joint which is too fast stay so, and without.
+        slacks = (-np.inf, 0.0, None) if kind == BRAKED else (None,)
+        seconds = 0.0
+        for slack in slacks:
+            w = (self.workspaces if slack is None else self._braked)[feet]
+            if slack is not None:
+                bound_joints(robot, self._options, w.bounds, slack)
+            found_kind, solved, more = self._attempt(w, kind, tasks, limit)
+            seconds += more
+            if solved:
+                break
+        if solved:
+            best = w.matrices.minimum if found_kind == FREE else w.qp.results.x
+            torques(w.matrices.factor, best, limit, self._torque)
+        else:
+            self._tell(found_kind != SINGULAR, feet)
+            np.clip(self._torque, -limit, limit, out=self._torque)
+        answer(now, w.work, found)
+        return seconds, solved
 
     def _attempt(
-        self, w: _Workspace, tasks: TaskStack, stance: Stance, limit: Array
-    ) -> tuple[bool, bool, float]:
-        """Whether the problem is regular, and solved, in this workspace; seconds in ProxQP."""
+        self, w: Workspace, kind: int, tasks: TaskStack, limit: Array
+    ) -> tuple[int, bool, float]:
+        """Kind of the problem in this workspace, whether it is solved, and seconds in ProxQP.
+
+        Args:
+            w: in which it is, or is to be, assembled.
+            kind: of the problem there; ``BRAKED``: it is not assembled yet.
+            tasks, limit: as for :meth:`finish`.
+        """
         robot = self.robot
-        for i, foot in enumerate(stance.feet):
-            sliding = robot.contact_velocity[foot]
-            w.jacobian[i] = robot.contact_jacobian[foot]
-            w.bias[i] = robot.contact_bias[foot] + self._contact_damping * sliding
-        w.force[:] = stance.force.reshape(w.force.shape)
-        w.torque_limit[:], w.cap[:] = limit, stance.cap
-        w.friction[0] = self.friction
-        found = assemble(
-            robot.mass_matrix,
-            robot.nonlinear_effects,
-            w.contact,
-            tasks.table,
-            self._costs,
-            w.limits,
-            w.out,
-        )
-        if found == FREE:
-            w.answer = w.matrices.minimum
-            return True, True, 0.0
+        if kind == BRAKED:
+            arguments = (robot.arrays, tasks.table, limit, w.bounds, w.work)
+            kind = assemble(self.data[0], robot.data[0], *arguments)
+        if kind == FREE:
+            return kind, True, 0.0
         tasks.check_finite()  # with such a number no constraint is kept
         start = time.perf_counter()
-        regular = found != SINGULAR
-        solved = regular and w.solve()
-        seconds = time.perf_counter() - start
-        w.answer = w.qp.results.x
-        return regular, solved, seconds
+        solved = kind != SINGULAR and w.solve()
+        return kind, solved, time.perf_counter() - start
 
-    def _tell(self, regular: bool, stance: Stance) -> None:
+    def _tell(self, regular: bool, feet: int) -> None:
         """Log that the last solved torques are kept, once for failures in a row."""
         if not self._failing:
             why = "has no solution within its limits" if regular else "is singular"
             _LOG.warning(
                 "%s: the QP with %d stance feet %s: the last torques are kept",
                 self.robot.name,
-                len(stance.feet),
+                feet,
                 why,
             )

@@ -1,4 +1,4 @@
-"""Interface of tasks, their references, and the stack of rows that they write.
+"""Interface of tasks, and their references.
 
 A task asks for accelerations of some quantities y(q), one row each: with the Jacobian T of y,
 the QP minimises weight * (T a + dT/dt v - desired)^2, equation (45), where ``desired`` holds the
@@ -8,17 +8,13 @@ feedforward and the PD feedback.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from math import isfinite
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.fitting import blame, name_of
-from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
+from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
@@ -26,9 +22,27 @@ BIAS, DESIRED, WEIGHT = 0, 1, 2
 """Columns of a row behind its (nv,) Jacobian."""
 
 
-@dataclass
+_F, _I = np.float64, np.int64
+
+REFERENCES = np.dtype(
+    [
+        ("com", _F, (6,)),
+        ("com_now", _F, (4,)),
+        ("com_push", _F),
+        ("pitch", _F),
+        ("feet", _I, (2,)),
+        ("foot", _F, (2, 2, 3)),
+        ("side", _F, (2, 3)),
+        ("furthest", _F, (2,)),
+        ("lift", _F),
+    ],
+    align=True,
+)
+"""What tasks read beside the robot's own state; :class:`References` explains the fields."""
+
+
 class References:
-    """References and measurements in one place; the controller overwrites them at every tick.
+    """References of a tick, which the controller overwrites; compiled code reads the same memory.
 
     Attributes:
         com: (6,) wanted x, y of the CoM, their first and their second derivatives, in a frame
@@ -37,7 +51,6 @@ class References:
             the phase senses: with the angular momentum about the CoM, or without.
         com_push: horizontal acceleration added to the feedforward [m/s^2].
         pitch: wanted angle of the trunk [rad].
-        pitch_now: (2,) its angle and rate [rad, rad/s].
         feet: the foot that is the rear leg's, and the front leg's.
         foot: (2, 2, 3) of each foot: x and y, each wanted position, velocity, acceleration, in
             the world [m, m/s, m/s^2].
@@ -45,19 +58,23 @@ class References:
             heading frame.
         furthest: (2,) largest x that each foot may be moved to, so that its leg does not go
             straight [m].
-        hip_speed: forward speed of the hips [m/s].
+        lift: the feedback part of the CoM's vertical acceleration; a ``ComTask`` writes it
+            [m/s^2].
+        data: (1,) of ``REFERENCES``, all of them.
     """
 
-    com: Array = field(default_factory=lambda: np.zeros(6))
-    com_now: Array = field(default_factory=lambda: np.zeros(4))
-    com_push: float = 0.0
-    pitch: float = 0.0
-    pitch_now: Array = field(default_factory=lambda: np.zeros(2))
-    feet: tuple[int, int] = (0, 1)
-    foot: Array = field(default_factory=lambda: np.zeros((2, 2, 3)))
-    side: Array = field(default_factory=lambda: np.zeros((2, 3)))
-    furthest: Array = field(default_factory=lambda: np.full(2, np.inf))
-    hip_speed: float = 0.0
+    def __init__(self, pitch: float = 0.0) -> None:
+        self.data = np.zeros(1, REFERENCES)
+        now = {name: self.data[name][0] for name in REFERENCES.names or ()}
+        self.com: Array = now["com"]
+        self.com_now: Array = now["com_now"]
+        self.feet: NDArray[np.int64] = now["feet"]
+        self.foot: Array = now["foot"]
+        self.side: Array = now["side"]
+        self.furthest: Array = now["furthest"]
+        self.feet[1], self.furthest[:], self.pitch = 1, np.inf, pitch
+
+    com_push, pitch, lift = (Number(name) for name in ("com_push", "pitch", "lift"))
 
 
 class Rows(NamedTuple):
@@ -103,55 +120,3 @@ def task_name(task: Task) -> str:
     """
     name = type(task).__name__.removesuffix("Task")
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
-
-
-class TaskStack:
-    """The rows of a phase's tasks, one below the other.
-
-    Args:
-        tasks: in order.
-        nv: degrees of freedom of the robot.
-
-    Attributes:
-        table: (r, nv + 3) one row of T, bias, desired and weight each.
-    """
-
-    def __init__(self, tasks: Sequence[Task], nv: int) -> None:
-        weights = [weight for task in tasks for weight in task.weights]
-        self.table: Array = np.zeros((len(weights), nv + 3))
-        self.table[:, nv + WEIGHT] = weights
-        self._parts: list[tuple[Task, Rows]] = []
-        first = 0
-        for task in tasks:
-            part = self.table[first : first + len(task.weights)]
-            first += len(part)
-            bias, desired, weight = (part[:, nv + i] for i in (BIAS, DESIRED, WEIGHT))
-            rows = Rows(part[:, :nv], bias, desired, weight, part)
-            self._parts.append((task, rows))
-
-    def write(self, robot: Biped, references: References) -> None:
-        """Let every task fill its rows of the table.
-
-        Args:
-            robot: the model, updated to this tick.
-            references: references and measurements of this tick.
-        """
-        for task, rows in self._parts:
-            try:
-                task.write(robot, references, rows)
-            except Exception as error:  # where nothing is raised this costs no time
-                blame(error, task.write)
-
-    def check_finite(self) -> None:
-        """Check what the tasks have written last.
-
-        Raises:
-            ParameterError: naming the task's class, if a number is not finite.
-        """
-        if isfinite(self.table.sum()):
-            return
-        for task, rows in self._parts:
-            if not np.isfinite(rows.table).all():
-                raise ParameterError(
-                    f"{name_of(task.write)} wrote a number that is not finite: write finite ones"
-                )

@@ -1,8 +1,15 @@
-"""Tasks: CoM, feet, trunk and spare joints follow their references."""
+"""Tasks: CoM, feet, trunk and spare joints follow their references.
+
+Each task's formula is a compiled function next to it, and :func:`write_rows` calls those of a
+phase's tasks in turn. Their arguments: ``task`` is of ``TASK``, ``r`` of ``ROBOT_DATA``, ``arrays``
+is :class:`~template_control.robot.terms.Jacobians` as a plain tuple, ``want`` is of
+``REFERENCES``, and ``rows`` are the task's own, overwritten.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +19,7 @@ from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
-from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.terms import UP
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.similarity import (
     PER_ACCELERATION_SQUARED,
@@ -21,16 +28,83 @@ from template_control.slip.similarity import (
     RATE_SQUARED,
     tuned,
 )
-from template_control.whole_body.task import BIAS, DESIRED, References, Rows
+from template_control.whole_body.task import BIAS, DESIRED, WEIGHT, References, Rows
 
 Array = NDArray[np.float64]
 
 _PITCH = 2  # place of a planar robot's pitch in q
 _SIDE = 1  # y of a floating-base robot's feet, to the left
+_F, _I = np.float64, np.int64
+
+TASK = np.dtype(
+    [
+        ("kind", _I),  # which formula: a task's ``kind``
+        ("first", _I),  # row of the stack
+        ("leg", _I),  # role of the task's foot
+        ("gains", _F, (4,)),  # kp and kd, twice where the task has two pairs
+        ("weight", _F),  # of the first row
+    ],
+    align=True,
+)
+"""A task as compiled code reads it."""
+
+_COM, _FOOT, _MOMENTUM, _POSTURE, _ORIENTATION, _SIDE_FOOT, _SPARE = range(7)
+
+
+class CompiledTask(Checked):
+    """A task whose rows a compiled formula writes.
+
+    Attributes:
+        kind: its formula.
+        in_space: whether only floating-base robots have what it speaks of.
+    """
+
+    kind: ClassVar[int]
+    in_space: ClassVar[bool] = False
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """See :class:`~.task.Task`."""
+        weight = self.weight  # type: ignore[attr-defined]
+        return weight if isinstance(weight, tuple) else (weight,)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Gains, as the formula reads them."""
+        return self.gains  # type: ignore[attr-defined]
+
+    def compiled(self, first: int) -> Any:
+        """(1,) of ``TASK``.
+
+        Args:
+            first: row of the stack.
+        """
+        found = np.zeros(1, TASK)
+        found["kind"], found["first"] = self.kind, first
+        found["leg"], found["weight"] = getattr(self, "leg", 0), self.weights[0]
+        found["gains"][0, : len(self.numbers)] = self.numbers
+        return found
+
+    def check(self, robot: Biped) -> None:
+        """Check that a robot has what the task speaks of.
+
+        Raises:
+            ParameterError: if the robot is held in its plane, and the task is one in space.
+        """
+        if self.in_space and robot.directions <= UP:
+            raise ParameterError(
+                f"robot {robot.name} is held in its plane, and a {type(self).__name__} asks for a"
+                " free one: take load_floating_robot, or tasks of the plane"
+            )
+
+    def write(self, robot: Biped, references: References, rows: Rows) -> None:
+        """See :meth:`~.task.Task.write`."""
+        self.check(robot)
+        write_rows(self.compiled(0), robot.data, robot.arrays, references.data, rows.table)
 
 
 @dataclass(frozen=True)
-class ComTask(Checked):
+class ComTask(CompiledTask):
     """Two rows, x and y of the CoM c, towards the template's r.
 
     The y row asks for J_y a + dJ_y/dt v = r_y'' + kp (r_y - c_y) + kd (r_y' - c_y').
@@ -50,35 +124,38 @@ class ComTask(Checked):
     weight: tuple[NotNegative, NotNegative] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
     gains: tuple[NotNegative, NotNegative] = tuned((60.0, 16.0), RATE_SQUARED, RATE)
 
-    @property
-    def weights(self) -> tuple[float, ...]:
-        """See :class:`~.task.Task`."""
-        return self.weight
+    kind = _COM
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
-        """See :meth:`~.task.Task.write`."""
-        (kp, kd), ref, now = self.gains, references.com.tolist(), references.com_now.tolist()
-        height, rise = now[1], robot.com_velocity.tolist()[1]
-        moment = robot.mass * height
-        rows.jacobian[:] = robot.com_jacobian
-        rows.jacobian[0] += robot.angular_momentum_jacobian / moment
-        rows.bias[:] = robot.com_bias
-        rows.bias[0] += (
-            robot.angular_momentum_bias - robot.angular_momentum * rise / height
-        ) / moment
-        rows.desired[0] = (
-            ref[4] + kp * (ref[0] - now[0]) + kd * (ref[2] - now[2]) + references.com_push
-        )
-        rows.desired[1] = ref[5] + self.lift(references)
 
-    def lift(self, references: References) -> float:
-        """The feedback part of the vertical acceleration [m/s^2]."""
-        (kp, kd), ref, now = self.gains, references.com.tolist(), references.com_now.tolist()
-        return float(kp * (ref[1] - now[1]) + kd * (ref[3] - now[3]))
+@compiled
+def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of a :class:`ComTask`, and ``lift`` of the references.
+
+    Arguments as for :func:`write_rows`, one of each.
+    """
+    com, momentum = arrays[2], arrays[3]
+    kp, kd, nv, up, pitch = (
+        task.gains[0],
+        task.gains[1],
+        com.shape[1],
+        com.shape[0] - 1,
+        len(momentum) // 2,
+    )
+    ref, now = want.com, want.com_now
+    height, rise = now[1], r.com_velocity[UP]
+    moment = r.mass * height
+    for k in range(nv):
+        rows[0, k] = com[0, k] + momentum[pitch, k] / moment
+        rows[1, k] = com[up, k]
+    turning = r.momentum_bias[1] - r.momentum[1] * rise / height
+    rows[0, nv + BIAS], rows[1, nv + BIAS] = r.com_bias[0] + turning / moment, r.com_bias[UP]
+    ahead = ref[4] + kp * (ref[0] - now[0]) + kd * (ref[2] - now[2]) + want.com_push
+    want.lift = kp * (ref[1] - now[1]) + kd * (ref[3] - now[3])
+    rows[0, nv + DESIRED], rows[1, nv + DESIRED] = ahead, ref[5] + want.lift
 
 
 @dataclass(frozen=True)
-class FootTask(Checked):
+class FootTask(CompiledTask):
     """Two rows, x and y of a foot p, towards its reference r.
 
         J a + dJ/dt v = r'' + kp (r - p) + kd (r' - p')
@@ -99,57 +176,38 @@ class FootTask(Checked):
     gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
     hold_gains: tuple[NotNegative, NotNegative] = tuned((1e4, 200.0), RATE_SQUARED, RATE)
 
-    @property
-    def weights(self) -> tuple[float, ...]:
-        """See :class:`~.task.Task`."""
-        return self.weight
+    kind = _FOOT
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
-        """See :meth:`~.task.Task.write`."""
-        feels = robot.foot_position, robot.foot_velocity, robot.foot_jacobian, robot.foot_bias
-        wish = references.foot, references.furthest
-        gains = *self.gains, *self.hold_gains
-        follow_foot(references.feet[self.leg], feels, wish, references.hip_speed, gains, rows.table)
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """See :attr:`CompiledTask.numbers`."""
+        return *self.gains, *self.hold_gains
 
 
 @compiled
-def follow_foot(
-    foot: int,
-    feels: tuple[Array, Array, Array, Array],
-    wish: tuple[Array, Array],
-    hip_speed: float,
-    gains: tuple[float, float, float, float],
-    table: Array,
-) -> None:
-    """Write the two rows of a :class:`FootTask`.
+def foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of a :class:`FootTask`.
 
-    Args:
-        foot: 0 or 1.
-        feels: (2, 2) positions and (2, 2) velocities of both feet, their (2, 2, nv) Jacobians, and
-            (2, 2) dJ/dt v.
-        wish: (2, 2, 3) the references, and (2,) the furthest x of each foot [m].
-        hip_speed: forward [m/s].
-        gains: kp and kd of the feedback, and of that which holds the foot back.
-        table: (2, nv + 3) overwritten, as that of a :class:`~.task.TaskStack`.
+    Arguments as for :func:`write_rows`, one of each.
     """
-    position, velocity, jacobian, bias = feels
-    reference, furthest = wish
-    kp, kd, hold_p, hold_d = gains
-    nv = table.shape[1] - 3
-    for axis in range(2):
+    contact, foot = arrays[4], want.feet[task.leg]
+    kp, kd, hold_p, hold_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
+    nv = contact.shape[2]
+    for row in range(2):
+        axis, direction = row * UP, row * (contact.shape[1] - 1)
         for k in range(nv):
-            table[axis, k] = jacobian[foot, axis, k]
-        table[axis, nv + BIAS] = bias[foot, axis]
-        r = reference[foot, axis]
-        ahead, faster = r[0] - position[foot, axis], r[1] - velocity[foot, axis]
-        table[axis, nv + DESIRED] = r[2] + kp * ahead + kd * faster
-    ahead = furthest[foot] - position[foot, 0]
-    held = hold_p * ahead + hold_d * (hip_speed - velocity[foot, 0])
-    table[0, nv + DESIRED] = min(table[0, nv + DESIRED], held)
+            rows[row, k] = contact[foot, direction, k]
+        rows[row, nv + BIAS] = r.foot_bias[foot, axis]
+        ahead = want.foot[foot, row, 0] - r.foot_position[foot, axis]
+        faster = want.foot[foot, row, 1] - r.foot_velocity[foot, axis]
+        rows[row, nv + DESIRED] = want.foot[foot, row, 2] + kp * ahead + kd * faster
+    ahead = want.furthest[foot] - r.foot_position[foot, 0]
+    held = hold_p * ahead + hold_d * (r.hip_speed - r.foot_velocity[foot, 0])
+    rows[0, nv + DESIRED] = min(rows[0, nv + DESIRED], held)
 
 
 @dataclass(frozen=True)
-class MomentumTask(Checked):
+class MomentumTask(CompiledTask):
     """One row: the rate of the angular momentum L = A_L v about the CoM.
 
         A_L a + dA_L/dt v = k (m h^2 w (theta_ref - theta) - L)
@@ -169,25 +227,33 @@ class MomentumTask(Checked):
     bandwidth: NotNegative = tuned(20.0, RATE)
     turning: NotNegative = tuned(1.35, RATE)
 
-    @property
-    def weights(self) -> tuple[float, ...]:
-        """See :class:`~.task.Task`."""
-        return (self.weight,)
+    kind = _MOMENTUM
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
-        """See :meth:`~.task.Task.write`."""
-        # Python's numbers: arithmetic on an array's is slow.
-        height, angle = references.com_now.item(1), references.pitch_now.item(0)
-        inertia = robot.mass * (height * height)
-        rows.jacobian[0] = robot.angular_momentum_jacobian
-        rows.bias[0] = robot.angular_momentum_bias
-        turning = inertia * self.turning * (references.pitch - angle)
-        rows.desired[0] = self.bandwidth * (turning - robot.angular_momentum)
-        rows.weight[0] = self.weight / (inertia * inertia)
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """See :attr:`CompiledTask.numbers`."""
+        return self.bandwidth, self.turning
+
+
+@compiled
+def momentum_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the row of a :class:`MomentumTask`.
+
+    Arguments as for :func:`write_rows`, one of each.
+    """
+    momentum, height = arrays[3], want.com_now[1]
+    pitch, nv = len(momentum) // 2, momentum.shape[1]
+    inertia = r.mass * (height * height)
+    for k in range(nv):
+        rows[0, k] = momentum[pitch, k]
+    rows[0, nv + BIAS] = r.momentum_bias[1]
+    turning = inertia * task.gains[1] * (want.pitch - r.attitude[1])
+    rows[0, nv + DESIRED] = task.gains[0] * (turning - r.momentum[1])
+    rows[0, nv + WEIGHT] = task.weight / (inertia * inertia)
 
 
 @dataclass(frozen=True)
-class PostureTask(Checked):
+class PostureTask(CompiledTask):
     """One row: theta'' = kp (theta_ref - theta) - kd theta', theta the trunk's pitch.
 
     Pitch is a coordinate of the robot, so T is a unit row and there is no bias.
@@ -200,21 +266,23 @@ class PostureTask(Checked):
     weight: NotNegative = tuned(1.0, PER_RATE_TO_THE_FOURTH)
     gains: tuple[NotNegative, NotNegative] = tuned((100.0, 20.0), RATE_SQUARED, RATE)
 
-    @property
-    def weights(self) -> tuple[float, ...]:
-        """See :class:`~.task.Task`."""
-        return (self.weight,)
+    kind = _POSTURE
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
-        """See :meth:`~.task.Task.write`."""
-        kp, kd = self.gains
-        angle, rate = references.pitch_now.tolist()
-        rows.jacobian[0, _PITCH] = 1.0
-        rows.desired[0] = kp * (references.pitch - angle) - kd * rate
+
+@compiled
+def posture_rows(task: Any, r: Any, want: Any, rows: Array) -> None:
+    """Write the row of a :class:`PostureTask`.
+
+    Arguments as for :func:`write_rows`, one of each.
+    """
+    nv = rows.shape[1] - 3
+    rows[0, _PITCH] = 1.0
+    away = task.gains[0] * (want.pitch - r.attitude[1])
+    rows[0, nv + DESIRED] = away - task.gains[1] * r.turning[1]
 
 
 @dataclass(frozen=True)
-class OrientationTask(Checked):
+class OrientationTask(CompiledTask):
     """Three rows: the trunk's angular acceleration about the heading frame's x, y and z.
 
         w' = kp (-roll, pitch_ref - pitch, -yaw) - kd w
@@ -237,25 +305,33 @@ class OrientationTask(Checked):
     gains: tuple[NotNegative, NotNegative] = tuned((100.0, 20.0), RATE_SQUARED, RATE)
     yaw_gains: tuple[NotNegative, NotNegative] = tuned((36.0, 12.0), RATE_SQUARED, RATE)
 
-    @property
-    def weights(self) -> tuple[float, ...]:
-        """See :class:`~template_control.whole_body.task.Task`."""
-        return self.weight
+    kind = _ORIENTATION
+    in_space = True
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
-        """See :meth:`~template_control.whole_body.task.Task.write`."""
-        free = _floating(robot)
-        (kp, kd), (yaw_p, yaw_d) = self.gains, self.yaw_gains
-        roll, pitch, yaw = free.roll_pitch_yaw()
-        x, y, z = free.space.turning.tolist()
-        rows.jacobian[:] = free.space.turning_jacobian
-        rows.desired[0] = -kp * roll - kd * x
-        rows.desired[1] = kp * (references.pitch - pitch) - kd * y
-        rows.desired[2] = -yaw_p * yaw - yaw_d * z
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """See :attr:`CompiledTask.numbers`."""
+        return *self.gains, *self.yaw_gains
+
+
+@compiled
+def orientation_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of an :class:`OrientationTask`.
+
+    Arguments as for :func:`write_rows`, one of each.
+    """
+    turning, nv = arrays[5], rows.shape[1] - 3
+    kp, kd, yaw_p, yaw_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
+    for axis in range(turning.shape[0]):
+        for k in range(nv):
+            rows[axis, k] = turning[axis, k]
+    rows[0, nv + DESIRED] = -kp * r.attitude[0] - kd * r.turning[0]
+    rows[1, nv + DESIRED] = kp * (want.pitch - r.attitude[1]) - kd * r.turning[1]
+    rows[2, nv + DESIRED] = -yaw_p * r.attitude[2] - yaw_d * r.turning[2]
 
 
 @dataclass(frozen=True)
-class SideFootTask(Checked):
+class SideFootTask(CompiledTask):
     """One row: y of a foot p towards its reference r, beside the two of a ``FootTask``.
 
         J a + dJ/dt v = r'' + kp (r - p) + kd (r' - p')
@@ -270,25 +346,27 @@ class SideFootTask(Checked):
     weight: NotNegative = tuned(1.0, PER_ACCELERATION_SQUARED)
     gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
 
-    @property
-    def weights(self) -> tuple[float, ...]:
-        """See :class:`~template_control.whole_body.task.Task`."""
-        return (self.weight,)
+    kind = _SIDE_FOOT
+    in_space = True
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
-        """See :meth:`~template_control.whole_body.task.Task.write`."""
-        space, (kp, kd) = _floating(robot).space, self.gains
-        foot = references.feet[self.leg]
-        place, speed, acceleration = references.side[foot].tolist()
-        rows.jacobian[0] = space.foot_jacobian[foot, _SIDE]
-        rows.bias[0] = space.foot_bias[foot, _SIDE]
-        away = place - float(space.foot[foot, _SIDE])
-        behind = speed - float(robot.contact_velocity[foot, _SIDE])
-        rows.desired[0] = acceleration + kp * away + kd * behind
+
+@compiled
+def side_foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the row of a :class:`SideFootTask`.
+
+    Arguments as for :func:`write_rows`, one of each.
+    """
+    contact, foot, nv = arrays[4], want.feet[task.leg], rows.shape[1] - 3
+    for k in range(nv):
+        rows[0, k] = contact[foot, _SIDE, k]
+    rows[0, nv + BIAS] = r.foot_bias[foot, _SIDE]
+    away = want.side[foot, 0] - r.foot_position[foot, _SIDE]
+    behind = want.side[foot, 1] - r.foot_velocity[foot, _SIDE]
+    rows[0, nv + DESIRED] = want.side[foot, 2] + task.gains[0] * away + task.gains[1] * behind
 
 
 @dataclass(frozen=True)
-class SpareJointTask(Checked):
+class SpareJointTask(CompiledTask):
     """Two rows, one for each leg: q'' = kp (q0 - q) - kd q'.
 
     A foot is placed by three hinges. Of four, the one about the axis that is nearest to the
@@ -302,30 +380,61 @@ class SpareJointTask(Checked):
     weight: NotNegative = tuned(1.0, PER_RATE_TO_THE_FOURTH)
     gains: tuple[NotNegative, NotNegative] = tuned((400.0, 40.0), RATE_SQUARED, RATE)
 
+    kind = _SPARE
+    in_space = True
+
     @property
     def weights(self) -> tuple[float, ...]:
-        """See :class:`~template_control.whole_body.task.Task`."""
+        """See :class:`~.task.Task`."""
         return self.weight, self.weight
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
-        """See :meth:`~template_control.whole_body.task.Task.write`."""
-        spare, (kp, kd) = _floating(robot).spare, self.gains
-        rows.weight[len(spare) :] = 0.0
-        for row, (joint, rest) in enumerate(spare):
-            rows.jacobian[row, robot.base_dof + joint] = 1.0
-            away = rest - float(robot.joint_angle[joint])
-            rows.desired[row] = kp * away - kd * float(robot.joint_velocity[joint])
 
+@compiled
+def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) -> None:
+    """Write the rows of a :class:`SpareJointTask`.
 
-def _floating(robot: Biped) -> FloatingBaseBiped:
-    """The robot, if it has a floating base.
-
-    Raises:
-        ParameterError: if it is held in its plane.
+    Arguments as for :func:`write_rows`, one of each.
     """
-    if isinstance(robot, FloatingBaseBiped):
-        return robot
-    raise ParameterError(
-        f"robot {robot.name} is held in its plane, and a task in space asks for a free one: take"
-        " load_floating_robot, or tasks of the plane"
-    )
+    joints, nv = arrays[6], rows.shape[1] - 3
+    base_dof = nv - joints.shape[1]
+    for row in range(2):
+        if row >= r.spare:
+            rows[row, nv + WEIGHT] = 0.0
+            continue
+        joint = r.spare_joint[row]
+        rows[row, base_dof + joint] = 1.0
+        away = task.gains[0] * (r.spare_angle[row] - joints[0, joint])
+        rows[row, nv + DESIRED] = away - task.gains[1] * joints[1, joint]
+
+
+@compiled
+def write_rows(
+    program: Any, data: Any, arrays: tuple[Any, ...], references: Any, table: Array
+) -> None:
+    """Let tasks write their rows.
+
+    Args:
+        program: (n,) of ``TASK``.
+        data: (1,) of ``ROBOT_DATA``.
+        arrays: of the robot.
+        references: (1,) of ``REFERENCES``.
+        table: of a :class:`~.stack.TaskStack`; the tasks' rows are overwritten.
+    """
+    r, want = data[0], references[0]
+    for i in range(program.shape[0]):
+        task = program[i]
+        rows = table[task.first :]
+        if task.kind == _COM:
+            com_rows(task, r, arrays, want, rows)
+        elif task.kind == _FOOT:
+            foot_rows(task, r, arrays, want, rows)
+        elif task.kind == _MOMENTUM:
+            momentum_rows(task, r, arrays, want, rows)
+        elif task.kind == _POSTURE:
+            posture_rows(task, r, want, rows)
+        elif task.kind == _ORIENTATION:
+            orientation_rows(task, r, arrays, want, rows)
+        elif task.kind == _SIDE_FOOT:
+            side_foot_rows(task, r, arrays, want, rows)
+        else:
+            spare_joint_rows(task, r, arrays, rows)

@@ -42,6 +42,7 @@ SHARED = (
     "errors",
     "settings",
     "storage",
+    "structured",
     "terminal",
     "version",
     "warm_up",

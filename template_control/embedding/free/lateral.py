@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.embedding.com_path import TemplatePath
 from template_control.embedding.planners.planner import Decision
 from template_control.slip.automaton.vocabulary import Slot
@@ -105,6 +106,84 @@ def early_touchdown(
     return best
 
 
+_F, _I = np.float64, np.int64
+
+LATERAL = np.dtype(
+    [
+        # -- the path: see LateralPath --
+        ("gravity", _F),
+        ("longest", _F),
+        ("touchdown", _F),
+        ("section", _F),
+        ("beside", _I),
+        ("feet", _I, (2,)),  # that were rear and front at its start
+        # -- what the foothold is for: see LateralAim --
+        ("state", _F, (2,)),
+        ("step", _F),
+        ("cost", _F, (2, 2)),
+        ("step_cost", _F),
+        ("offset", _F, (2,)),
+        ("steps", _F, (2,)),
+        ("reach", _F),
+        ("stretch", _F),
+        # -- the foothold: see Placement --
+        ("hold", _F),  # time before touchdown from which on it is kept [s]
+        ("placed", _I),  # whether there is one
+        ("y", _F),
+        ("wanted", _F),
+        ("left", _F),
+        ("com", _F),
+        ("expected", _F, (2,)),
+        ("slope", _F, (2,)),
+    ],
+    align=True,
+)
+"""The lateral half of a tick."""
+
+
+@compiled
+def lateral_foothold(
+    lateral: Any, arrays: tuple[Any, ...], time: float, com: Array, feet: Array
+) -> float:
+    """y of the next foothold [m]; NaN where none is known.
+
+    Args:
+        lateral: of ``LATERAL``, overwritten.
+        arrays: coefficients, meta and footholds of the :class:`.LateralPath`.
+        time: on the path [s].
+        com: (2,) y of the CoM and dy/dt [m, m/s].
+        feet: (2,) y of the feet that were rear and front at the start of the path [m].
+    """
+    path = LateralPath(
+        coefficients=arrays[0],
+        meta=arrays[1],
+        footholds=arrays[2],
+        gravity=lateral.gravity,
+        longest=lateral.longest,
+        touchdown=lateral.touchdown,
+        section=lateral.section,
+        beside=lateral.beside,
+    )
+    aim = LateralAim(
+        state=lateral.state,
+        step=lateral.step,
+        cost=lateral.cost,
+        step_cost=lateral.step_cost,
+        offset=lateral.offset,
+        steps=lateral.steps,
+        reach=lateral.reach,
+        stretch=lateral.stretch,
+    )
+    found = place(path, aim, time, com, feet)
+    if found.left > lateral.hold or not lateral.placed:
+        lateral.placed = 1
+        lateral.y, lateral.wanted = found.y, found.wanted
+        lateral.left, lateral.com = found.left, found.com
+        for k in range(2):
+            lateral.expected[k], lateral.slope[k] = found.expected[k], found.slope[k]
+    return lateral.y
+
+
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of each foot, in the order of the robot's ``feet``."""
 
@@ -116,23 +195,22 @@ class LateralPlanner:
         parameters: the template.
         options: of the reference template.
         wish: step width, lateral motion, turn.
+        data: (1,) of ``LATERAL``, which ticks read and write.
 
     Attributes:
         learnt: what the robot adds to the template's sideways motion.
         wish: see above; it may be changed between two steps.
-        placed: the foothold that was chosen for the foot in the air; None before the first.
         cycle: the periodic motion of the wish.
     """
 
     def __init__(
-        self, parameters: SlipParameters, options: LateralOptions, wish: LateralWish
+        self, parameters: SlipParameters, options: LateralOptions, wish: LateralWish, data: Any
     ) -> None:
-        self.wish = wish
+        self.wish, self.data = wish, data
         self._unscaled = options
         self.options = scaled(options, Scale.of(parameters))
         self._gravity = parameters.gravity
         self.learnt = LateralLearnt()
-        self.placed: Placement | None = None
         self.cycle: LateralCycle
         self._gait: Gait | None = None
         self._lateral: LateralGait
@@ -141,6 +219,15 @@ class LateralPlanner:
         self._path: LateralPath
         self._landed: Placement | None = None
         self._due = np.inf
+        data["hold"] = self.options.hold
+
+    @property
+    def placed(self) -> Placement | None:
+        """The foothold that was chosen for the foot in the air; None before the first."""
+        now = self.data[0]
+        if not now["placed"]:
+            return None
+        return Placement(*(now[name].copy() for name in Placement._fields))
 
     def reset(self, gait: Gait) -> None:
         """Begin anew; nothing is learnt yet.
@@ -148,7 +235,8 @@ class LateralPlanner:
         Args:
             gait: that is walked.
         """
-        self.learnt, self.placed, self._planar = LateralLearnt(), None, None
+        self.learnt, self._planar = LateralLearnt(), None
+        self.data["placed"] = 0
         self._landed, self._due = None, np.inf
         self.walk(gait)
 
@@ -192,7 +280,8 @@ class LateralPlanner:
         if np.isfinite(self._due) and self._due > 0.0:
             options = self.options.learning
             self.learnt = self.learnt.after_stance(lasted, self._due, options)
-        self._landed, self.placed, self._due = self.placed, None, np.inf
+        self._landed, self._due = self.placed, np.inf
+        self.data["placed"] = 0
 
     def aim(self, stance: Side) -> None:
         """A foot swings.
@@ -201,30 +290,36 @@ class LateralPlanner:
             stance: side of the other one, beside which it is to land.
         """
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
+        for name, value in self._aim._asdict().items():
+            self.data[name] = value
 
-    def forecast(self, path: TemplatePath, time: float, com: Array, feet: Array) -> LateralForecast:
-        """Forecast of the next foothold.
-
-        Args:
-            path, time, com, feet: as for :meth:`foothold`.
-        """
-        return lateral_forecast(self._find(path, time, com, feet), self._aim)
-
-    def foothold(self, path: TemplatePath, time: float, com: Array, feet: Array) -> float:
-        """y of the next foothold [m]; NaN where none is known.
+    def forecast(self, path: TemplatePath, com: Array, feet: Array) -> LateralForecast:
+        """Forecast of the next foothold, where a path begins.
 
         Args:
             path: the planar path that the robot is on.
-            time: on it [s].
             com: (2,) y of the CoM and dy/dt [m, m/s].
             feet: (2,) y of the feet that were rear and front at the start of the path [m].
         """
-        found = self._find(path, time, com, feet)
-        if found.left > self.options.hold or self.placed is None:
-            self.placed = found
-        return self.placed.y
+        self._take(path)
+        return lateral_forecast(place(self._path, self._aim, 0.0, com, feet), self._aim)
 
-    def _find(self, path: TemplatePath, time: float, com: Array, feet: Array) -> Placement:
+    def follow(self, path: TemplatePath, feet: tuple[int, int]) -> tuple[Any, ...]:
+        """Take the planar path that the robot is on from now on.
+
+        Args:
+            path: the path.
+            feet: that were rear and front at its start.
+
+        Returns:
+            The arrays that :func:`lateral_foothold` reads.
+        """
+        self._take(path)
+        self.data["feet"] = feet
+        for name in ("gravity", "longest", "touchdown", "section", "beside"):
+            self.data[name] = getattr(self._path, name)
+        return self._path.coefficients, self._path.meta, self._path.footholds
+
+    def _take(self, path: TemplatePath) -> None:
         if path is not self._planar:
             self._planar, self._path = path, lateral_path(path.strides, self._gravity)
-        return place(self._path, self._aim, time, com, feet)

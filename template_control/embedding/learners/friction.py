@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
+from template_control.compiled import compiled
 from template_control.slip.similarity import TIME, Scale, tuned
+from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
@@ -41,29 +44,87 @@ class FrictionOptions(Checked):
     lowest: Positive = tuned(0.3)
 
 
-@dataclass
-class _Slide:
-    """Forces and time of a foot since it began to slide.
+_F = np.float64
 
-    Attributes:
-        standing: time since touchdown [s].
-        time: that it has slid for [s].
-        along, normal: sums of the ground's forces [N].
+SLIDES = np.dtype(
+    [
+        ("least", _F),  # load that a foot carries at least to teach anything [N]
+        ("speed", _F),  # of a foot that slides, at least [m/s]
+        ("duration", _F),  # [s], of the options
+        ("settling", _F),  # [s], of the options
+        ("lowest", _F),  # of the options
+        ("coefficient", _F),  # the estimate
+        ("standing", _F, (2,)),  # time since each foot's touchdown [s]
+        ("time", _F, (2,)),  # that each foot has slid for [s]
+        ("along", _F, (2,)),  # sums of the ground's forces since it began to slide [N]
+        ("normal", _F, (2,)),
+    ],
+    align=True,
+)
+"""Friction's estimate, and each foot's slide."""
+
+
+@compiled
+def feel_slides(s: Any, standing: NDArray[np.uint8], force: Array, speed: Array, dt: float) -> bool:
+    """Look at how the feet move, and what acts on them.
+
+    Args:
+        s: of ``SLIDES``, overwritten.
+        standing: (2,) whether each foot is on ground to stand on; one that chatters is, though
+            it carries nothing every other millisecond.
+        force: (2, d) the ground's force on each foot, along the ground first and up last [N].
+        speed: (2, d - 1 or more) of the feet's material points along the ground [m/s].
+        dt: since the last look [s].
+
+    Returns:
+        Whether the estimate has changed.
     """
+    before, level = s.coefficient, force.shape[1] - 1
+    for foot in range(2):
+        if not standing[foot]:
+            s.standing[foot] = 0.0
+            _end(s, foot)
+            continue
+        s.standing[foot] += dt
+        load = force[foot, level]
+        if load < s.least:
+            continue
+        if _slides_on(s, foot, force, speed):
+            s.time[foot] += dt
+            s.along[foot] += _size(force, foot, level)
+            s.normal[foot] += load
+            if s.time[foot] >= s.duration:
+                ratio = max(s.along[foot] / s.normal[foot], s.lowest)
+                if ratio < (1.0 - _DOUBT) * s.coefficient:
+                    s.coefficient = ratio
+        else:
+            _end(s, foot)
+    return s.coefficient != before
 
-    standing: float = 0.0
-    time: float = 0.0
-    along: float = 0.0
-    normal: float = 0.0
 
-    def lift(self) -> None:
-        """The foot has lifted off."""
-        self.standing = 0.0
-        self.end()
+@compiled
+def _slides_on(s: Any, foot: int, force: Array, speed: Array) -> bool:
+    """Whether a foot that stands slides, so that friction holds it back."""
+    level, power = force.shape[1] - 1, 0.0
+    if s.standing[foot] < s.settling or _size(speed, foot, level) <= s.speed:
+        return False
+    for axis in range(level):
+        power += force[foot, axis] * speed[foot, axis]
+    return power < 0.0
 
-    def end(self) -> None:
-        """The foot slides no longer."""
-        self.time = self.along = self.normal = 0.0
+
+@compiled
+def _size(vectors: Array, foot: int, level: int) -> float:
+    """Length of a foot's vector along the ground."""
+    if level == 1:
+        return abs(vectors[foot, 0])
+    return hypot(vectors[foot, 0], vectors[foot, 1])
+
+
+@compiled
+def _end(s: Any, foot: int) -> None:
+    """The foot slides no longer."""
+    s.time[foot] = s.along[foot] = s.normal[foot] = 0.0
 
 
 class FrictionEstimate:
@@ -78,61 +139,30 @@ class FrictionEstimate:
         before: the coefficient before anything is learnt.
         weight: of the robot [N].
         scale: units of the template.
+        data: (1,) of ``SLIDES``; own memory if not given.
 
     Attributes:
         coefficient: the estimate.
     """
 
+    coefficient = Number("coefficient")
+
     def __init__(
-        self, options: FrictionOptions, before: float, weight: float, scale: Scale
+        self,
+        options: FrictionOptions,
+        before: float,
+        weight: float,
+        scale: Scale,
+        *,
+        data: Any = None,
     ) -> None:
-        self.options = options
-        self.coefficient = before
-        self._least = _LOAD * weight
-        self._speed = SLIDING_SPEED * scale.speed
-        self._slides = (_Slide(), _Slide())
+        self.data = np.zeros(1, SLIDES) if data is None else data
+        now = self.data[0]
+        now["least"], now["speed"] = _LOAD * weight, SLIDING_SPEED * scale.speed
+        for name in ("duration", "settling", "lowest"):
+            now[name] = getattr(options, name)
+        now["coefficient"] = before
 
     def update(self, standing: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
-        """Look at how the feet move, and what acts on them.
-
-        Args:
-            standing: (2,) whether each foot is on ground to stand on; one that chatters is, though
-                it carries nothing every other millisecond.
-            force: (2, d) the ground's force on each foot, along the ground first and up last [N].
-            speed: (2, d) of the feet's material points on the ground [m/s].
-            dt: since the last look [s].
-
-        Returns:
-            Whether the estimate has changed.
-        """
-        before = self.coefficient
-        # Number by number: arrays of two would take five times as long, at every tick.
-        feet = zip(self._slides, standing.tolist(), force.tolist(), speed.tolist(), strict=True)
-        for slide, stands, one, moves in feet:
-            if not stands:
-                slide.lift()
-                continue
-            slide.standing += dt
-            if one[-1] < self._least:
-                continue
-            if self._slides_on(slide, one, moves):
-                slide.time += dt
-                slide.along += hypot(*one[:-1])
-                slide.normal += one[-1]
-                self._learn(slide)
-            else:
-                slide.end()
-        return self.coefficient != before
-
-    def _slides_on(self, slide: _Slide, force: list[float], speed: list[float]) -> bool:
-        """Whether a foot that stands slides, so that friction holds it back."""
-        if slide.standing < self.options.settling or hypot(*speed[:-1]) <= self._speed:
-            return False
-        return sum(f * v for f, v in zip(force[:-1], speed[:-1], strict=True)) < 0.0
-
-    def _learn(self, slide: _Slide) -> None:
-        if slide.time < self.options.duration:
-            return
-        ratio = max(slide.along / slide.normal, self.options.lowest)
-        if ratio < (1.0 - _DOUBT) * self.coefficient:
-            self.coefficient = ratio
+        """As :func:`feel_slides`."""
+        return bool(feel_slides(self.data[0], standing.view(np.uint8), force, speed, dt))

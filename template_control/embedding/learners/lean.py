@@ -11,12 +11,17 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
+
+import numpy as np
 
 from template_control.checks.checked import Checked
+from template_control.compiled import compiled
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import RATE, SPEED, Scale, tuned
+from template_control.structured import Number
 
 LEAN_RATE = 0.1
 """Rate at which the lean changes at most [rad/s, of the reference template]."""
@@ -99,6 +104,38 @@ class LeanOptions(Checked):
         return upright if lean is None else lean.at(goal.wanted_speed)
 
 
+_F = np.float64
+
+LEAN = np.dtype(
+    [
+        ("goal", _F),  # mean pitch of the present stride [rad]
+        ("mean", _F),  # mean pitch that is wanted now, on its way to the goal [rad]
+        ("correction", _F),  # what the reference adds to it [rad]
+        ("rate", _F),  # at which the mean changes at most [rad/s]
+        ("sum", _F),  # of the mean's error over the stride [rad s]
+        ("time", _F),  # of the stride so far [s]
+    ],
+    align=True,
+)
+"""Lean of the trunk."""
+
+
+@compiled
+def advance_lean(lean: Any, pitch: float, dt: float) -> float:
+    """The reference of the pitch at this tick [rad].
+
+    Args:
+        lean: of ``LEAN``, overwritten.
+        pitch: of the trunk [rad].
+        dt: duration of the tick [s].
+    """
+    most = lean.rate * dt
+    lean.mean += min(max(lean.goal - lean.mean, -most), most)
+    lean.sum += (lean.mean - pitch) * dt
+    lean.time += dt
+    return lean.mean + lean.correction
+
+
 class TrunkLean:
     """The trunk's reference; it persists from stride to stride.
 
@@ -106,16 +143,24 @@ class TrunkLean:
         options: by kind of stride and speed.
         upright: reference of the strides without a lean of their own [rad].
         scale: units of the template.
+        data: (1,) of ``LEAN``; own memory if not given.
 
     Attributes:
         mean: the mean pitch that is wanted now [rad].
         correction: what the reference adds to it [rad].
     """
 
-    def __init__(self, options: LeanOptions, upright: float, scale: Scale) -> None:
+    mean, correction, _goal, _sum, _time = (
+        Number(name) for name in ("mean", "correction", "goal", "sum", "time")
+    )
+
+    def __init__(
+        self, options: LeanOptions, upright: float, scale: Scale, data: Any = None
+    ) -> None:
+        self.data = np.zeros(1, LEAN) if data is None else data
         self.options = options
         self._upright = upright
-        self._rate = LEAN_RATE * scale.factor(RATE)
+        self.data["rate"] = LEAN_RATE * scale.factor(RATE)
         self.reset()
 
     def reset(self) -> None:
@@ -147,11 +192,7 @@ class TrunkLean:
             pitch: of the trunk [rad].
             dt: duration of the tick [s].
         """
-        most = self._rate * dt
-        self.mean += min(max(self._goal - self.mean, -most), most)
-        self._sum += (self.mean - pitch) * dt
-        self._time += dt
-        return self.mean + self.correction
+        return float(advance_lean(self.data[0], pitch, dt))
 
     def end_stride(self, nominal: bool) -> None:
         """Learn from the stride that has just ended.

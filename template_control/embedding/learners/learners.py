@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +28,7 @@ class Learners:
         options: of each, scaled to the template.
         parameters: the template.
         robot: the (nominal) model.
+        tick: (1,) of ``TICK``, in which they keep what ticks read and write.
 
     Attributes:
         load: how much heavier the robot is than its model.
@@ -34,13 +37,15 @@ class Learners:
         friction: how slippery the ground is.
     """
 
-    def __init__(self, options: EmbeddingOptions, parameters: SlipParameters, robot: Biped) -> None:
-        self.load = LoadEstimate(robot.gravity)
+    def __init__(
+        self, options: EmbeddingOptions, parameters: SlipParameters, robot: Biped, tick: Any
+    ) -> None:
+        scale, weight = Scale.of(parameters), robot.mass * robot.gravity
+        self.load = LoadEstimate(robot.gravity, tick["load"])
         self.trim = MomentumTrim(parameters)
-        self.lean = TrunkLean(options.lean, options.trunk_pitch, Scale.of(parameters))
-        weight = robot.mass * robot.gravity
+        self.lean = TrunkLean(options.lean, options.trunk_pitch, scale, tick["lean"])
         self.friction = FrictionEstimate(
-            options.slides, options.friction, weight, Scale.of(parameters)
+            options.slides, options.friction, weight, scale, data=tick["slides"]
         )
 
     @property

@@ -9,13 +9,17 @@ change the momentum about itself. In double stance the forces of two feet can.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.embedding.com_path import TemplatePath
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait, vlo_jacobians
 from template_control.slip.parameters import SlipParameters
+from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
@@ -41,6 +45,31 @@ TRIM_BOUND = 0.03
 """Of the trim's acceleration over g."""
 
 
+_F = np.float64
+
+LOAD = np.dtype(
+    [
+        ("sum", _F),  # of the vertical feedback over the stride [m/s]
+        ("time", _F),  # over which it was summed [s]
+    ],
+    align=True,
+)
+"""Load estimate, within a stride."""
+
+
+@compiled
+def observe_load(load: Any, feedback: float, dt: float) -> None:
+    """Add the feedback of one tick to the mean over the present stride.
+
+    Args:
+        load: of ``LOAD``, overwritten.
+        feedback: the feedback part of the CoM's vertical acceleration, up positive [m/s^2].
+        dt: duration of the tick [s].
+    """
+    load.sum += feedback * dt
+    load.time += dt
+
+
 class LoadEstimate:
     """Ratio of the real to the modelled weight.
 
@@ -50,16 +79,18 @@ class LoadEstimate:
 
     Args:
         gravity: of the robot's model [m/s^2]; the feedback is measured in units of it.
+        data: (1,) of ``LOAD``; own memory if not given.
 
     Attributes:
         factor: the estimate, 1 at first.
     """
 
-    def __init__(self, gravity: float) -> None:
+    _sum, _time = Number("sum"), Number("time")
+
+    def __init__(self, gravity: float, data: Any = None) -> None:
+        self.data = np.zeros(1, LOAD) if data is None else data
         self.factor = 1.0
         self._gravity = gravity
-        self._sum = 0.0
-        self._time = 0.0
 
     def observe(self, feedback: float, dt: float) -> None:
         """Add the feedback of one tick to the mean over the present stride.
@@ -68,8 +99,7 @@ class LoadEstimate:
             feedback: the feedback part of the CoM's vertical acceleration, up positive [m/s^2].
             dt: duration of the tick [s].
         """
-        self._sum += feedback * dt
-        self._time += dt
+        observe_load(self.data[0], feedback, dt)
 
     def end_stride(self, nominal: bool) -> None:
         """Learn from the stride that has just ended.

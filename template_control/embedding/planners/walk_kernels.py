@@ -8,16 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from template_control.embedding.com_path import LOCATE
-from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.running import leg_bounds
 from template_control.embedding.planners.step_search import KneeLoadPenalty, Law, choose
 from template_control.embedding.planners.stride_solver import improve
-from template_control.embedding.swing import (
-    SwingOptions,
-    quintic_step,
-    swing_step,
-)
 from template_control.robot.library import load_robot
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, StrideKind
@@ -28,14 +21,10 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.warm_up import Part
-from template_control.whole_body.problem import (
-    Matrices,
-    assemble,
-    follow,
-    rows_per_foot,
-    torques,
-)
-from template_control.whole_body.tasks import follow_foot
+from template_control.whole_body.solver import WholeBodyQp
+from template_control.whole_body.stack import TaskStack
+from template_control.whole_body.task import References
+from template_control.whole_body.tasks import PostureTask
 
 _TEMPLATE = SlipParameters()
 _K0 = _TEMPLATE.leg_stiffness
@@ -59,23 +48,18 @@ def exact_map() -> None:
     simulate_stride(_TEMPLATE, STRIDE_START[StrideKind.WALK], VLO.state(_STATE), _CONTROLS)
 
 
-def whole_body() -> None:
-    """The whole-body QP, of two degrees of freedom, one motor and one foot."""
-    matrices = Matrices.zeros(2, 1, 2, 1 + rows_per_foot(2))
-    mass_matrix = np.asfortranarray(np.eye(2))
-    bias, limits, costs = np.zeros(2), np.ones(1 + 1 + 2), np.ones(2)
-    contact, tasks, out = np.zeros((1, 2, 4)), np.zeros((1, 5)), tuple(matrices)
-    assemble(mass_matrix, bias, contact, tasks, costs, limits, out)
-    torques(np.ones((1, 1)), np.zeros(1), np.ones(1), np.zeros(1))
-    feet, wish = np.zeros((2, 2)), (np.zeros((2, 2, 3)), np.zeros(2))
-    follow_foot(0, (feet, feet, np.zeros((2, 2, 2)), feet), wish, 0.0, (1.0,) * 4, np.zeros((2, 5)))
-    follow(matrices.a_map, matrices.f_map, np.zeros(1), np.zeros(2), np.zeros(2))
+def whole_tick() -> None:
+    """A tick of the controller; only Pinocchio knows how its arrays lie."""
+    from template_control.embedding.tick import TICK, act, sense  # which imports planners
 
-
-def planar_terms() -> None:
-    """The sagittal part of what Pinocchio computes; only Pinocchio knows how its arrays lie."""
-    robot = load_robot("five-link")
-    robot.update(np.zeros(robot.nv), np.zeros(robot.nv))
+    robot, references, tick = load_robot("five-link"), References(), np.zeros(1, TICK)
+    robot.update(robot.neutral(), np.zeros(robot.nv))
+    qp, tasks = WholeBodyQp(robot), TaskStack((PostureTask(),), robot.nv)
+    memory = references.data, qp.data
+    sense(tick, robot.data, *memory, np.zeros(2, dtype=bool), np.zeros((2, 2)), 1e-3)
+    curve = np.ones((2, 1, ORDER + 1)), np.ones((1, 7)), np.ones(3)
+    rest = tasks.program, tasks.table, 1e-3, qp.room(0, 1.0)
+    act(tick, (robot.data, robot.arrays), *memory, curve, None, rest)
 
 
 def step_search() -> None:
@@ -102,17 +86,6 @@ def step_search() -> None:
     choose(law, scratch, _STATE, u, first)
 
 
-def references() -> None:
-    """The template's path, its leg forces and the swing of a foot."""
-    coefficients, meta = np.ones((2, 1, ORDER + 1)), np.ones((1, 7))
-    for locate in LOCATE.values():
-        locate(coefficients, meta, np.ones(3), 0.1, 1.0, 0.0, np.zeros(6))
-    leg_forces(meta[0], 0.1, np.ones(6), np.array([1.0, 1.0, 0.0, 1.0, 0.0]), np.zeros((2, 2)))
-    quintic_step(np.zeros(3), 0.1, 0.0, 1.0, 1e-3)
-    shape = SwingOptions().shape
-    swing_step(np.zeros(3), np.zeros(3), (0.1, 0.0, 1.0), shape, (0.0, 0.0), 1e-3)
-
-
 def catch() -> None:
     """The planner of the run that a walk breaks into."""
     one, square, prior = np.ones(1), np.ones((1, 1)), np.ones((4, 1))
@@ -121,10 +94,8 @@ def catch() -> None:
 
 
 CONTROL = (
-    Part(whole_body, 2.0),
-    Part(planar_terms, 0.7),
+    Part(whole_tick, 9.0),
     Part(catch, 1.3),
-    Part(references, 0.9),
 )
 """What a tick of the controller calls."""
 

@@ -5,11 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.com_path import LOCATE, at_direction, join, sample
+from template_control.embedding.com_path import at_direction, at_time, join, sample
 from template_control.embedding.learners.momentum import LoadEstimate
 from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.modes import GuardOptions, RobotGuards
-from template_control.embedding.phases import Clock
 from template_control.embedding.state import TemplateState
 from template_control.errors import GaitError, RobotError
 from template_control.robot.start import state_at_vlo
@@ -87,7 +86,7 @@ def test_phase_look_up_inverts_the_path(brisk_gait, time, scale):
     assert t == pytest.approx(time, abs=1e-8)
     np.testing.assert_allclose(found, state, atol=1e-7)
     # By time, wherever the robot is.
-    assert LOCATE[Clock.TIME](*curve, -5.0, 0.1, time, found)[0] == time
+    assert at_time(*curve, -5.0, 0.1, time, found)[0] == time
     np.testing.assert_allclose(found, state, atol=1e-12)
 
 

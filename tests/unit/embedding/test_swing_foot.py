@@ -1,20 +1,28 @@
 """The swing foot's path: clearance, reach, a slow landing, and ground that comes late."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from template_control.embedding.controller import SwingController
 from template_control.embedding.swing import (
     HIGH_SWING,
     Feet,
     SwingFoot,
     SwingOptions,
+    drop,
+    furthest,
+    meet_wall,
     quintic_step,
-    swing_step,
 )
+from template_control.embedding.tick import TICK, move_swings
+from template_control.robot.terms import ROBOT_DATA
 from template_control.slip.automaton.vocabulary import Leg
+from template_control.whole_body.task import References
+
+
+def meet(swing, at, foothold, due):
+    """A tick in which a foot is at a wall."""
+    place = np.array([at[0], 0.0, at[1]])
+    meet_wall(swing.data[0], 0, swing.x, swing.y, place, (foothold, due), 1e-3)
 
 
 def test_quintic_arrives():
@@ -35,11 +43,13 @@ def test_a_swing_steps_along_the_quintics_of_its_parts():
         (0.3, 0.08): (0.0, -options.landing_speed, 0.08),  # and comes down
     }
     for (elapsed, to_go), up in parts.items():
-        (x, y), (other_x, other_y) = ([axis.copy() for axis in here] for _ in range(2))
-        swing_step(x, y, (0.7, 0.0, to_go), options.shape, (elapsed, -np.inf), 1e-3)
+        swing, (other_x, other_y) = SwingFoot(options), (axis.copy() for axis in here)
+        swing.start(np.zeros(2), np.zeros(2), elapsed)
+        swing.x[:], swing.y[:] = here
+        swing.advance(0.7, to_go, 1e-3, 0.0)
         quintic_step(other_x, 0.7, 0.0, to_go - options.early, 1e-3)
         quintic_step(other_y, *up, 1e-3)
-        np.testing.assert_array_equal((x, y), (other_x, other_y))
+        np.testing.assert_array_equal((swing.x, swing.y), (other_x, other_y))
 
 
 def test_swing_clears_the_ground_and_lands_slowly():
@@ -71,11 +81,9 @@ def test_swing_without_a_foothold_comes_down():
 
 
 def test_swing_stays_within_reach_of_the_hip():
-    swing = SwingFoot(SwingOptions(leg_share=0.97))
-    swing.start(np.array([0.55, 0.1]), np.zeros(2))
-    x = swing.furthest((0.2, 0.85), 0.9)
+    x = furthest(0.97, (0.2, 0.85), 0.1, 0.9)
     assert np.hypot(x - 0.2, 0.75) == pytest.approx(0.97 * 0.9)
-    assert swing.furthest((0.2, 1.2), 0.9) == 0.2, "nowhere but below the hip"
+    assert furthest(0.97, (0.2, 1.2), 0.1, 0.9) == 0.2, "nowhere but below the hip"
 
 
 def test_swing_falls_to_ground_that_comes_late():
@@ -83,7 +91,7 @@ def test_swing_falls_to_ground_that_comes_late():
     swing = SwingFoot(options)
     swing.start(np.array([0.6, 0.0]), np.array([0.1, -0.2]))
     for _ in range(50):
-        swing.drop(1e-3)
+        drop(swing.data[0], 0, swing.x, swing.y, 1e-3)
     assert swing.y[0] == pytest.approx(-0.2 * 0.05 - 0.5 * options.drop_acceleration * 0.05**2)
     assert swing.x[0] == 0.6
     assert swing.x[1] == 0.0
@@ -110,7 +118,7 @@ def test_a_foot_that_meets_a_wall_goes_up_along_it_and_on_above_it():
         swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
     wall, below = np.array([-0.5, 0.07]), swing.y[0]
     for _ in range(20):
-        swing.meet_wall(wall, 0.6, 0.28, 1e-3)
+        meet(swing, wall, 0.6, 0.28)
     assert swing.x[0] == -0.5
     assert swing.x[1] == 0.0
     met = swing.y[0]
@@ -125,7 +133,7 @@ def test_a_foot_that_meets_a_wall_late_goes_down_before_it():
     swing = SwingFoot(SwingOptions())
     swing.start(np.array([0.5, 0.03]), np.array([0.3, -0.5]))
     for _ in range(20):
-        swing.meet_wall(np.array([0.5, 0.02]), 0.6, 0.02, 1e-3)
+        meet(swing, (0.5, 0.02), 0.6, 0.02)
     assert swing.x[0] == 0.5
     assert swing.y[0] < 0.03 - 0.5 * 0.02
 
@@ -138,27 +146,26 @@ def test_a_foot_that_comes_down_and_is_nearly_there_is_set_down(speed, foothold,
     swing = SwingFoot(SwingOptions())
     swing.start(np.array([0.5, 0.03]), np.array([0.3, speed]))
     for _ in range(20):
-        swing.meet_wall(np.array([0.5, 0.02]), foothold, 0.07, 1e-3)
+        meet(swing, (0.5, 0.02), foothold, 0.07)
     assert (swing.y[0] > 0.03) == rises
 
 
 @pytest.mark.parametrize("overdue", [False, True])
 def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(overdue):
     """The path of an overdue foot knows a later touchdown, of lower ground."""
-    feet = Feet(SwingOptions(), np.zeros((2, 2, 3)))
-    swing = feet.swing[1]
+    tick, robot, references = np.zeros(1, TICK), np.zeros(1, ROBOT_DATA), References()
+    swing = Feet(SwingOptions(), references.foot, tick["feet"]).swing[1]
     swing.start(np.array([0.57, -0.004]), np.array([0.0, -0.2]))
-    landing = SimpleNamespace(x=0.7, time=0.13)
-    in_air = SwingController(
-        SimpleNamespace(foot_position=np.array([[0.0, 0.0], [0.57, -0.006]]), leg_length=1.0),
-        feet,
-        SimpleNamespace(blocked=lambda foot: True),
-        SimpleNamespace(furthest=np.zeros(2)),
-    )
-    supervisor = SimpleNamespace(without_touchdown=overdue, landing=lambda foot: landing)
-    mode = SimpleNamespace(swings=(Leg.FRONT,), next_touchdown_leg=Leg.FRONT)
+    now, (model,) = tick[0], robot
+    now["contacts"]["wall"][1] = 1.0
+    now["mode"]["swings"], now["mode"]["swing_leg"][0] = 1, Leg.FRONT
+    now["mode"]["next_touchdown_leg"] = Leg.FRONT
+    now["path"]["without_touchdown"] = overdue
+    now["path"]["landing_x"][1], now["path"]["landing_time"][1] = 0.7, 0.13
+    model["foot_position"][1], model["hips"] = (0.57, 0.0, -0.006), (0.25, 0.0, 0.9)
+    model["leg_length"] = 1.0
     for _ in range(10):
-        in_air.advance(mode, supervisor, None, 0.0, np.array([0.25, 0.9]), 1e-3)
+        move_swings(now, model, references.data[0], 1e-3)
     assert swing.x[0] == 0.57
     assert (swing.y[0] < -0.006) if overdue else (swing.y[0] > 0.0)
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 import template_control as tc
-from template_control.embedding import FREE_PLANNER, FreeController, FreeOptions
+from template_control.embedding import FREE_PLANNER, EmbeddingController, FreeOptions
 from template_control.estimation import NoiseFilter, NoiseFilterOptions
 from template_control.robustness.severity_sweep import gait_errors
 from template_control.run.backends import FloatingBackend
@@ -93,7 +93,7 @@ def test_a_jolt_of_the_joints_is_believed_at_a_touchdown_only(bolt):
 
 def senses(robot, sensors, tuning=None):
     gait = tc.robot_gait_for_speed(robot, 0.55)
-    controller = FreeController(robot, tc.LqrPlanner(gait, FREE_PLANNER), tuning)
+    controller = EmbeddingController(robot, tc.LqrPlanner(gait, FREE_PLANNER), tuning)
     return FloatingBackend(robot).senses(controller, tc.Experiment(sensors=sensors))
 
 

@@ -12,8 +12,14 @@ from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.start import FloatingBasePose, floating_state_in
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
-from template_control.whole_body.task import DESIRED, WEIGHT, References, TaskStack
-from template_control.whole_body.tasks import ComTask, FootTask, OrientationTask, SideFootTask
+from template_control.whole_body.stack import TaskStack
+from template_control.whole_body.task import DESIRED, WEIGHT, References
+from template_control.whole_body.tasks import (
+    ComTask,
+    FootTask,
+    OrientationTask,
+    SideFootTask,
+)
 
 FRICTION = 0.6
 OPTIONS = QpOptions(

@@ -6,10 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from template_control.robot.terms import joint_reserve
-from template_control.whole_body.solver import JointBounds, QpOptions
+from template_control.whole_body.problem import bounds_needed
+from template_control.whole_body.solver import QpOptions, WholeBodyQp
 
 RANGES = np.array([[-2.0, 1.5], [0.0, 2.5]])
 LIMITS = np.array([10.0, 20.0])
+JOINTS = np.vstack((LIMITS, *RANGES.T))
 TUNING = QpOptions(speed_share=0.8, speed_horizon=0.02, stop_share=0.4, stop_horizon=0.05)
 
 turning = st.floats(-30.0, 30.0, allow_subnormal=False)
@@ -23,7 +25,7 @@ def test_a_joint_nears_a_stop_as_the_rule_says(place, speed):
     way = TUNING.stop_horizon * speed
     expected = bool(np.any((way <= low) | (way >= high)))
     configuration = np.concatenate(([7.0, -7.0], place))  # a base stands before the joints
-    fastest, soonest = joint_reserve(configuration, speed, LIMITS, RANGES)
+    fastest, soonest = joint_reserve(configuration, speed, JOINTS)
     assert fastest == np.abs(speed / LIMITS).max()
     # The rule multiplies where the function divides: they round differently.
     border = TUNING.stop_horizon / TUNING.speed_share
@@ -44,7 +46,7 @@ def test_a_joint_nears_a_stop_as_the_rule_says(place, speed):
     ],
 )
 def test_the_soonest_stop(place, speed, soonest):
-    found = joint_reserve(np.array(place), np.array(speed), LIMITS, RANGES)[1]
+    found = joint_reserve(np.array(place), np.array(speed), JOINTS)[1]
     assert found == pytest.approx(soonest)
 
 
@@ -58,7 +60,8 @@ def test_stops_are_looked_at_when_joints_are_fast(robot, knee, fastest, needed):
     v[4] = knee
     robot.update(q, v)
     assert robot.soonest_stop == pytest.approx(0.5 / -knee)
+    qp = WholeBodyQp(robot, TUNING)
     robot.fastest = fastest
-    assert JointBounds(robot, TUNING).needed() is needed
+    assert bounds_needed(qp.data[0], robot.data[0]) is needed
     robot.fastest = 0.9
-    assert JointBounds(robot, TUNING).needed(), "near the limit of speed"
+    assert bounds_needed(qp.data[0], robot.data[0]), "near the limit of speed"

@@ -17,8 +17,14 @@ from template_control.whole_body.solver import (
     WholeBodyQp,
     load_proxqp,
 )
-from template_control.whole_body.task import DESIRED, WEIGHT, References, TaskStack
-from template_control.whole_body.tasks import ComTask, FootTask, MomentumTask, PostureTask
+from template_control.whole_body.stack import TaskStack
+from template_control.whole_body.task import DESIRED, WEIGHT, References
+from template_control.whole_body.tasks import (
+    ComTask,
+    FootTask,
+    MomentumTask,
+    PostureTask,
+)
 
 FRICTION = 0.6
 OPTIONS = QpOptions(friction=FRICTION, friction_margin=1.0)
@@ -148,7 +154,7 @@ def test_proxqp_is_asked_where_a_limit_acts_and_nowhere_else(robot, feet, share,
     rng, limited = np.random.default_rng(5), 0
     for _ in range(100):
         *_, s = solve(robot, rng, feet, qp, scale=rng.uniform(0.0, most))
-        m = qp._workspaces[feet].matrices
+        m = qp.workspaces[feet].matrices
         assert s.solved
         if s.solve_seconds > 0.0:
             limited += 1
@@ -342,7 +348,7 @@ def test_a_foot_is_held_where_its_leg_would_go_straight(robot):
     stack.write(robot, references)
     assert free > 100.0
     held = stack.table[0, 7 + DESIRED]
-    assert held == pytest.approx(200.0 * (references.hip_speed - robot.foot_velocity[1, 0]))
+    assert held == pytest.approx(200.0 * (robot.hip_speed - robot.foot_velocity[1, 0]))
 
 
 def test_the_same_problem_gives_the_same_bits_wherever_it_lies_in_memory():

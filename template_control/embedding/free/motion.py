@@ -1,0 +1,218 @@
+"""Lateral motion of a floating-base robot: its heading, and its feet to the left and right.
+
+The controller runs in the sagittal plane: of :class:`~template_control.robot.FloatingBaseBiped` it
+sees x and z in the heading frame. Here that frame is turned, and the feet are placed sideways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import cos, inf, sin
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.free.lateral import (
+    BEYOND,
+    SIDES,
+    LateralForecast,
+    LateralPlanner,
+    early_touchdown,
+)
+from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.planners.planner import Context, Decision, decided
+from template_control.embedding.state import TemplateState
+from template_control.embedding.supervisor import StrideSupervisor
+from template_control.embedding.swing import Feet
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.slip.automaton.hybrid import Node
+from template_control.slip.automaton.vocabulary import Event, Leg
+from template_control.slip.gaits.gait import Gait
+from template_control.slip.lateral.gait import LateralWish
+from template_control.slip.lateral.placing import LATERAL
+from template_control.slip.maps.section import Section
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale, scaled
+from template_control.warm_up import ready
+from template_control.whole_body.task import References
+
+Array = NDArray[np.float64]
+
+_SIDE = 1  # y, to the left
+
+
+class LateralMotion:
+    """Heading, and footholds to the left and right.
+
+    Args:
+        robot: the (nominal) model; every tick updates it.
+        planner: where the feet land to the left or right.
+        feet: their roles.
+        references: of which ``side`` is kept here.
+        reach: a foothold that is wanted further than this beyond its bounds is out of reach [m].
+
+    Attributes:
+        robot, planner: see above.
+        turning: rate of the heading by time [rad/s].
+    """
+
+    def __init__(
+        self,
+        robot: FloatingBaseBiped,
+        planner: LateralPlanner,
+        feet: Feet,
+        references: References,
+        reach: float,
+    ) -> None:
+        self.robot, self.planner = robot, planner
+        self._feet, self._references, self._reach = feet, references, reach
+        self.turning: Callable[[float], float] = lambda time: 0.0
+
+    @classmethod
+    def of(
+        cls,
+        robot: FloatingBaseBiped,
+        parameters: SlipParameters,
+        options: FreeOptions,
+        feet: Feet,
+        references: References,
+        data: Any,
+    ) -> LateralMotion:
+        """That of a controller.
+
+        Args:
+            robot, feet, references: see the class.
+            parameters: the template.
+            options: tuning, not scaled.
+            data: (1,) of :data:`~.lateral.LATERAL`, which ticks read and write.
+        """
+        ready(LATERAL)
+        scale = Scale.of(parameters)
+        wish = LateralWish(scaled(options, scale).step_width)
+        planner = LateralPlanner(parameters, options.lateral, wish, data)
+        return cls(robot, planner, feet, references, BEYOND * scale.length)
+
+    def begin(self, gait: Gait) -> None:
+        """Begin a run; nothing is learnt yet.
+
+        Args:
+            gait: of its first stride.
+        """
+        self.planner.reset(gait)
+
+    def state(self, height: float, momentum_speed: bool) -> Array:
+        """(2,) y of the CoM, and dy/dt with the angular momentum as the forward speed has it.
+
+        Args:
+            height: of the CoM over the template's ground [m].
+            momentum_speed: whether the speed includes the angular momentum.
+        """
+        s = self.robot.space
+        speed = s.com_velocity[_SIDE]
+        if momentum_speed:
+            speed = speed - s.momentum[0] / (self.robot.mass * height)
+        return np.array([s.com[_SIDE], speed])
+
+    def side(self, foot: int) -> float:
+        """y of a foot [m]."""
+        return float(self.robot.space.foot[foot, _SIDE])
+
+    def end_stride(self, com: Array, nominal: bool) -> bool:
+        """Learn from the stride that has just ended, and turn the heading frame.
+
+        Args:
+            com: (2,) :meth:`state` where it ended.
+            nominal: whether it went near the gait.
+
+        Returns:
+            Whether the frame has turned: the robot has to be read again.
+        """
+        planner, stance = self.planner, self._feet.foot_of_leg[Leg.REAR]
+        if nominal:
+            planner.end_step(SIDES[stance], self.side(stance), com)
+        if planner.wish.turn:
+            self._turn(planner.wish.turn, self.robot.space.foot[stance, :2].copy())
+        return bool(planner.wish.turn)
+
+    def _turn(self, angle: float, about: Array) -> None:
+        """Turn the heading frame about a point of it; what is kept in it turns back."""
+        self.robot.turn(angle, about)
+        c, s = cos(angle), sin(angle)
+        for foot in range(2):
+            ahead, side = self._references.foot[foot, 0], self._references.side[foot]
+            ahead[0] -= about[0]
+            side[0] -= about[1]
+            ahead[:], side[:] = c * ahead + s * side, c * side - s * ahead
+            ahead[0] += about[0]
+            side[0] += about[1]
+
+    def begin_stride(
+        self,
+        section: Section,
+        supervisor: StrideSupervisor,
+        node: Node,
+        sensed: TemplateState,
+        com: Array,
+        time: float,
+    ) -> Node:
+        """Take note of the stride that begins, and let it end sooner where that is better.
+
+        Args:
+            section: at which it begins.
+            supervisor: which has decided it; it follows another decision where there is a better
+                one.
+            node: of the automaton, the robot's.
+            sensed: the robot's state.
+            com: (2,) :meth:`state`.
+            time: since the start [s].
+
+        Returns:
+            The node that the robot is in then.
+        """
+        planner, gait = self.planner, supervisor.planner.gait
+        planner.wish = replace(planner.wish, turn=self.turning(time) * gait.step_duration)
+        planner.walk(gait)
+        planner.aim(SIDES[self._feet.foot_of_leg[Leg.REAR]])
+        z, target = section.of(sensed.state), supervisor.goal.target
+
+        def decide(least: float) -> Decision:
+            return decided(supervisor.planner.decide, Context(z, target, (least, inf)))
+
+        def follow(decision: Decision) -> Node:
+            if decision is supervisor.decision:
+                return node
+            supervisor.set_decision(decision)
+            return supervisor.follow(node, sensed, time)
+
+        def look(decision: Decision) -> LateralForecast:
+            follow(decision)
+            feet = np.array([self.side(foot) for foot in supervisor.feet])
+            return planner.forecast(supervisor.path, com, feet)
+
+        node = follow(early_touchdown(supervisor.decision, decide, look, self._reach))
+        planner.expect(supervisor.time_of(Event.TOUCHDOWN))
+        return node
+
+    def touch_down(self, lasted: float) -> None:
+        """A foot has landed.
+
+        Args:
+            lasted: time since the section [s].
+        """
+        self.planner.touch_down(lasted)
+
+    def lift(self, foot: int) -> None:
+        """A foot begins its swing."""
+        speed = float(self.robot.contact_velocity[foot, _SIDE])
+        self._references.side[foot] = self.side(foot), speed, 0.0
+        self.planner.aim(SIDES[1 - foot])
+
+    def arrays(self, supervisor: StrideSupervisor) -> tuple[Any, ...]:
+        """What :func:`.lateral_foothold` reads of a path.
+
+        Args:
+            supervisor: whose path it is.
+        """
+        return self.planner.follow(supervisor.path, supervisor.feet)

@@ -1,0 +1,301 @@
+"""State of a tick, and its compiled parts.
+
+``TICK`` holds what the controller knows from tick to tick, one part for each file that says what
+its numbers mean. Python looks at it through the objects that own the parts; the functions
+here, which are most of a tick, read and write the same memory. :func:`sense` takes in what was
+measured; :func:`act` moves the references on, and solves the QP where no limit acts. Between them
+Python sees to events and plans.
+
+The arguments of all of them: ``tick`` is (1,) of ``TICK``, ``data`` (1,) of ``ROBOT_DATA``,
+``references`` (1,) of ``REFERENCES``, ``qp`` (1,) of ``QP_DATA``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.compiled import compiled
+from template_control.embedding.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
+from template_control.embedding.free.lateral import LATERAL, lateral_foothold
+from template_control.embedding.learners.friction import SLIDES, feel_slides
+from template_control.embedding.learners.lean import LEAN, advance_lean
+from template_control.embedding.learners.momentum import LOAD, observe_load
+from template_control.embedding.leg_forces import unload_cap
+from template_control.embedding.modes import (
+    GUARDS,
+    MODE,
+    PATH,
+    first_fired,
+    move_clock,
+    plan_is_due,
+)
+from template_control.embedding.state import SENSED, predict_velocity, read_state, rolled
+from template_control.embedding.swing import (
+    FEET,
+    drop,
+    furthest,
+    meet_wall,
+    quintic_step,
+    swing_step,
+)
+from template_control.robot.terms import UP
+from template_control.slip.automaton.vocabulary import Event
+from template_control.whole_body.problem import solve_free
+from template_control.whole_body.tasks import write_rows
+
+Array = NDArray[np.float64]
+
+_F, _I = np.float64, np.int64
+
+TICK = np.dtype(
+    [
+        ("time", _F),  # since the start [s]
+        ("early", _F),  # a touchdown is due from this long before its time on the path [s]
+        ("sinking", _F),  # a foot that comes down faster is not due [m/s]
+        ("friction_margin", _F),  # share of the friction that the cones use
+        ("tilt", _F),  # of the axes with the ground [rad]
+        ("trim", _F),  # acceleration that the momentum trim adds in its phases [m/s^2]
+        ("mode", MODE),
+        ("contacts", CONTACTS),
+        ("slides", SLIDES),
+        ("feet", FEET),
+        ("sensed", SENSED),
+        ("guards", GUARDS),
+        ("path", PATH),
+        ("lean", LEAN),
+        ("load", LOAD),
+        ("lateral", LATERAL),
+    ],
+    align=True,
+)
+"""State of the controller from tick to tick."""
+
+QUIET, EVENTFUL, DIVERGED = 0, 1, 2
+"""What :func:`sense` finds: nothing to decide; an event, or a plan that is due; no finite state."""
+
+_TOUCHDOWN = int(Event.TOUCHDOWN)
+_REAR = 0
+_SIDE = 1
+
+
+@compiled
+def sense(
+    tick: Any,
+    data: Any,
+    references: Any,
+    qp: Any,
+    contact: NDArray[np.bool_],
+    force: Array,
+    dt: float,
+) -> int:
+    """Take in what was measured, and find out whether anything is to be decided.
+
+    Args:
+        tick, data, references, qp: see the module.
+        contact: (2,) whether each foot touches the ground, as its sensor says.
+        force: (2, 2) the ground's force on each foot, forward and up [N]; ``NO_FORCE``: none.
+        dt: control period [s].
+    """
+    t, r = tick[0], data[0]
+    _expect(t, r)
+    update_contacts(t.contacts, contact, force, dt)
+    if force.shape[0] > 0:
+        feel_friction(tick, data, qp, force, dt)
+    for foot in range(2):
+        t.feet.swing_time[foot] += dt
+    if not read_state(t.sensed, t.feet, r, t.mode):
+        return DIVERGED
+    if fired_edge(tick) >= 0:
+        return EVENTFUL
+    speed, reference = t.sensed.state[2], references[0].com[2]
+    return EVENTFUL if plan_is_due(t.path, t.mode, speed, reference, t.time) else QUIET
+
+
+@compiled
+def _expect(t: Any, r: Any) -> None:
+    """Whether each foot is to touch the ground now, or is due to land.
+
+    An overdue foot is no longer due: where it meets the ground then, nothing has foretold.
+    """
+    c, mode = t.contacts, t.mode
+    c.expected[0] = c.expected[1] = IN_AIR
+    for leg in range(mode.stances):
+        c.expected[t.feet.roles[leg]] = ON_GROUND
+    if mode.next_touchdown_leg >= 0 and not t.path.without_touchdown:
+        foot = t.feet.roles[mode.next_touchdown_leg]
+        due = t.path.event_times[_TOUCHDOWN] - t.path.time
+        if due <= t.early and r.foot_velocity[foot, UP] >= -t.sinking:
+            c.expected[foot] = DUE
+
+
+@compiled
+def feel_friction(tick: Any, data: Any, qp: Any, force: Array, dt: float) -> None:
+    """Let the cones be as narrow as the friction that sliding feet have felt.
+
+    Args:
+        tick, data, qp: see the module.
+        force, dt: as for :func:`.feel_slides`.
+    """
+    t = tick[0]
+    if feel_slides(t.slides, t.contacts.standing, force, data[0].foot_velocity, dt):
+        qp[0].friction = t.friction_margin * t.slides.coefficient
+
+
+@compiled
+def feel_in_space(tick: Any, data: Any, qp: Any, force: Array, axes: Array, dt: float) -> None:
+    """As :func:`feel_friction`, of forces in the world.
+
+    Args:
+        tick, data, qp, dt: as there.
+        force: (2, 3) the ground's force on each foot in the world's axes [N].
+        axes: (3, 3) of a floating-base robot.
+    """
+    feel_friction(tick, data, qp, np.dot(force, axes), dt)
+
+
+@compiled
+def fired_edge(tick: Any) -> int:
+    """As :func:`.first_fired`, of a ``tick``."""
+    t = tick[0]
+    return first_fired(t.guards, t.mode, t.path, t.sensed, t.feet, t.contacts)
+
+
+@compiled
+def advance(
+    tick: Any,
+    robot: tuple[Any, ...],
+    references: Any,
+    qp: Any,
+    curve: tuple[Array, Array, Array],
+    lateral: tuple[Any, ...] | None,
+    rest: tuple[Any, ...],
+) -> None:
+    """Move the references on, write the tasks' rows and the stance.
+
+    Args:
+        tick, references, qp: see the module.
+        robot: its ``data`` and its ``arrays``.
+        curve: of the path.
+        lateral: the arrays that :func:`.lateral_foothold` reads; None: in the plane.
+        rest: ``program`` and ``table`` of the phase's tasks, and the control period [s].
+    """
+    t, want, (data, arrays), (program, table, dt) = tick[0], references[0], robot, rest
+    r, mode, s = data[0], t.mode, t.sensed
+    move_clock(t.path, curve, s, mode, want, (r.com_velocity[0], dt))
+    move_swings(t, r, want, dt)
+    if lateral is not None:
+        _swing_sideways(t, r, want, lateral, dt)
+    for k in range(4):
+        want.com_now[k] = s.state[k]
+    want.com_now[0] -= s.toes[0]
+    want.com_push = t.trim if mode.trim_momentum else 0.0
+    want.pitch = advance_lean(t.lean, r.attitude[1] - t.tilt, dt) + t.tilt
+    for leg in range(2):
+        want.feet[leg] = t.feet.roles[leg]
+    write_rows(program, data, arrays, references, table)
+    if mode.estimate_load:
+        observe_load(t.load, want.lift, dt)
+    predict_velocity(s, want.com[4:], dt)
+    t.time += dt
+    _stand(t, r, qp[0], arrays[4].shape[1])
+
+
+@compiled
+def act(
+    tick: Any,
+    robot: tuple[Any, ...],
+    references: Any,
+    qp: Any,
+    curve: tuple[Array, Array, Array],
+    lateral: tuple[Any, ...] | None,
+    rest: tuple[Any, ...],
+) -> int:
+    """As :func:`advance`; then solve the QP.
+
+    Args:
+        tick, robot, references, qp, curve, lateral: as there.
+        rest: as there, and ``room`` of :func:`.solve_free`.
+
+    Returns:
+        As :func:`.solve_free`.
+    """
+    program, table, dt, room = rest
+    advance(tick, robot, references, qp, curve, lateral, (program, table, dt))
+    return solve_free(qp, robot[0], robot[1], table, room)
+
+
+@compiled
+def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
+    """Move the references of the feet in the air towards their footholds.
+
+    Args:
+        t, r, want: of ``TICK``, ``ROBOT_DATA`` and ``REFERENCES``.
+        dt: control period [s].
+    """
+    f, mode, path = t.feet, t.mode, t.path
+    overdue = -1  # the foot that should have found the ground by now
+    if mode.next_touchdown_leg >= 0 and path.without_touchdown:
+        overdue = f.roles[mode.next_touchdown_leg]
+    for i in range(mode.swings):
+        foot = f.roles[mode.swing_leg[i]]
+        x, y = want.foot[foot, 0], want.foot[foot, 1]
+        foothold, due = path.landing_x[foot], path.landing_time[foot] - path.time
+        if t.contacts.wall[foot] > 0.0:
+            # The path goes on as if an overdue foot had time; it has none to go up again.
+            aim = (foothold, 0.0 if foot == overdue else due)
+            meet_wall(f, foot, x, y, r.foot_position[foot], aim, dt)
+        elif foot == overdue:
+            drop(f, foot, x, y, dt)
+        else:
+            if not np.isfinite(foothold):
+                # The template cannot complete the stride; the gait's own foothold is the best
+                # guess.
+                foothold = t.sensed.toes[_REAR] + path.step_length
+                due = path.step_duration - f.swing_time[foot]
+            if mode.rolling_contact:
+                foothold = rolled(foothold, path.touchdown_angle, r.foot_radius)
+            swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), dt)
+        hip = (r.hips[0], r.hips[UP])
+        want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], r.leg_length)
+
+
+@compiled
+def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: float) -> None:
+    """As :func:`move_swings`, to the left and right."""
+    f, mode, path, lateral = t.feet, t.mode, t.path, t.lateral
+    com, feet = np.empty(2), np.empty(2)
+    com[0], com[1] = r.com[_SIDE], r.com_velocity[_SIDE]
+    if mode.momentum_speed:
+        com[1] = r.com_velocity[_SIDE] - r.momentum[0] / (r.mass * t.sensed.state[1])
+    for i in range(mode.swings):
+        foot = f.roles[mode.swing_leg[i]]
+        for k in range(2):
+            feet[k] = r.foot_position[lateral.feet[k], _SIDE]
+        due = path.landing_time[foot] - path.time
+        target, side = lateral_foothold(lateral, arrays, path.time, com, feet), want.side[foot]
+        # Without a touchdown on the path there is no time in which to get there.
+        if not f.horizon[foot] < due < np.inf or not np.isfinite(target):
+            side[1] = side[2] = 0.0
+        else:
+            quintic_step(side, target, 0.0, max(due - f.early[foot], f.horizon[foot]), dt)
+
+
+@compiled
+def _stand(t: Any, r: Any, qp: Any, directions: int) -> None:
+    """Write the feet on the ground, the template's forces on them, and how far they unload."""
+    mode, forces = t.mode, t.path.forces
+    qp.feet = mode.stances
+    for leg in range(mode.stances):
+        foot = t.feet.roles[leg]
+        qp.foot[leg], qp.cap[leg] = foot, np.inf
+        if mode.unloads[leg]:
+            qp.cap[leg] = unload_cap(forces[leg, 1], r.mass * r.gravity)
+        qp.force[leg, 0], qp.force[leg, directions - 1] = forces[leg, 0], forces[leg, 1]
+        if directions > UP:
+            # In space a leg's force points at the CoM sideways too.
+            away = r.com[_SIDE] - r.foot_position[foot, _SIDE]
+            up = r.com[UP] - r.foot_position[foot, UP]
+            qp.force[leg, _SIDE] = forces[leg, 1] * away / up
