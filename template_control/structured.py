@@ -8,9 +8,7 @@ from typing import Any
 class Number:
     """A number of an object's structured array ``data``, as an attribute of the object.
 
-    Args:
-        field: of the array's one element.
-        axis: of the field; None where it is one number.
+    ``field`` is of the array's one element; ``axis`` is of the field, None where it is one number.
     """
 
     def __init__(self, field: str, axis: int | None = None) -> None:

@@ -32,11 +32,7 @@ class Table(table.Table):
     """A table that folds a word rather than leave its end out, however narrow the terminal is."""
 
     def add_column(self, *arguments: Any, **options: Any) -> None:
-        """As rich's.
-
-        Args:
-            arguments, options: see :meth:`rich.table.Table.add_column`.
-        """
+        """As :meth:`rich.table.Table.add_column`."""
         super().add_column(*arguments, **{"overflow": "fold", **options})
 
 

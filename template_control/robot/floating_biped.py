@@ -95,12 +95,7 @@ class SpaceTerms(NamedTuple):
 
     @classmethod
     def of(cls, data: Any, j: Jacobians) -> SpaceTerms:
-        """Views of a robot's terms.
-
-        Args:
-            data: (1,) of ``ROBOT_DATA``.
-            j: its Jacobians.
-        """
+        """Views of a robot's terms, in ``data`` (1,) of ``ROBOT_DATA`` and in its Jacobians."""
         now = {name: data[name][0] for name in data.dtype.names}
         return cls(
             com=now["com"],

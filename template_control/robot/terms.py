@@ -85,13 +85,7 @@ class Jacobians(NamedTuple):
 
     @classmethod
     def zeros(cls, data: Any, directions: int, base_dof: int) -> Jacobians:
-        """All zero but for what Pinocchio writes.
-
-        Args:
-            data: Pinocchio's.
-            directions: of a contact.
-            base_dof: unactuated degrees of freedom.
-        """
+        """All zero but for what Pinocchio writes; ``directions`` are those of a contact."""
         nv, axes = len(data.nle), 3 if directions > UP else 1
         shapes = ((directions, nv), (axes, nv), (2, directions, nv), (axes // 3 * 3, nv))
         found = [np.zeros(shape) for shape in (*shapes, (2, nv - base_dof))]
@@ -103,14 +97,10 @@ Sources = tuple[Array, ...]
 
 
 def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array) -> Sources:
-    """Views of what :func:`gather_planar` reads.
+    """Views that :func:`gather_planar` reads in Pinocchio's data, which every update writes.
 
-    Args:
-        model: the robot's.
-        data: written by Pinocchio at every update.
-        frames: of the two feet.
-        limits: (4, nu) of the joints: largest speeds [rad/s], lower and upper stops [rad], damping
-            [N m s/rad].
+    ``frames`` are the feet's; ``limits`` (4, nu) the joints' largest speeds [rad/s], lower and
+    upper stops [rad], damping [N m s/rad].
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.g)
     feet = tuple(data.oMf[frame].translation for frame in frames)
@@ -119,17 +109,11 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array)
 
 @compiled
 def joint_reserve(q: Array, speeds: Array, limits: Array) -> tuple[float, float]:
-    """The fastest joint, and the one that is soonest at a stop.
+    """Largest share of its limit that a joint's speed has, and the soonest arrival at a stop [s].
 
-    Args:
-        q: (nq,) configuration; its last nu entries are the joints' angles [rad].
-        speeds: (nu,) of the joints [rad/s].
-        limits: (3 or more, nu) of these speeds [rad/s], and the joints' lower and upper stops
-            [rad].
-
-    Returns:
-        The largest share of its limit that a speed has. The shortest time in which a joint would
-        come to its stop at its speed [s]: 0 of one that is there, inf where none moves.
+    The latter is 0 of a joint that is at its stop, inf where none moves. ``q`` ends in the nu
+    angles; ``speeds`` (nu,) [rad/s]; ``limits`` (3 or more, nu) of these speeds, and lower and
+    upper stops [rad].
     """
     fastest, soonest = 0.0, np.inf
     first = q.shape[0] - speeds.shape[0]
@@ -168,19 +152,16 @@ def _gather_joints(
 def gather_planar(
     views: Sources, q: Array, v: Array, drift: tuple[Array, Array], data: Any, out: tuple[Any, ...]
 ) -> bool:
-    """Write the planar terms at the state that Pinocchio has last computed.
+    """Write the planar terms at the state that Pinocchio has last computed; True if it is finite.
 
     Args:
         views: from :func:`sources`.
         q, v: (nv,) the state.
-        drift: of each foot's frame the (6,) classical acceleration dJ/dt v, linear then angular,
-            in the world's axes [m/s^2, rad/s^2].
+        drift: of each foot's frame the (6,) classical acceleration dJ/dt v, linear then angular, in
+            the world's axes [m/s^2, rad/s^2].
         data: (1,) of ``ROBOT_DATA``, overwritten.
         out: of :class:`Jacobians`, as a plain tuple: ``nonlinear_effects``, ``com``, ``momentum``,
             ``contact`` and ``joints``, overwritten.
-
-    Returns:
-        Whether the state is finite.
     """
     centre, speed, pull, momentum, weight, left, right = views[:7]
     com_jacobian, centroidal, jacobian, carries, limits = views[7:]
@@ -250,17 +231,9 @@ def gather_floating(
 ) -> bool:
     """Write the terms at the state that Pinocchio has last computed, in the heading frame.
 
-    Args:
-        views: from :func:`sources`.
-        q: (nq,) the configuration.
-        v: (nv,) the velocity.
-        drift, data: as for :func:`gather_planar`.
-        out: as there, with ``turning`` before the last.
-        base: (5,) of the heading frame: x and y of its origin in the world [m], cosine and sine of
-            the heading; y of the trunk's hips from its origin [m]. :class:`Trunk` as a plain tuple.
-
-    Returns:
-        Whether the state is finite.
+    As :func:`gather_planar`, with q (nq,), v (nv,), and ``turning`` before the last of ``out``.
+    ``base`` (5,) is :class:`Trunk` as a plain tuple, of the heading frame: x and y of its origin in
+    the world [m], cosine and sine of the heading, y of the trunk's hips from its origin [m].
     """
     centre, speed, _, momentum, weight, left, right = views[:7]
     jcom_world, centroidal, jacobian, carries, limits = views[7:]

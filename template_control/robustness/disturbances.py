@@ -54,7 +54,7 @@ def footholds(
 
     Returns:
         (n,) x of the footholds [m], the last step's last; the gait's own if the robot falls, as it
-            will then fall with the disturbance as well.
+        will then fall with the disturbance as well.
     """
     record = simulate(replace(where, steps=steps, start=start))
     if record.fell:

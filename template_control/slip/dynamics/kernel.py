@@ -143,7 +143,7 @@ def run_stride(
 
     Returns:
         Outcome, last node (the one entered, where the section was reached), number of segments,
-            number of events, duration [s].
+        number of events, duration [s].
     """
     tables, model, node = kernel.tables, model_of(kernel), kernel.node
     gravity, rest_length, max_time = model.gravity, model.rest_length, model.max_time
