@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, Field, fields, is_dataclass, replace
+from dataclasses import MISSING, fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
 from types import NoneType, UnionType
@@ -21,6 +21,7 @@ from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origi
 import numpy as np
 import tomli_w
 
+from template_control.checks.checked import is_default
 from template_control.errors import ParameterError, TemplateControlError
 
 T = TypeVar("T")
@@ -157,7 +158,7 @@ def _deeper(hint: Any, current: Any, entries: _Entries, where: str) -> Any:
     if wanted not in kinds:
         raise ParameterError(f"{where}.{_KIND} is {wanted!r}: give one of {', '.join(kinds)}")
     made = kinds[wanted]
-    own = {f.name for f in fields(current) if not _is_default(f, getattr(current, f.name))}
+    own = {f.name for f in fields(current) if not is_default(f, getattr(current, f.name))}
     shared = own & {f.name for f in fields(made)}
     hints = get_type_hints(made)
     values = {name: getattr(current, name) for name in shared} | {
@@ -312,7 +313,7 @@ def to_table(options: Any, where: str = "") -> dict[str, Any]:
                 raise ParameterError(f"{place} is {type(value).__name__}, which TOML cannot say")
             table[f.name] = _toml_value(value, place)
         except ParameterError:
-            if not _is_default(f, value):
+            if not is_default(f, value):
                 raise
     return table
 
@@ -322,12 +323,6 @@ def _fits(hint: Any, value: Any) -> bool:
     if not is_dataclass(value) or isinstance(value, type):
         return True
     return type(value) in (get_args(hint) if _is_union(hint) else (hint,))
-
-
-def _is_default(f: Field[Any], value: Any) -> bool:
-    if f.default_factory is not MISSING:
-        return bool(f.default_factory() == value)
-    return f.default is not MISSING and bool(f.default == value)
 
 
 def _toml_value(value: Any, where: str) -> Any:

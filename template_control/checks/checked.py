@@ -17,10 +17,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import MISSING, Field, fields
 from functools import cache, wraps
 from itertools import chain, repeat
 from types import SimpleNamespace
 from typing import Any, ClassVar, ParamSpec, TypeVar, get_type_hints
+
+import numpy as np
 
 from template_control.checks.fitting import Refused, check, fitter
 from template_control.errors import ParameterError, TemplateControlError
@@ -34,10 +37,17 @@ _POSITIONAL = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_O
 class Checked:
     """Base of frozen dataclasses whose fields are checked when one is made.
 
-    A subclass with a ``__post_init__`` of its own calls this one first.
+    A subclass with a ``__post_init__`` of its own calls this one first. Instances are equal if
+    their fields are, arrays too; their ``repr`` has the fields that are not as by default.
     """
 
     _error: ClassVar[type[TemplateControlError]] = ParameterError
+
+    def __init_subclass__(cls) -> None:
+        """Give the class these two before ``dataclass`` does, which keeps what a class has."""
+        for name, method in (("__repr__", _brief), ("__eq__", _equal)):
+            if name not in vars(cls):
+                setattr(cls, name, method)
 
     def __post_init__(self) -> None:
         kind: Any = type(self)
@@ -50,6 +60,39 @@ class Checked:
                 raise
             if found is not value:
                 object.__setattr__(self, name, found)
+
+
+def _brief(options: Any) -> str:
+    shown = [
+        f"{f.name}={getattr(options, f.name)!r}"
+        for f in fields(options)
+        if f.repr and not is_default(f, getattr(options, f.name))
+    ]
+    return f"{type(options).__qualname__}({', '.join(shown)})"
+
+
+def _equal(options: Any, other: Any) -> Any:
+    if type(options) is not type(other):
+        return NotImplemented
+    return all(_same(getattr(options, f.name), getattr(other, f.name)) for f in fields(options))
+
+
+def _same(value: Any, other: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return np.array_equal(value, other)
+    return value is other or bool(value == other)
+
+
+def is_default(f: Field[Any], value: Any) -> bool:
+    """Whether a field has its default value.
+
+    Args:
+        f: of a dataclass.
+        value: of an instance.
+    """
+    if f.default_factory is not MISSING:
+        return _same(value, f.default_factory())
+    return f.default is not MISSING and _same(value, f.default)
 
 
 @cache

@@ -1,5 +1,6 @@
 """What a user gives is checked when it is given: types, ranges and shapes."""
 
+import pydoc
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Annotated, Any, Literal
 
@@ -18,8 +19,11 @@ from template_control.checks.ranges import (
     Range,
     Shape,
 )
+from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.planners.transition import TransitionOptions
 from template_control.errors import ParameterError, RobotError, ScenarioError, SweepError
+from template_control.robot.start import Pose
+from template_control.slip.automaton.automaton import AUTOMATON
 
 
 @dataclass(frozen=True)
@@ -185,3 +189,37 @@ def test_nothing_that_cannot_be_written_down_loses_a_run(robot, default_gait):
         tc.Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=1, controller=options)
     )
     assert record.options["embedding"]["swing"]["clearance"] == 0.05
+
+
+def test_a_repr_has_what_is_not_as_by_default():
+    options = tc.EmbeddingOptions(friction=0.5, tasks={"com": {"gains": (80.0, 18.0)}})
+    assert repr(tc.EmbeddingOptions()) == "EmbeddingOptions()"
+    assert repr(options) == "EmbeddingOptions(friction=0.5, tasks={'com': {'gains': (80.0, 18.0)}})"
+    assert repr(tc.Push(5.0, 2)) == "Push(impulse=5.0, step=2)"
+    assert repr(tc.Experiment()) == "Experiment()"
+
+
+def test_options_with_arrays_can_be_compared():
+    def pose(height):
+        return Pose([0.0, height], [1.0, 0.0], np.zeros((2, 2)), np.zeros((2, 2)))
+
+    assert pose(0.9) == pose(0.9)
+    assert pose(0.9) != pose(0.8)
+    assert tc.Experiment(pose=pose(0.9)) == tc.Experiment(pose=pose(0.9))
+    assert pose(0.9) != 0.9
+
+
+@pytest.mark.parametrize("thing", [tc.simulate, tc.load_record, tc.Recorder.tick])
+def test_help_fits_a_screen(thing):
+    text = pydoc.plain(pydoc.render_doc(thing))
+    assert len(text.splitlines()) <= 40
+    assert max(map(len, text.splitlines())) <= 110
+
+
+@pytest.mark.parametrize(
+    "thing",
+    [tc.EmbeddingOptions(), FreeOptions(), tc.Experiment().resolved(), AUTOMATON],
+    ids=lambda thing: type(thing).__name__,
+)
+def test_a_repr_fits_a_few_lines(thing):
+    assert len(repr(thing)) <= 240

@@ -154,6 +154,9 @@ class Automaton:
         object.__setattr__(self, "starts", dict(self.starts))
         _check(self)
 
+    def __repr__(self) -> str:
+        return f"Automaton({len(self.nodes)} nodes, strides {', '.join(map(str, self.starts))})"
+
     @cached_property
     def index(self) -> dict[str, int]:
         """Node name to position in :attr:`nodes`."""
