@@ -1,11 +1,15 @@
 """Every option of the command line is a key of an experiment's file, and every key an option."""
 
 import json
+from contextlib import suppress
 from enum import Enum
 from types import NoneType
 from typing import Literal, get_args, get_origin
 
 import pytest
+from hypothesis import given
+from hypothesis import settings as settings_of_hypothesis
+from hypothesis import strategies as st
 
 import template_control as tc
 from template_control import settings
@@ -18,6 +22,9 @@ from template_control.robot.spec import RobotSpec
 from template_control.run.specs import GaitSpec, OwnPlanner
 
 COMMANDS = ("walk", "run", "go", "robustness", "campaign")
+WITHOUT_EXPERIMENT = {
+    "robots", "replay", "plots", "slip", "gaits", "automaton", "keys", "warm-up", "reproduce",
+}  # fmt: skip
 KEPT_ELSEWHERE = {
     "help", "config", "output", "json", "no_figures", "keys", "scenario",
     "disturbance", "quick", "workers", "markdown", "trials", "mix", "severity", "draws",
@@ -31,6 +38,11 @@ def options_of(command):
     parser = build_parser([command])
     (commands,) = (a for a in parser._actions if a.dest == "command")
     return commands.choices[command]._actions
+
+
+def test_every_command_that_runs_a_robot_is_looked_at():
+    (commands,) = (a for a in build_parser([])._actions if a.dest == "command")
+    assert set(commands.choices) == {*COMMANDS, *WITHOUT_EXPERIMENT}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -172,19 +184,22 @@ OTHERWISE = {
     "controller.lean.strides": {"r": {"speeds": [0.3], "pitches": [0.1]}},
     "world.robot.model": "human", "world.robot.locked": {"a": 0.1}, "world.robot.feet": ["a", "b"],
 }  # fmt: skip
+POSE = {
+    "pose.com": [0.0, 0.97], "pose.com_velocity": [1.0, 0.0],
+    "pose.feet": [[0.0, 0.0], [0.1, 0.1]], "pose.feet_velocity": [[0.0, 0.0], [2.0, 0.0]],
+}  # fmt: skip
 NEEDS_MORE = ("world.ground_step.", "world.terrain.friction", "planner.path")
 """Keys of tables that have other keys which must be given with them."""
 
 
 @pytest.mark.parametrize("path", LEAVES)
 def test_every_key_is_an_option_that_its_file_holds(path, understood, tmp_path):
-    if path.startswith("pose."):
-        pytest.skip("a pose has keys that must be given together")
     leaf, last = LEAVES[path], None
-    value = OTHERWISE.get(path) or another(leaf.hint, leaf.default)
+    value = OTHERWISE.get(path) or POSE.get(path) or another(leaf.hint, leaf.default)
+    needed = POSE if path.startswith("pose.") else {}
     for base in base_for(path) if "." in path else [tc.Experiment()]:
         try:
-            experiment = base.with_({path: value})
+            experiment = base.with_({**needed, path: value})
         except tc.TemplateControlError as error:
             last = str(error)
             continue
@@ -199,8 +214,38 @@ def test_every_key_is_an_option_that_its_file_holds(path, understood, tmp_path):
     assert table == pytest.approx(value) if isinstance(value, float) else table is not None
     if "." not in path:
         return
-    line = understood(f"template-control walk --{path} '{settings.literal(value)}'")
+    words = (f"--{key} '{settings.literal(x)}'" for key, x in {**needed, path: value}.items())
+    line = understood(f"template-control walk {' '.join(words)}")
     assert experiment_from(line, base).resolved() == experiment.resolved()
+
+
+SIMPLE = sorted(
+    path
+    for path, leaf in LEAVES.items()
+    if leaf.hint in (bool, float, int)
+    and path.startswith(("controller.", "planner.", "falls.", "record_every", "strict"))
+    and path not in OTHERWISE
+)
+"""Keys that any default experiment has or another kind of its tables, with a default."""
+
+
+@given(st.sets(st.sampled_from(SIMPLE), max_size=8), st.sampled_from(["five-link", "bolt"]))
+@settings_of_hypothesis(max_examples=40, deadline=None, derandomize=True)
+def test_any_keys_together_are_options_that_their_file_holds(tmp_path_factory, paths, model):
+    base = tc.Experiment(model)
+    keys = {path: another(LEAVES[path].hint, LEAVES[path].default) for path in sorted(paths)}
+    kept = {}
+    for path, value in keys.items():  # of the kinds of table that this experiment has
+        with suppress(tc.TemplateControlError):
+            base.with_({**kept, path: value})
+            kept[path] = value
+    words = [f"--{p}={settings.literal(v)}" for p, v in kept.items() if "." in p]
+    words += [f"--{p.replace('_', '-')}" for p in kept if p == "strict"]
+    words += [f"--record-every={v}" for p, v in kept.items() if p == "record_every"]
+    options = build_parser(["walk"]).parse_args(["walk", "--robot", model, *words])
+    experiment = experiment_from(options, tc.Experiment())
+    assert experiment.resolved() == base.with_(kept).resolved()
+    written_and_read(experiment, tmp_path_factory.mktemp("keys"))
 
 
 def test_a_key_of_a_text_needs_no_quotes(understood):

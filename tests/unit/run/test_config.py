@@ -2,6 +2,7 @@
 
 import math
 import re
+import shlex
 import shutil
 import sys
 import tomllib
@@ -9,7 +10,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from places import DOCS
+from places import DOCS, EXAMPLES
 
 import template_control as tc
 from template_control import settings
@@ -17,19 +18,19 @@ from template_control.cli.experiment_options import experiment_from
 from template_control.cli.main import main
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment
-from template_control.run.record import Record
 from template_control.run.specs import GaitSpec, OwnPlanner
 from template_control.slip import Slot
 
 
-def walk(folder, *arguments):
-    """Exit status and record of a walk without figures."""
-    status = main(["walk", *arguments, "--no-figures", "--output", str(folder)])
-    return status, Record.load(folder / "run.npz")
+def walk(folder, *arguments, command="walk"):
+    """Exit status and record of a run without figures."""
+    status = main([command, *arguments, "--no-figures", "--output", str(folder)])
+    return status, tc.load_record(folder / "run.npz")
 
 
 def assert_same_run(one, other):
-    for f in fields(Record):
+    assert type(one) is type(other)
+    for f in fields(one):
         if f.name == "metadata" or f.name.endswith("_seconds"):
             continue
         np.testing.assert_array_equal(getattr(one, f.name), getattr(other, f.name), err_msg=f.name)
@@ -40,20 +41,31 @@ DISTURBED = (
     "--speed 1.2 --friction 0.6 --mass-scale 1.05 --torque-scale 0.9 --push -8@1:0.3 --push 5@0"
     " --noise 0.0005 --delay 0.002 --seed 3 --steps 2 --record-every 2"
 )
+KINDS_OF_RUN = {
+    "disturbed": f"walk {DISTURBED}",
+    "paper's planner": "walk --plant ideal --planner modified --map improved"
+    " --touchdown-angle 66.5 --steps 1",
+    "other robot": "walk --robot bolt --steps 1",
+    "ahead": "walk --plant ideal --planner ahead --steps 1",
+    "run": "run --robot runner --speed 2.5 --steps 1",
+    "go": f"go {EXAMPLES / 'walk_run_walk.toml'} --robot runner --steps 2",
+    "stand": f"walk --scenario {EXAMPLES / 'zero_five_zero.toml'} --steps 2",
+    "floating base": "walk --robot bolt --floating-base --turn 0.2 --step-width 0.1 --steps 1",
+    "estimate": "walk --estimate --seed 3 --contact-errors 0.001 --steps 1",
+    "mujoco": "walk --plant mujoco --terrain slope:angle=2 --steps 1",
+    "payload on another planet": "walk --plant-mass trunk=60 --gravity 5 --steps 1",
+    "task by name": "walk --controller.tasks '{com = {gains = [80.0, 18.0]}}' --steps 1",
+}
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        DISTURBED,
-        "--plant ideal --planner modified --map improved --touchdown-angle 66.5 --steps 1",
-        "--robot bolt --steps 1",
-    ],
-)
-def test_a_run_writes_what_repeats_it_bit_by_bit(line, tmp_path):
-    status, first = walk(tmp_path / "first", *line.split())
-    again, second = walk(tmp_path / "second", "--config", str(tmp_path / "first" / "run.toml"))
+@pytest.mark.parametrize("kind", KINDS_OF_RUN)
+def test_a_run_of_any_kind_writes_what_repeats_it_bit_by_bit(kind, tmp_path):
+    command, *words = shlex.split(KINDS_OF_RUN[kind])
+    status, first = walk(tmp_path / "first", *words, command=command)
+    file = str(tmp_path / "first" / "run.toml")
+    again, second = walk(tmp_path / "second", "--config", file, command=command)
     assert status == again == 0
+    assert first.steps >= 1
     assert_same_run(first, second)
     texts = [(tmp_path / name / "run.toml").read_text() for name in ("first", "second")]
     assert texts[0] == texts[1]
