@@ -26,7 +26,7 @@ from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_by_speed import walking_gait
-from template_control.slip.maps.section import APEX
+from template_control.slip.maps.section import APEX, REST
 from template_control.slip.scenario.route import Route, SpeedRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
@@ -62,12 +62,16 @@ def first_speed(route: Route) -> float:
 
 
 def _standing(route: Route) -> Planners:
-    """The planners of a scenario that stands; others need none."""
-    if not (isinstance(route, ScenarioRoute) and route.scenario.stands):
+    """The planners of a scenario that stands, or a route that begins so; others need none."""
+    p, family = route.parameters, None
+    if isinstance(route, ScenarioRoute) and route.scenario.stands:
+        height = route.scenario.stand_height
+        family = gaits_by_speed(p) if route.pushes_off else None
+    elif route.section == REST:
+        height = float(route.start[1])
+    else:
         return {}
-    p = route.parameters
-    relative = route.scenario.stand_height / p.rest_length * REFERENCE.rest_length
-    family = gaits_by_speed(p) if route.pushes_off else None
+    relative = height / p.rest_length * REFERENCE.rest_length
     return standing_planners(p, StandingOptions(height=relative), family)
 
 
@@ -75,7 +79,8 @@ def _standing(route: Route) -> Planners:
 def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 
-    That is walking steps for a route that begins at VLO, and running ones for one at an apex. A
+    That is walking steps for a route that begins at VLO, running ones for one at an apex, and
+    standing for one that stands, and starts and stops where it is a scenario. A
     route whose walk has any speed is walked with the planner that looks several steps ahead.
 
     Args:
@@ -95,6 +100,8 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
         return {StrideKind.RUN: RunningPlanner(runs(speed))}
     scenario = route.scenario if isinstance(route, ScenarioRoute) else None
     standing = _standing(route)
+    if route.section == REST and scenario is None:
+        return standing
     if isinstance(route, SpeedRoute) or (isinstance(route, ScenarioRoute) and route.pushes_off):
         ahead = walking or AheadPlanner(p, speed=speed)
         return {ahead.gait.stride: ahead, **standing}

@@ -8,6 +8,7 @@ import pytest
 import template_control as tc
 from template_control.embedding.com_path import derivatives, quintics
 from template_control.embedding.leg_forces import leg_forces
+from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
 from template_control.embedding.standing.passes import GaitsBySpeed, PassTable
@@ -16,6 +17,7 @@ from template_control.errors import ParameterError, ScenarioError
 from template_control.run.options import Push
 from template_control.slip import Event, Slot, walking_gait
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.walking_by_speed import speed_range
 from template_control.slip.maps.section import REST, VLO
 from template_control.slip.scenario.route import SteadyRoute
@@ -352,3 +354,13 @@ def test_the_robot_stands_walks_and_stands(spacing, speed):
     assert np.ptp(record.com[last], axis=0).max() < 1e-3
     assert np.abs(record.com_velocity[last]).max() < 2e-3
     assert 0.2 < np.ptp(record.foot[-1, :, 0]) < 0.3
+
+
+def test_a_route_that_stands_has_its_planners(robot):
+    p = tc.template_for(robot)
+    height = 0.96 * p.rest_length
+    route = SteadyRoute(p, StrideKind.STAND, (0.0, height, 0.0))
+    assert default_planners(route)[StrideKind.STAND].gait.state[1] == pytest.approx(height)
+    record = tc.simulate(tc.Experiment(robot, route, steps=1))
+    assert not record.fell
+    assert record.com[-1, 1] == pytest.approx(height, abs=2e-3)
