@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields, is_dataclass, replace
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
 from types import NoneType, UnionType
@@ -82,11 +82,20 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
             raise ParameterError(f"unknown key {place}: known are {', '.join(known)}")
         if name in values:
             raise ParameterError(f"{place} is given by two keys: give {name} only")
+        usual = _usual_kind(known[name])
+        if isinstance(value, dict) and usual is not None:
+            value = {_KIND: usual, **value}
         values[name] = _read(hints[name], value, place)
     for name, f in known.items():
         if name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise ParameterError(f"{where or 'the table'} has no {name}: give one")
     return _made(lambda: kind(**values), kind, where)
+
+
+def _usual_kind(f: Field[Any]) -> str | None:
+    """Kind of the table that is a field's default, such as the world's engine that is installed."""
+    default = f.default if f.default_factory is MISSING else f.default_factory()
+    return getattr(default, _KIND, None) if is_dataclass(default) else None
 
 
 def _made(make: Callable[[], T], kind: type, where: str) -> T:
@@ -261,9 +270,8 @@ def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
         tables = [h for h in union if is_dataclass(h) and _said(h)]
         if tables:
             if kinds := _kinds(tables):
-                found.setdefault(
-                    f"{place}.{_KIND}", Leaf(f"{place}.{_KIND}", str, next(iter(kinds)))
-                )
+                usual = _usual_kind(f) or next(iter(kinds))
+                found.setdefault(f"{place}.{_KIND}", Leaf(f"{place}.{_KIND}", str, usual))
             for table in tables:
                 for leaf in leaves(table, place):
                     found.setdefault(leaf.path, leaf)

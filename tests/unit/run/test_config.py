@@ -16,6 +16,8 @@ import template_control as tc
 from template_control import settings
 from template_control.cli.experiment_options import experiment_from
 from template_control.cli.main import main
+from template_control.plant import plant
+from template_control.plant.plant import default_plant
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment
 from template_control.run.specs import GaitSpec, OwnPlanner
@@ -281,3 +283,13 @@ def test_the_defaults_are_written_and_read():
         settings.from_table(Experiment, tomllib.loads(settings.text(settings.to_table(config))))
         == config
     )
+
+
+def test_a_world_without_kind_is_the_engine_that_is_installed(tmp_path, monkeypatch):
+    path = tmp_path / "world.toml"
+    path.write_text("[world]\nfriction = 0.5\n")
+    assert Experiment.load(path).world == replace(default_plant(), friction=0.5)
+    monkeypatch.setattr(plant, "find_spec", lambda name: None)
+    assert Experiment.load(path).world == tc.MujocoOptions(friction=0.5)
+    kinds = {leaf.path: leaf.default for leaf in settings.leaves(Experiment)}
+    assert kinds["world.kind"] == "mujoco"
