@@ -6,9 +6,7 @@ import argparse
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
-from template_control import view
 from template_control.checks import option_types as values
 from template_control.cli.experiment_options import add_flags, experiment_from
 from template_control.cli.flags import ALL, SCENARIO
@@ -22,7 +20,6 @@ from template_control.cli.report import (
 )
 from template_control.errors import ParameterError
 from template_control.run.experiment import Experiment, PreparedExperiment
-from template_control.run.record import Record
 from template_control.run.specs import GaitSpec
 from template_control.run.summary import summarise
 from template_control.slip.scenario.run import simulate_scenario
@@ -102,13 +99,7 @@ def _with_template(
         plain_console(stderr=True).print(NO_STANDS)
     with plain_console(stderr=True).status("the template"):
         template = simulate_scenario(route.scenario)
-
-    def more(record: Record, folder: Path) -> None:
-        template.save(folder / "template.npz")
-        if not options.no_figures:
-            view.save_route_figures(record, template, folder)
-
-    kept = run_and_keep(options, experiment, prepared, doing, more)
+    kept = run_and_keep(options, experiment, prepared, doing, template)
     figures = summarise_route(kept.record, template, kept.path)
     if options.json:
         print(json.dumps(figures))

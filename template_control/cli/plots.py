@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from template_control import view
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
-from template_control.errors import ParameterError
-from template_control.run.record import load_record
+from template_control.run.record import Record, load_record
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import writing
-from template_control.view.figures import FIGURES, FORMATS, FREE_FIGURES, figures_of
+from template_control.view.figures import FIGURES, FORMATS, FREE_FIGURES
 from template_control.view.scenario_figures import ROUTE_FIGURES
 from template_control.view.style import DPI, Look
 
+TEMPLATE = "template.npz"
+"""File of the template's run that goes with a robot's run through a scenario."""
+
 _DOTS = Range(20, 1200)
+_KNOWN = tuple(dict.fromkeys((*FIGURES, *FREE_FIGURES, *ROUTE_FIGURES)))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Draw a run: stick diagram, centre of mass, torques, ground forces, phase portrait,"
         " tracking errors, energies, VLO states; of a scenario that `go` has made, also the robot"
-        " beside its template. Works on fallen and interrupted runs too."
+        " and its template. Works on fallen and interrupted runs too."
         " Exit status: 0, 2 for bad input."
     )
     parser.add_argument("run_file", type=values.path, metavar="RUN", help="run.npz of a walk")
@@ -33,43 +37,71 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder for the figures; by default the run's",
     )
-    known = ", ".join(dict.fromkeys((*FIGURES, *FREE_FIGURES, *ROUTE_FIGURES)))
-    parser.add_argument("--figures", metavar="NAMES", help=f"some of {known}; by default all")
-    parser.add_argument("--format", choices=FORMATS, default="png", help="by default png")
-    parser.add_argument("--dpi", type=values.whole(_DOTS), default=DPI, help=f"by default {DPI}")
+    add_figure_options(parser)
+
+
+def add_figure_options(parser: argparse.ArgumentParser) -> None:
+    """Add what a command that draws a run's figures takes."""
+    group = parser.add_argument_group("figures")
+    group.add_argument(
+        "--figures",
+        type=_names,
+        metavar="NAMES",
+        help=f"some of {', '.join(_KNOWN)}; by default all that the run has",
+    )
+    group.add_argument("--format", choices=FORMATS, default="png", help="by default png")
+    group.add_argument("--dpi", type=values.whole(_DOTS), default=DPI, help=f"by default {DPI}")
     for name, what in (("start", "from here"), ("end", "up to here")):
-        parser.add_argument(
+        group.add_argument(
             f"--{name}",
             type=values.number(Range()),
             metavar="S",
             help=f"show {what} [s]; negative values count from the run's end. By default each"
             " figure shows what the run is about",
         )
-    parser.add_argument("--no-title", action="store_true", help="no title inside, for a paper")
+    group.add_argument("--no-title", action="store_true", help="no title inside, for a paper")
+
+
+def _names(text: str) -> list[str]:
+    """Names of figures, of which a run may have some only."""
+    names = text.split(",")
+    for name in names:
+        if name not in _KNOWN:
+            raise argparse.ArgumentTypeError(
+                f"is {name!r}: give a list, with commas, of {', '.join(_KNOWN)}"
+            )
+    return names
+
+
+def draw(
+    options: argparse.Namespace, record: Record, folder: Path, template: ScenarioRecord | None
+) -> list[Path]:
+    """Draw a run's figures as the options say; returns their files.
+
+    Args:
+        options: as parsed.
+        record: the run.
+        folder: for the files.
+        template: the same scenario on the robot's template, of a run that has one.
+    """
+    look = Look(options.start, options.end, not options.no_title)
+    drawn = {"dpi": options.dpi, "look": look, "file_format": options.format}
+    names = options.figures
+    of_route = [] if template is None else [n for n in ROUTE_FIGURES if names is None or n in names]
+    own = None if names is None else [name for name in names if name not in of_route]
+    paths = view.save_figures(record, folder, figures=own, **drawn)
+    if template is not None:
+        paths += view.save_route_figures(record, template, folder, figures=of_route, **drawn)
+    return paths
 
 
 def run(options: argparse.Namespace) -> int:
     """Draw and name the files."""
     record = load_record(options.run_file)
     folder = options.run_file.parent if options.output is None else options.output
-    look = Look(options.start, options.end, not options.no_title)
-    beside = options.run_file.parent / "template.npz"
-    of_route = ROUTE_FIGURES if beside.is_file() else ()
-    known = [*figures_of(record), *of_route]
-    names = known if options.figures is None else options.figures.split(",")
-    for name in names:
-        if name not in known:
-            raise ParameterError(
-                f"there is no figure {name!r} of this run: give some of {', '.join(known)}"
-            )
-    drawn = {"dpi": options.dpi, "look": look, "file_format": options.format}
+    file = options.run_file.parent / TEMPLATE
+    template = ScenarioRecord.load(file) if file.is_file() else None
     with writing(folder):
-        own = [name for name in names if name not in ROUTE_FIGURES]
-        paths = view.save_figures(record, folder, figures=own, **drawn)
-        if set(names) & set(of_route):
-            template = ScenarioRecord.load(beside)
-            made = view.save_route_figures(record, template, folder, **drawn)
-            paths += [path for path in made if path.stem in names]
-        for path in paths:
+        for path in draw(options, record, folder, template):
             print(path)
     return 0

@@ -14,21 +14,22 @@ from typing import Any, NoReturn
 
 from rich.console import Console
 
-from template_control import view
 from template_control.checks import option_types as values
 from template_control.cli.interrupts import stopped
+from template_control.cli.plots import TEMPLATE, add_figure_options, draw
 from template_control.errors import TemplateControlError
 from template_control.plant.c_library import stdout_to_stderr
 from template_control.run import failures
 from template_control.run.experiment import STEPS, Experiment, PreparedExperiment
 from template_control.run.record import Record, RunInterrupted, one_line, recorded
 from template_control.run.simulation import simulate
+from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
 from template_control.terminal import Table, bar, plain_console
 
 
 def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
-    """Add ``--output``, ``--json`` and ``--no-figures``.
+    """Add ``--output``, ``--json``, and which figures are drawn.
 
     Args:
         parser: of the command.
@@ -45,6 +46,7 @@ def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
         "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
     )
     parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+    add_figure_options(parser)
 
 
 @contextmanager
@@ -104,7 +106,7 @@ def run_and_keep(
     experiment: Experiment,
     prepared: PreparedExperiment,
     doing: str,
-    more: Callable[[Record, Path], Any] | None = None,
+    template: ScenarioRecord | None = None,
 ) -> Kept:
     """Do a run; write it, what repeats it, and its figures.
 
@@ -113,7 +115,7 @@ def run_and_keep(
         experiment: as it is written.
         prepared: the same, as it is run.
         doing: what the progress bar says.
-        more: writes further files of the record into the folder; not after Ctrl-C.
+        template: the same scenario on the robot's template, kept and drawn with the run.
 
     Raises:
         TemplateControlError: if a part of the user's own fails, or answers with nonsense; what was
@@ -137,11 +139,11 @@ def run_and_keep(
             _give_up(error, experiment, folder)
         path = files.write(lambda: record.save(folder / "run.npz"))
         files.write(lambda: experiment.save(folder / "run.toml"))
-        if not record.interrupted:
-            if not options.no_figures:
-                files.write(lambda: view.save_figures(record, folder))
-            if more is not None:
-                files.write(lambda: more(record, folder))
+        (folder / TEMPLATE).unlink(missing_ok=True)  # of the run that is replaced
+        if template is not None and not record.interrupted:
+            files.write(lambda: template.save(folder / TEMPLATE))
+        if not (options.no_figures or record.interrupted):
+            files.write(lambda: draw(options, record, folder, template))
     return Kept(record, None if path is None else str(path), files)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -291,6 +292,7 @@ def save_route_figures(
     template: ScenarioRecord,
     folder: str | Path,
     dpi: Count = DPI,
+    figures: Sequence[str] | None = None,
     look: Look | None = None,
     file_format: Format = "png",
 ) -> list[Path]:
@@ -301,6 +303,7 @@ def save_route_figures(
         template: the same scenario on the robot's template.
         folder: where the files go; it must exist.
         dpi: dots per inch of pictures made of dots.
+        figures: names; None: all. A run without transitions has no figure of them.
         look: part of the run, and whether the titles stand in the figures.
         file_format: of the files.
 
@@ -311,4 +314,5 @@ def save_route_figures(
         return [
             save_figure(figure, Path(folder) / f"{name}.{file_format}", dpi)
             for name, figure in route_figures(record, template, look or _LOOK).items()
+            if figures is None or name in figures
         ]

@@ -27,6 +27,7 @@ WITHOUT_EXPERIMENT = {
 }  # fmt: skip
 KEPT_ELSEWHERE = {
     "help", "config", "output", "json", "no_figures", "keys", "scenario",
+    "figures", "format", "dpi", "start", "end", "no_title",
     "disturbance", "quick", "workers", "markdown", "trials", "mix", "severity", "draws",
 }  # fmt: skip
 LEAVES = {leaf.path: leaf for leaf in settings.leaves(tc.Experiment)}

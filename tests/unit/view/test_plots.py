@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from places import EXAMPLES
 
 import template_control as tc
 from template_control.cli.main import main
@@ -89,6 +90,27 @@ def test_the_command_draws_what_it_is_asked_for(record, tmp_path, capfd):
     assert not list(tmp_path.glob("*.png"))
 
 
+def test_a_run_draws_what_it_is_asked_for(tmp_path, capfd, refused):
+    words = ["walk", "--steps", "1", "--output", str(tmp_path), "--json"]
+    assert "--figures is 'comm': give a list" in refused([*words, "--figures", "comm"])
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "template.npz").write_text("of the run that was here")
+    figures = ["--figures", "com", "--format", "pdf", "--start", "0.1", "--no-title"]
+    assert main([*words, *figures]) == 0
+    assert {p.name for p in tmp_path.iterdir()} >= {"run.npz", "run.toml", "com.pdf"}
+    assert not list(tmp_path.glob("*.png"))
+    assert not (tmp_path / "template.npz").exists()
+
+
+def test_a_scenario_draws_what_it_is_asked_for(tmp_path, capfd):
+    words = ["go", str(EXAMPLES / "walk_run_walk.toml"), "--robot", "runner", "--steps", "1"]
+    asked = ["--figures", "scenario,forces", "--format", "pdf", "--output", str(tmp_path)]
+    assert main([*words, *asked]) == 0
+    assert {p.name for p in tmp_path.glob("*.pdf")} == {"scenario.pdf", "forces.pdf"}
+    assert main(["plots", str(tmp_path / "run.npz"), "--figures", "scenario"]) == 0
+    assert {p.name for p in tmp_path.glob("*.png")} == {"scenario.png"}
+
+
 def test_a_look_chooses_the_part_and_the_title(record):
     look = Look(0.2, -0.3, titled=False)
     for name in ("com", "torques", "forces", "tracking", "turning", "energies"):
@@ -133,7 +155,7 @@ def test_an_impact_is_marked_with_its_size(record):
     ("arguments", "culprit"),
     [
         (["missing.npz"], "missing.npz"),
-        (["run.npz", "--figures", "com,none"], "no figure 'none'"),
+        (["run.npz", "--figures", "com,none"], "--figures is 'none': give a list"),
         (["run.npz", "--start", "5", "--end", "4"], "nothing lies between start 5 s and end 4 s"),
         (["run.npz", "--dpi", "3"], "--dpi is 3"),
         (["junk.npz"], "junk.npz"),
