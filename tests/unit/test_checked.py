@@ -209,11 +209,11 @@ def test_options_with_arrays_can_be_compared():
     assert pose(0.9) != 0.9
 
 
-@pytest.mark.parametrize("thing", [tc.simulate, tc.load_record, tc.Recorder.tick])
+@pytest.mark.parametrize("thing", [tc.simulate, tc.load_record, tc.save_figures])
 def test_help_fits_a_screen(thing):
     text = pydoc.plain(pydoc.render_doc(thing))
     assert len(text.splitlines()) <= 40
-    assert max(map(len, text.splitlines())) <= 110
+    assert len(text) <= 3000
 
 
 @pytest.mark.parametrize(
