@@ -56,17 +56,28 @@ def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
         size: rows of the factored block.
         columns: (size, m) right-hand sides, one a column; overwritten with the solutions.
     """
-    for c in range(columns.shape[1]):
-        for i in range(size):
-            value = columns[i, c]
-            for k in range(i):
-                value -= factor[i, k] * columns[k, c]
-            columns[i, c] = value / factor[i, i]
-        for i in range(size - 1, -1, -1):
-            value = columns[i, c]
-            for k in range(i + 1, size):
-                value -= factor[k, i] * columns[k, c]
-            columns[i, c] = value / factor[i, i]
+    width = columns.shape[1]  # side by side: one instruction takes several
+    for i in range(size):
+        for k in range(i):
+            for c in range(width):
+                columns[i, c] -= factor[i, k] * columns[k, c]
+        for c in range(width):
+            columns[i, c] /= factor[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            for c in range(width):
+                columns[i, c] -= factor[k, i] * columns[k, c]
+        for c in range(width):
+            columns[i, c] /= factor[i, i]
+
+
+@compiled
+def multiply_add(left: Array, right: Array, out: Array) -> None:
+    """out += left right, each entry summed up from its value in ``out``, in order."""
+    for i in range(out.shape[0]):
+        for k in range(left.shape[1]):
+            for j in range(out.shape[1]):
+                out[i, j] += left[i, k] * right[k, j]
 
 
 @compiled
@@ -98,35 +109,31 @@ def eliminate(
     factor = mass_matrix.copy()
     if not cholesky(factor, nv):
         return False
-    # Right-hand sides without contact: columns of S, then -h.
-    a_map[:] = 0.0
+    # Right-hand sides: columns of S, then -h, then J^T.
+    columns = np.zeros((nv, nu + 1 + m))
     for j in range(nu):
-        a_map[base_dof + j, j] = 1.0
+        columns[base_dof + j, j] = 1.0
     for i in range(nv):
-        a_map[i, nu] = -nonlinear_effects[i]
-    solve_cholesky(factor, nv, a_map)
-    jt = jacobian.T.copy()
-    solve_cholesky(factor, nv, jt)  # M^-1 J^T
-    delassus = np.empty((m, m))
-    for i in range(m):
+        columns[i, nu] = -nonlinear_effects[i]
         for j in range(m):
-            total = 0.0
-            for k in range(nv):
-                total += jacobian[i, k] * jt[k, j]
-            delassus[i, j] = total
+            columns[i, nu + 1 + j] = jacobian[j, i]
+    solve_cholesky(factor, nv, columns)
+    uncontacted, jt = columns[:, : nu + 1], columns[:, nu + 1 : nu + 1 + m]  # the latter M^-1 J^T
+    delassus = np.zeros((m, m))
+    multiply_add(jacobian, jt, delassus)
+    f_map[:] = 0.0
+    for i in range(m):
+        f_map[i, nu] = bias[i]
+    multiply_add(jacobian, uncontacted, f_map)
     for i in range(m):
         for j in range(nu + 1):
-            total = bias[i] if j == nu else 0.0
-            for k in range(nv):
-                total += jacobian[i, k] * a_map[k, j]
-            f_map[i, j] = -total
+            f_map[i, j] = -f_map[i, j]
     if not cholesky(delassus, m):
         return False
     solve_cholesky(delassus, m, f_map)
+    a_map[:] = 0.0
+    multiply_add(jt, f_map, a_map)
     for i in range(nv):
         for j in range(nu + 1):
-            total = 0.0
-            for k in range(m):
-                total += jt[i, k] * f_map[k, j]
-            a_map[i, j] += total
+            a_map[i, j] += uncontacted[i, j]
     return True

@@ -182,11 +182,10 @@ def assemble(
     for t in range(tasks.shape[0]):
         if tasks[t, nv + WEIGHT] == 0.0:
             continue
-        for j in range(nu + 1):
-            total = 0.0
-            for k in range(nv):
-                total += tasks[t, k] * a_map[k, j]
-            row[j] = total
+        row[:] = 0.0
+        for k in range(nv):
+            for j in range(nu + 1):
+                row[j] += tasks[t, k] * a_map[k, j]
         row[nu] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
         _add_square(row, tasks[t, nv + WEIGHT], torque_limit, factor, gradient)
     for foot in range(feet):
@@ -306,12 +305,12 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
 def _add_square(
     row: Array, row_weight: float, scale: Array, hessian: Array, gradient: Array
 ) -> None:
-    """Add the square of (row[:-1] tau + row[-1]), tau = scale * z, to H and g."""
+    """Add the square of (row[:-1] tau + row[-1]), tau = scale * z, to H's lower triangle and g."""
     nu = gradient.shape[0]
     for i in range(nu):
         left = row_weight * row[i] * scale[i]
         gradient[i] += left * row[nu]
-        for j in range(nu):
+        for j in range(i + 1):
             hessian[i, j] += left * row[j] * scale[j]
 
 
