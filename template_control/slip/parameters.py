@@ -39,6 +39,15 @@ class SlipParameters(Checked):
     slope: Slope = 0.0
     assist: Annotated[float, Range()] = 0.0
 
+    def __repr__(self) -> str:
+        text = (
+            f"mass={self.mass:.6g}, gravity={self.gravity:.6g}, rest_length={self.rest_length:.6g},"
+            f" leg_stiffness={self.leg_stiffness:.6g}"
+        )
+        more = {"slope": self.slope, "assist": self.assist}
+        text += "".join(f", {name}={value:.6g}" for name, value in more.items() if value)
+        return f"SlipParameters({text})"
+
     @property
     def gravity_parts(self) -> tuple[float, float]:
         """Gravity into the ground, and along it, backward positive [m/s^2]."""
