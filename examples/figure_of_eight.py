@@ -1,4 +1,4 @@
-"""Bolt walks a figure of eight, held by nothing: once around to the left, once to the right.
+"""Figure of eight of Bolt with a floating base: once around to the left, once to the right.
 
 python examples/figure_of_eight.py [--speed 0.6] [--rate 0.35] [--picture eight.png]
 """
@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 import template_control as tc
 from template_control.run import FloatingRecord
+from template_control.terminal import progress_bar
 from template_control.view.figures import footholds
 from template_control.view.style import save_figure
 
@@ -27,15 +28,10 @@ def main() -> None:
     around = 2.0 * np.pi / chosen.rate
     course = tc.HeadingCommand(turning_rate=chosen.rate, turns=((around, -chosen.rate),))
     steps = chosen.steps or int(2.0 * around / gait.step_duration)
-    record = tc.simulate(
-        tc.Experiment(
-            bolt,
-            planner=tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER),
-            steps=steps,
-            course=course,
-            record_every=5,
-        )
-    )
+    planner = tc.LqrPlanner(gait, tc.embedding.FREE_PLANNER)
+    experiment = tc.Experiment(bolt, planner=planner, steps=steps, course=course, record_every=5)
+    with progress_bar(f"{steps} steps, about 20 s", steps) as progress:
+        record = tc.simulate(experiment, progress)
     assert isinstance(record, FloatingRecord)
     roll, pitch, yaw = np.abs(record.attitude).max(axis=0)
     print(f"{record.steps} of {steps} steps in {record.time[-1]:.1f} s, fell: {record.fell}")

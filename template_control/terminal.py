@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich import table
@@ -67,3 +68,15 @@ def counted(items: Iterable[T], total: int, text: str) -> Iterator[T]:
     """The items, once, with a progress bar on standard error; ``text`` is in front of it."""
     with bar(plain_console(stderr=True), transient=True) as progress:
         yield from progress.track(items, total=total, description=text)
+
+
+@contextmanager
+def progress_bar(text: str, total: float | None) -> Iterator[Callable[[float], None]]:
+    """Progress bar on standard error for as long as a ``with`` block lasts.
+
+    Yields:
+        The function that sets how much of ``total`` is done; ``total`` is None where nobody knows.
+    """
+    with bar(plain_console(stderr=True)) as progress:
+        task = progress.add_task(text, total=total)
+        yield lambda done: progress.update(task, completed=done)

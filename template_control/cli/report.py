@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rich.console import Console
-
 from template_control.checks import option_types as values
 from template_control.cli.interrupts import stopped
 from template_control.cli.plots import TEMPLATE, add_figure_options, draw
@@ -25,7 +23,7 @@ from template_control.run.record import Record, RunInterrupted, one_line, record
 from template_control.run.simulation import simulate
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
-from template_control.terminal import Table, bar, plain_console
+from template_control.terminal import Table, plain_console, progress_bar
 
 
 def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
@@ -127,7 +125,7 @@ def run_and_keep(
     with output_folder(options.output) as folder, stdout_to_stderr():
         try:
             with (
-                progress_bar(plain_console(stderr=True), doing, total) as advance,
+                progress_bar(doing, total) as advance,
                 _failures_told(),
             ):
                 record = simulate(prepared, advance)
@@ -344,20 +342,3 @@ def nearest_text(nearest: dict[str, float]) -> str:
 def _state(z: dict[str, float]) -> str:
     text = f"{z['speed']:.4f} m/s  {z['height']:.4f} m"
     return text + (f"  {z['vertical_speed']:+.4f} m/s" if "vertical_speed" in z else "")
-
-
-@contextmanager
-def progress_bar(console: Console, text: str, total: float | None) -> Iterator[Any]:
-    """Show a progress bar while a ``with`` block runs.
-
-    Args:
-        console: where the bar is drawn.
-        text: what is going on, in front of the bar.
-        total: amount at which the bar is full, in the caller's unit; None where nobody knows.
-
-    Yields:
-        The function that sets how much is done, in the same unit.
-    """
-    with bar(console) as progress:
-        task = progress.add_task(text, total=total)
-        yield lambda done: progress.update(task, completed=done)

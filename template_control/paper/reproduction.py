@@ -58,5 +58,5 @@ REPRODUCTIONS: dict[str, Callable[..., Reproduction]] = {
 }
 """By the name ``template-control reproduce`` knows them by."""
 
-LONG = {"fig8": 20, "fig9": 60, "fig12": 60, "fig13": 20}
+LONG = {"fig8": 20, "fig9": 30, "fig12": 40, "fig13": 20}
 """Seconds on two cores of those that need more than ten, in tens."""
