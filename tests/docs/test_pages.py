@@ -15,6 +15,7 @@ RUN = (
     "engines",
     "floating_base",
     "options",
+    "parameter_study",
     "public_robots",
     "running",
     "your_floating_robot",
