@@ -5,17 +5,16 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
-from matplotlib.quiver import Quiver
-from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from template_control.errors import RecordError
@@ -23,102 +22,48 @@ from template_control.run.record import FloatingRecord, Record
 from template_control.storage import atomic_path
 from template_control.view.replay.playback import (
     Playback,
-    carrying,
     coil,
-    footholds,
-    force_arrows,
     spring,
     template_legs,
 )
 from template_control.view.replay.robot_visuals import model_of
-from template_control.view.replay.scene import in_space
+from template_control.view.replay.scene import in_space, smoothed
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text
 
 Array = NDArray[np.float64]
 
-LEGS = (LEFT, RIGHT)
-"""Colours of the legs."""
-
-WIDTH = 2.6
-"""Of the picture, in rest lengths."""
-
-
-def empty_picture() -> tuple[Figure, Axes]:
-    """A figure that is drawn without a display, and its axes."""
-    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes: Axes = figure.subplots()
-    return figure, axes
-
-
-def force_artist(axes: Axes, zorder: int) -> Quiver:
-    """The arrows of the ground's forces on both feet.
-
-    Args:
-        axes: to draw in.
-        zorder: what is drawn before and behind them.
-    """
-    return axes.quiver(
-        [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], color=LEGS, angles="xy",
-        scale_units="xy", scale=1.0, width=0.007, zorder=zorder,
-    )  # fmt: skip
-
-
-def named(axes: Axes, robot: str) -> Text:
-    """Draw the legend and the robot's name; the title that tells the time comes back.
-
-    Args:
-        axes: with all that the legend names.
-        robot: its name.
-    """
-    for color, name in zip(LEGS, ("left", "right"), strict=True):
-        axes.plot([], [], color=color, linewidth=4, label=f"{name} leg, its ground force")
-    axes.legend(loc="upper left", fontsize=7, frameon=False)
-    time = axes.set_title(" ", fontsize=9, loc="right")
-    axes.set_title(as_text(robot), fontsize=9, loc="left")
-    return time
-
-
-def keep_layout(figure: Figure) -> None:
-    """Once: a layout that follows the tick labels would make the picture tremble.
-
-    Args:
-        figure: with its first frame.
-    """
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-
-
-_BELOW = 0.22  # share of the picture's height under the ground beneath the CoM
-_AROUND = 3.0  # rest lengths of ground that are drawn beside the path
-_ASIDE, _ABOVE = np.radians(-25.0), np.radians(18.0)  # the camera's, from a view from the right
+_LEGS = (LEFT, RIGHT)
+_WIDTH = 2.6  # of the picture, in rest lengths
+_HIGH = 0.75 * _WIDTH  # of the picture
+_BELOW = 0.08, 0.22  # share of the picture's height under the ground, planar and in space
+_AROUND = 3.0  # rest lengths of ground that are drawn next to the path
+_LEFTWARD, _ABOVE = np.radians(-25.0), np.radians(18.0)  # the camera's, from a view from the right
 
 # Rows: to the right and upward in the picture; without perspective, so that lengths compare.
-_CAMERA = np.array(
+IN_SPACE = np.array(
     [
-        [np.cos(_ASIDE), np.sin(_ASIDE), 0.0],
-        [-np.sin(_ASIDE) * np.sin(_ABOVE), np.cos(_ASIDE) * np.sin(_ABOVE), np.cos(_ABOVE)],
+        [np.cos(_LEFTWARD), np.sin(_LEFTWARD), 0.0],
+        [
+            -np.sin(_LEFTWARD) * np.sin(_ABOVE),
+            np.cos(_LEFTWARD) * np.sin(_ABOVE),
+            np.cos(_ABOVE),
+        ],
     ]
 )
+"""Camera of a floating-base run: from the right and from behind."""
+FROM_THE_SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Camera of a planar run."""
 
 
-def seen(points: Array) -> Array:
-    """(..., 3) of the world to (..., 2) of the picture [m].
-
-    Args:
-        points: x, y to the left, z up [m].
-    """
-    return np.asarray(points @ _CAMERA.T)
-
-
-class SpaceStage:
+class Stage:
     """The picture, whose artists each frame moves.
 
     Args:
-        playback: of a free robot's run.
+        playback: of a run.
 
     Attributes:
         figure: it.
+        camera: (2, 3) from the world to the picture.
         legs: the lines of the left and the right one, down to the foot.
         body: where joints and trunk are in the frame that is shown.
     """
@@ -127,49 +72,75 @@ class SpaceStage:
         record = playback.record
         self.playback, self._space = playback, in_space(record, np.zeros(2))
         self.body = _Body(record)
-        length = record.template.rest_length
+        self._length = length = record.template.rest_length
+        flat = not isinstance(record, FloatingRecord)
+        self.camera = FROM_THE_SIDE if flat else IN_SPACE
+        self._below = _BELOW[0 if flat else 1]
         _, self._loaded = template_legs(record)
         self._spring = spring(0.03 * length)
-        self.figure, axes = empty_picture()
-        self._axes, self._half = axes, 0.5 * WIDTH * length
-        axes.set(xticks=[], yticks=[])
+        self.figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+        FigureCanvasAgg(self.figure)
+        self._axes = axes = self.figure.subplots()
         axes.set_aspect("equal", adjustable="box")
-        axes.add_collection(LineCollection(self._ground(length), colors="0.82", linewidths=0.8))
-        self._trail = axes.plot([], [], color=COM, linewidth=1.2)[0]
-        self._marks = [axes.plot([], [], "^", color=c, markersize=5)[0] for c in LEGS]
-        # The left leg is behind the trunk, the right one before it.
-        self.legs = [
-            axes.plot([], [], color=c, linewidth=4, solid_capstyle="round", zorder=order)[0]
-            for c, order in zip(LEGS, (2, 4), strict=True)
-        ]
-        self._trunk = Polygon(np.zeros((4, 2)), color=TRUNK, linewidth=3, alpha=0.55, zorder=3)
-        axes.add_patch(self._trunk)
-        springs = [axes.plot([], [], color=TEMPLATE, linewidth=1.1, zorder=5)[0] for _ in (0, 1)]
-        self._springs = springs
-        self._com = axes.plot([], [], "o", color=COM, markersize=7, label="CoM", zorder=6)[0]
-        self._template = axes.plot(
-            [], [], "o", color=TEMPLATE, markersize=3, label="template", zorder=7
-        )[0]
-        self._forces = force_artist(axes, 8)
-        self._title = named(axes, record.robot_name)
-        self.show(0)
-        keep_layout(self.figure)
+        self._draw_ground(flat)
+        self._level = smoothed(record.ground, self._space.com[playback.rows, 0], length)
 
-    def _ground(self, length: float) -> list[Array]:
-        """A net of lines on the ground around the path, one every rest length."""
-        record = self.playback.record
+        def line(marker: str, zorder: float, **look: Any) -> Line2D:
+            return axes.plot([], [], marker, zorder=zorder, **look)[0]
+
+        self._trail = line("", 2, color=COM, linewidth=1.2)
+        self._marks = [line("^", 2, color=c, markersize=5) for c in _LEGS]
+        # The left leg is behind the trunk, the right one before it.
+        thick: dict[str, Any] = {"linewidth": 4, "solid_capstyle": "round"}
+        self.legs = [line("", z, color=c, **thick) for c, z in zip(_LEGS, (2, 4), strict=True)]
+        width = 7 if flat else 3
+        self._trunk = Polygon(
+            np.zeros((4, 2)), color=TRUNK, linewidth=width, alpha=0.55, zorder=3, joinstyle="round"
+        )
+        axes.add_patch(self._trunk)
+        self._springs = [line("", 5, color=TEMPLATE, linewidth=1.1) for _ in _LEGS]
+        self._com = line("o", 6, color=COM, markersize=7, label="CoM")
+        self._template = line("o", 7, color=TEMPLATE, markersize=3, label="template")
+        self._forces = axes.quiver(
+            *np.zeros((4, 2)), color=_LEGS, angles="xy", scale_units="xy", scale=1.0, width=0.007,
+            zorder=8,
+        )  # fmt: skip
+        for color, name in zip(_LEGS, ("left", "right"), strict=True):
+            line("", 0, color=color, linewidth=4, label=f"{name} leg, its ground force")
+        axes.legend(loc="upper left", fontsize=7, frameon=False)
+        self._time = axes.set_title(" ", fontsize=9, loc="right")
+        axes.set_title(as_text(record.robot_name), fontsize=9, loc="left")
+        self.show(0)
+        # Once: a layout that follows the tick labels would make the picture tremble.
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")
+
+    def seen(self, points: Array) -> Array:
+        """(..., 3) of the world to (..., 2) of the picture [m]."""
+        return np.asarray(points @ self.camera.T)
+
+    def _draw_ground(self, flat: bool) -> None:
+        """The ground around the path: its profile, or a net of lines every rest length."""
+        record, length = self.playback.record, self._length
         place = self._space.com[self.playback.rows, :2] / length
         low, high = np.floor(place.min(axis=0) - _AROUND), np.ceil(place.max(axis=0) + _AROUND)
         (x0, y0), (x1, y1) = (length * low).tolist(), (length * high).tolist()
         along = np.array(record.ground.line(x0, x1))
+        if flat:
+            self._axes.set(xlabel="x [m]", ylabel="y [m]")
+            depth = along[:, 1].min() - length
+            self._axes.fill_between(along[:, 0], along[:, 1], depth, color="0.9", linewidth=0)
+            self._axes.plot(*along.T, color="0.3", linewidth=0.8)
+            return
+        self._axes.set(xticks=[], yticks=[])
         lines = [
-            seen(np.column_stack((along[:, 0], np.full(len(along), length * y), along[:, 1])))
+            self.seen(np.insert(along, 1, length * y, axis=1))
             for y in np.arange(low[1], high[1] + 0.5)
         ]
         for x in (length * np.arange(low[0], high[0] + 0.5)).tolist():
             height = record.ground.height_at(x)
-            lines.append(seen(np.array([[x, y0, height], [x, y1, height]])))
-        return lines
+            lines.append(self.seen(np.array([[x, y0, height], [x, y1, height]])))
+        self._axes.add_collection(LineCollection(lines, colors="0.82", linewidths=0.8))
 
     def show(self, frame: int) -> None:
         """Draw a frame.
@@ -178,7 +149,7 @@ class SpaceStage:
             frame: its number.
         """
         record, space, rows = self.playback.record, self._space, self.playback.rows
-        row = rows[frame]
+        row, seen = rows[frame], self.seen
         com, feet = space.com[row], space.foot[row]
         self.body.place(record.q[row])
         self._trunk.set_xy(seen(self.body.trunk()))
@@ -196,12 +167,11 @@ class SpaceStage:
         self._template.set_data(*template[:, None])
         self._forces.set_offsets(seen(feet))
         self._forces.set_UVC(*seen(space.arrow[row]).T)
-        beneath = record.ground.height_at(float(com[0]))
-        x, y = seen(np.array([com[0], com[1], beneath])).tolist()
-        high = 2.0 * self._half * 0.75
-        self._axes.set_xlim(x - self._half, x + self._half)
-        self._axes.set_ylim(y - _BELOW * high, y + (1.0 - _BELOW) * high)
-        self._title.set_text(f"{record.time[row]:.2f} s")
+        x, y = seen(np.array([com[0], com[1], self._level[frame]])).tolist()
+        half, high = 0.5 * _WIDTH * self._length, _HIGH * self._length
+        self._axes.set_xlim(x - half, x + half)
+        self._axes.set_ylim(y - self._below * high, y + (1.0 - self._below) * high)
+        self._time.set_text(f"{record.time[row]:.2f} s")
 
 
 class _Body:
@@ -232,74 +202,6 @@ class _Body:
 _MOST_GIF_FRAMES = 1000  # a GIF is held in memory until its last frame
 
 
-class _Stage:
-    """The picture, whose artists each frame moves."""
-
-    def __init__(self, playback: Playback) -> None:
-        record, rows = playback.record, playback.rows
-        self.playback = playback
-        length = record.template.rest_length
-        self.top = 2.0 * record.trunk_com
-        self.toes, self.loaded = template_legs(record)
-        self.arrows, self.on = force_arrows(record), carrying(record)
-        self.spring = spring(0.03 * length)
-        self.figure, axes = empty_picture()
-        self.axes, self.half = axes, 0.5 * WIDTH * length
-        axes.set_aspect("equal")
-        self.ground = record.ground
-        ends = record.com[rows, 0].min() - self.half, record.com[rows, 0].max() + self.half
-        line = np.transpose(self.ground.line(*map(float, ends)))
-        over = record.q[rows, 1] - [self.ground.height_at(x) for x in record.q[rows, 0].tolist()]
-        low, high = line[1].min() - 0.12 * length, 1.06 * (float(np.max(over)) + self.top)
-        axes.set(xlabel="x [m]", ylabel="y [m]", ylim=(low, line[1].max() + high))
-        axes.fill_between(line[0], line[1], low - length, color="0.9", linewidth=0)
-        axes.plot(*line, color="0.3", linewidth=0.8)
-        stood = footholds(record)
-        self.foothold_time = [np.array([f.time for f in stood if f.foot == i]) for i in (0, 1)]
-        self.foothold_x = [np.array([f.x for f in stood if f.foot == i]) for i in (0, 1)]
-        self.marks = [axes.plot([], [], "^", color=c, markersize=5)[0] for c in LEGS]
-        self.trunk = axes.plot([], [], color=TRUNK, linewidth=7, solid_capstyle="round")[0]
-        self.legs = [
-            axes.plot([], [], color=c, linewidth=4, solid_capstyle="round", alpha=0.85)[0]
-            for c in LEGS
-        ]
-        self.trail = axes.plot([], [], color=COM, linewidth=1.2)[0]
-        self.com = axes.plot([], [], "o", color=COM, markersize=7, label="CoM")[0]
-        self.springs = [axes.plot([], [], color=TEMPLATE, linewidth=1.1)[0] for _ in (0, 1)]
-        self.template = axes.plot([], [], "o", color=TEMPLATE, markersize=3, label="template")[0]
-        self.forces = force_artist(axes, 5)
-        self.title = named(axes, record.robot_name)
-        self.show(0)
-        keep_layout(self.figure)
-
-    def show(self, frame: int) -> None:
-        record, rows = self.playback.record, self.playback.rows
-        row = rows[frame]
-        pitch = record.q[row, 2]
-        hip = record.q[row, :2]
-        top = hip + self.top * np.array([np.sin(pitch), np.cos(pitch)])
-        self.trunk.set_data(*np.stack((hip, top)).T)
-        for foot, leg in enumerate(record.legs):
-            self.legs[foot].set_data(*np.vstack((record.joint[row, leg], record.foot[row, foot])).T)
-            seen = self.foothold_time[foot] <= record.time[row]
-            places = self.foothold_x[foot][seen]
-            heights = [self.ground.height_at(x) for x in places.tolist()]
-            self.marks[foot].set_data(places, heights)
-        for number, line in enumerate(self.springs):
-            if self.loaded[row, number]:
-                ends = (record.template_com[row], self.toes[row, number])
-                line.set_data(*coil(self.spring, *ends))
-            else:
-                line.set_data([], [])
-        self.trail.set_data(*record.com[rows[0] : row + 1].T)
-        self.com.set_data(*record.com[row][:, None])
-        self.template.set_data(*record.template_com[row][:, None])
-        self.forces.set_offsets(record.foot[row])
-        self.forces.set_UVC(*self.arrows[row].T)
-        self.axes.set_xlim(record.com[row, 0] - self.half, record.com[row, 0] + self.half)
-        self.title.set_text(f"{record.time[row]:.2f} s")
-
-
 def write_film(
     path: Path,
     playback: Playback,
@@ -321,8 +223,7 @@ def write_film(
     """
     writer = _writer(path, fps, len(playback.rows))
     with atomic_path(path) as place:
-        free = isinstance(playback.record, FloatingRecord)
-        stage = SpaceStage(playback) if free else _Stage(playback)
+        stage = Stage(playback)
         try:
             with writer.saving(stage.figure, str(place), dpi):
                 for frame in range(len(playback.rows)):

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.view.replay.film import SpaceStage, seen
+from template_control.view.replay.film import IN_SPACE, Stage
 from template_control.view.replay.playback import playback
 from template_control.view.replay.robot_visuals import load_visuals, placements
 from template_control.view.replay.scene import in_space, scene_commands, turned_to
@@ -46,7 +46,7 @@ def test_a_leg_that_passes_the_vertical_does_not_spin():
 
 
 def test_up_is_up_and_forward_is_to_the_right_in_the_film():
-    right, up = seen(np.array([0.0, 0.0, 1.0])), seen(np.array([1.0, 0.0, 0.0]))
+    right, up = IN_SPACE @ np.array([0.0, 0.0, 1.0]), IN_SPACE @ np.array([1.0, 0.0, 0.0])
     assert right[0] == 0.0
     assert right[1] > 0.9
     assert up[0] > 0.9
@@ -99,13 +99,15 @@ def test_the_scene_follows_the_walk_in_its_turn(record):
 @pytest.mark.slow(seconds=2)
 def test_the_film_shows_the_legs_on_their_feet(record):
     frames = playback(record, fps=5.0)
-    stage = SpaceStage(frames)
+    stage = Stage(frames)
     thigh = []
     for frame, row in enumerate(frames.rows):
         stage.show(frame)
         for foot, leg in enumerate(stage.legs):
             points = np.array(leg.get_data()).T
-            np.testing.assert_allclose(points[-1], seen(record.space_foot[row, foot]), atol=1e-12)
+            np.testing.assert_allclose(
+                points[-1], stage.seen(record.space_foot[row, foot]), atol=1e-12
+            )
         body = stage.body.leg(0)
         thigh.append(np.linalg.norm(body[2] - body[1]))
     np.testing.assert_allclose(thigh, 0.45, atol=1e-9)
