@@ -63,59 +63,30 @@ class RobotBackend(ABC):
         route: Route,
         automaton: Automaton,
     ) -> EmbeddingController:
-        """The robot's controller.
-
-        Args:
-            planners: one for each kind of stride of the route, or one.
-            options: tuning.
-            route: which stride comes next.
-            automaton: of the route's strides.
-        """
+        """The robot's controller, with planners for each kind of stride of the route."""
 
     @abstractmethod
     def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
-        """Start the controller where the run begins, and tell (q, v) there.
+        """Start the controller where the run begins; (q, v) there.
 
-        Args:
-            controller: of the robot.
-            o: how the run goes.
-
-        Raises:
-            ParameterError: if it is not clear where the feet are.
+        A ParameterError if it is not clear where the feet are.
         """
 
     @abstractmethod
     def plant(self, world: World) -> AbstractContextManager[Plant]:
-        """The robot in a world.
-
-        Args:
-            world: options of a plant, or a plant.
-        """
+        """The robot in a world: options of a plant, or a plant."""
 
     @abstractmethod
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
-        """What tells the controller the state.
-
-        Args:
-            controller: of the robot.
-            o: how the run goes.
-        """
+        """Sensors and estimators that give the controller its state."""
 
     @abstractmethod
     def force(self, along: float, lateral: float) -> tuple[float, ...]:
-        """A push as the robot's plant takes it, after the torques.
-
-        Args:
-            along, lateral: forward, and to the left [N].
-        """
+        """A push, forward and to the left [N], as the robot's plant takes it after the torques."""
 
 
 class PlanarBackend(RobotBackend):
-    """See :class:`RobotBackend`.
-
-    Args:
-        robot: that is run.
-    """
+    """See :class:`RobotBackend`."""
 
     def __init__(self, robot: PlanarBiped) -> None:
         self.robot = robot
@@ -127,11 +98,7 @@ class PlanarBackend(RobotBackend):
         route: Route,
         automaton: Automaton,
     ) -> EmbeddingController:
-        """See :meth:`RobotBackend.controller`.
-
-        Raises:
-            ParameterError: if the options are those of a free robot.
-        """
+        """See :meth:`RobotBackend.controller`; a ParameterError for options of a free robot."""
         if isinstance(options, FreeOptions):
             raise ParameterError(
                 f"{self.robot.name} is held in its plane, and its embedding has FreeOptions: give"
@@ -140,11 +107,7 @@ class PlanarBackend(RobotBackend):
         return EmbeddingController(self.robot, planners, options, route, automaton)
 
     def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
-        """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns.
-
-        Raises:
-            ParameterError: as there.
-        """
+        """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns."""
         robot, route, pose = self.robot, controller.supervisor.route, o.pose
         first = planner, node = controller.supervisor.begin(route.section)
         z = route.start if o.start is None else np.array(o.start)
@@ -156,7 +119,7 @@ class PlanarBackend(RobotBackend):
             q, v = state_in(robot, pose)
             controller.start(pose.rear, pose.swung, first=first)
             return q, v
-        # Mid-swing: beside the stance foot, passing it at twice the CoM's speed.
+        # Mid-swing: next to the stance foot, passing it at twice the CoM's speed.
         shape = controller.swings.towards(controller.supervisor.first_goal())
         swing = np.array([0.0, shape.clearance])
         pitch = controller.first_pitch()
@@ -174,11 +137,7 @@ class PlanarBackend(RobotBackend):
         return apex_pose(self.robot, ApexStart(z, planner.gait, swing, pitch, automaton))
 
     def _standing_pose(self, controller: EmbeddingController, o: Experiment) -> Pose:
-        """At rest on the ground of the plant.
-
-        Raises:
-            ParameterError: if it is steeper than a start can be made on.
-        """
+        """At rest on the ground of the plant; a ParameterError if it is too steep for a start."""
         pose = standing_pose(controller.supervisor.route.parameters, ground=o.world.ground_height)
         (rear, low), (front, high) = pose.feet.tolist()
         slope, (down, up) = atan2(high - low, front - rear), startable_slopes(self.robot)
@@ -212,11 +171,7 @@ _REAR = 0  # the left foot stands where a run begins
 
 
 class FloatingBackend(RobotBackend):
-    """See :class:`RobotBackend`.
-
-    Args:
-        robot: that is run.
-    """
+    """See :class:`RobotBackend`."""
 
     def __init__(self, robot: FloatingBaseBiped) -> None:
         self.robot = robot
@@ -228,11 +183,7 @@ class FloatingBackend(RobotBackend):
         route: Route,
         automaton: Automaton,
     ) -> EmbeddingController:
-        """See :meth:`RobotBackend.controller`.
-
-        Raises:
-            ParameterError: if the options are those of a planar robot.
-        """
+        """See :meth:`RobotBackend.controller`; a ParameterError for options of a planar robot."""
         if not isinstance(options, FreeOptions):
             raise ParameterError(
                 f"{self.robot.name} walks free, and its embedding has EmbeddingOptions: give"
@@ -243,8 +194,7 @@ class FloatingBackend(RobotBackend):
     def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`: at VLO, in the sideways motion of the gait.
 
-        Raises:
-            ParameterError: if the run begins elsewhere, or the options have a planar pose.
+        A ParameterError if the run begins elsewhere, or the options have a planar pose.
         """
         route, motion = controller.supervisor.route, controller.lateral
         if o.pose is not None or route.section != VLO or motion is None:
@@ -278,11 +228,7 @@ class FloatingBackend(RobotBackend):
         return q, v
 
     def plant(self, world: World) -> AbstractContextManager[Plant]:
-        """See :meth:`RobotBackend.plant`.
-
-        Raises:
-            ParameterError: if the world knows no free robot.
-        """
+        """See :meth:`RobotBackend.plant`; a ParameterError for a world without free robots."""
         if isinstance(world, Plant) and not isinstance(world, PlantOptions):
             return nullcontext(world)
         if isinstance(world, MujocoOptions):
@@ -295,11 +241,7 @@ class FloatingBackend(RobotBackend):
         )
 
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
-        """See :meth:`RobotBackend.senses`; noise is filtered.
-
-        Raises:
-            ParameterError: if the state is to be estimated.
-        """
+        """See :meth:`RobotBackend.senses`: noise is filtered; estimating the state is refused."""
         if not isinstance(o.sensors, SensorOptions):
             raise ParameterError(
                 f"{self.robot.name} walks free, and the estimate is that of a planar robot: give"

@@ -145,7 +145,7 @@ class Experiment(Checked):
 
     @property
     def free(self) -> bool:
-        """Whether the robot has a floating base."""
+        """True if the robot has a floating base."""
         if isinstance(self.robot, RobotSpec):
             return self.robot.free
         return isinstance(self.robot, FloatingBaseBiped)
@@ -418,9 +418,7 @@ def _planner(spec: PlannerSpec, gait: Gait) -> Planner:
 def _check_strictly(motion: Gait | Route, planner: Planner | Planners) -> None:
     """Refuse a walk that cannot be had as it is wanted.
 
-    Raises:
-        ScenarioError: if it cannot.
-        ParameterError: if that is known only of walks of any speed.
+    A ScenarioError; a ParameterError if that is known only of walks of any speed.
     """
     ahead = next(iter(planner.values())) if isinstance(planner, Mapping) else planner
     if not isinstance(motion, ScenarioRoute) or not isinstance(ahead, AheadPlanner):

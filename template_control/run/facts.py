@@ -17,11 +17,9 @@ T = TypeVar("T")
 
 
 class Fact(Generic[T]):
-    """Attribute that reads an entry of ``metadata``.
+    """Attribute that reads an entry of ``metadata``: ``make`` of it.
 
-    Args:
-        make: the attribute's value of the entry.
-        name: of the entry; "": the attribute's own.
+    ``name`` is the entry's; "": the attribute's own.
     """
 
     def __init__(self, make: Callable[[Any], T], name: str = "") -> None:

@@ -11,11 +11,7 @@ _MANY = 0.5  # share of a block: in a stumble the QP fails for a few ticks
 
 
 class QpFailures:
-    """Counts the ticks without a solved QP, and warns once where they are many.
-
-    Args:
-        name: of the robot, for the message.
-    """
+    """Counts the ticks without a solved QP; warns once, with the robot's name, if they are many."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -23,12 +19,7 @@ class QpFailures:
         self._told = False
 
     def tick(self, solved: bool, now: float) -> None:
-        """Count one tick.
-
-        Args:
-            solved: whether its QP was.
-            now: time [s].
-        """
+        """Count one tick at the time ``now`` [s]."""
         if self._ticks == _BLOCK:
             self._ticks = self._failed = 0
         self._ticks += 1

@@ -18,11 +18,7 @@ from template_control.storage import to_jsonable
 
 
 def about(controller: EmbeddingController) -> dict[str, Any]:
-    """What is known of a robot and its controller before a run's first tick.
-
-    Args:
-        controller: which has started.
-    """
+    """Facts of a robot and its controller, which has started, before a run's first tick."""
     robot = controller.robot
     nodes = controller.supervisor.automaton.nodes
     found = {
@@ -46,11 +42,7 @@ def about(controller: EmbeddingController) -> dict[str, Any]:
 
 
 def conditions(o: Experiment) -> dict[str, Any]:
-    """How a simulation goes; a plant of one's own is not data.
-
-    Args:
-        o: the experiment.
-    """
+    """Conditions of a simulation; a plant of one's own is not data."""
     told = {
         _NAMES.get(f.name, f.name): to_jsonable(getattr(o, f.name), _described)
         for f in fields(o)
@@ -62,12 +54,7 @@ def conditions(o: Experiment) -> dict[str, Any]:
 
 
 def outcome(controller: EmbeddingController, figures: Statistics) -> dict[str, Any]:
-    """What is known of a run so far.
-
-    Args:
-        controller: of the run.
-        figures: over its ticks.
-    """
+    """Facts of a run so far; ``figures`` are over its ticks."""
     found = {
         **_gait(controller),
         "arrived": controller.supervisor.arrived,

@@ -26,13 +26,7 @@ P = ParamSpec("P")
 def SimulationOptions(
     steps: int | None = None, plant: Any = None, embedding: Any = None, **others: Any
 ) -> Experiment:
-    """An experiment of version 0.1's options, for ``simulate(robot, route, options)``.
-
-    Args:
-        steps: as an experiment's.
-        plant, embedding: its world and its controller.
-        others: its other fields.
-    """
+    """An experiment of version 0.1's options, for ``simulate(robot, route, options)``."""
     given = others if plant is None else {"world": plant, **others}
     return Experiment(steps=steps, controller=embedding, **given)
 
@@ -56,12 +50,9 @@ class RunConfig:
 
 
 def Subject(robot: Any = "five-link", speed: float | None = None, plant: str = "pybullet") -> Any:
-    """An experiment of what version 0.1 disturbed.
+    """An experiment of what version 0.1 disturbed, with a kind of engine.
 
-    Args:
-        robot: of the experiment.
-        speed: of a run, or of a floating-base robot's walk [m/s].
-        plant: kind of the engine.
+    ``speed`` is of a run, or of a floating-base robot's walk [m/s].
     """
     free = isinstance(robot, RobotSpec) and robot.free
     world = MujocoOptions() if plant == MujocoOptions.kind else PlantOptions()
@@ -70,14 +61,7 @@ def Subject(robot: Any = "five-link", speed: float | None = None, plant: str = "
 
 
 def Situation(robot: Any, gait: Any, planner: Any, plant: Any = None) -> Any:
-    """A prepared experiment of version 0.1's situation.
-
-    Args:
-        robot: the model.
-        gait: that the planner keeps.
-        planner: of the experiment.
-        plant: its world.
-    """
+    """A prepared experiment of version 0.1's situation, whose planner keeps the gait."""
     return Experiment(robot, planner=planner, world=plant or default_plant()).prepare()
 
 

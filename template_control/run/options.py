@@ -37,7 +37,7 @@ class Push(Checked):
 
 @dataclass(frozen=True)
 class FallOptions(Checked):
-    """When a foot touches the ground, and when a robot counts as fallen.
+    """Limits at which a foot touches the ground, and a robot counts as fallen.
 
     Attributes:
         contact_force: share of the weight that a foot must carry to count as touching. Less is
@@ -58,14 +58,9 @@ class FallOptions(Checked):
 
 
 def check_pushes(pushes: tuple[Push, ...], steps: int) -> None:
-    """Check that a run is long enough for its pushes.
+    """Check that a run of at most ``steps`` is long enough for its pushes.
 
-    Args:
-        pushes: of the run.
-        steps: that it has at most.
-
-    Raises:
-        ParameterError: naming the push that would never come.
+    A ParameterError names the push that would never come.
     """
     for push in pushes:
         if push.step >= steps:
@@ -80,12 +75,12 @@ TurningRate = Annotated[float, Range(-2.0, 2.0)]
 
 @dataclass(frozen=True)
 class HeadingCommand(Checked):
-    """Where a free robot goes, and how wide it steps.
+    """Heading and step width of a free robot.
 
     Attributes:
         turning_rate: of the heading, to the left positive [rad/s].
         turns: times [s] and the turning rate [rad/s] from each of them on; the times rise.
-        step_width: distance aside between left and right footholds [m]; None: the one of the
+        step_width: lateral distance between left and right footholds [m]; None: the one of the
             embedding's options, by the robot's size.
     """
 

@@ -239,7 +239,7 @@ class Record(Facts):
         Dimensions are ``time``, ``section`` and ``tick``, and ``joint``, ``foot``, ``leg``,
         ``axis`` and the like, whose coordinates hold the names. Each variable's
         ``attrs["units"]`` is its SI unit; where entries differ, their names' coordinate has a
-        coordinate of units beside it. ``attrs`` of the set holds the facts of the run that are
+        coordinate of units with it. ``attrs`` of the set holds the facts of the run that are
         numbers or texts.
 
         Raises:
@@ -299,11 +299,7 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 def one_line(error: BaseException) -> str:
-    """An error on one line: its class, unless its text names the culprit, its text and its notes.
-
-    Args:
-        error: of this library, or of the user's own code.
-    """
+    """Error on one line: its class, unless its text names the culprit, its text and its notes."""
     text = str(error)
     if not isinstance(error, TemplateControlError):
         text = f"{type(error).__name__}: {text}" if text else type(error).__name__
@@ -311,22 +307,13 @@ def one_line(error: BaseException) -> str:
 
 
 def keep(error: Exception, record: Record) -> None:
-    """Give an error that ended a run what was recorded until then.
-
-    Args:
-        error: that goes up.
-        record: for :func:`recorded`.
-    """
+    """Give an error that ended a run what was recorded until then, for :func:`recorded`."""
     vars(error)["record"] = record
     error.add_note("What the run had recorded is this error's attribute record.")
 
 
 def recorded(error: BaseException) -> Record | None:
-    """What a run had recorded when an error ended it; None where it had not begun.
-
-    Args:
-        error: that :func:`~.simulation.simulate` has raised; Ctrl-C too.
-    """
+    """Record of a run until an error, or Ctrl-C, ended it; None if it had not begun."""
     record = vars(error).get("record")
     return record if isinstance(record, Record) else None
 
@@ -380,11 +367,11 @@ class FloatingRecord(Record):
 
 
 def _holds(path: str | Path, kind: type[Record]) -> bool:
-    """Whether a file has all fields of a kind of run; False where it cannot be read."""
+    """True if a file has all fields of a kind of run; False if it cannot be read."""
     try:
         with np.load(path, allow_pickle=False) as data:
             return set(data.files) >= set(kind.layout.fields)
-    except Exception:  # a damaged file has any of a dozen; its reader tells
+    except Exception:  # a damaged file has any of a dozen; its reader says which
         return False
 
 

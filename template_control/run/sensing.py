@@ -70,40 +70,24 @@ class SensorOptions(Checked):
 
 
 class Senses(Protocol):
-    """What tells the controller the state, tick by tick."""
+    """Measurement of the controller's state, tick by tick."""
 
     @property
     def exact(self) -> bool:
-        """Whether what is told is the truth."""
+        """True if the controller gets the true state."""
 
     def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Measure a state; the true arrays are left alone.
+        """q, v that the controller gets of the true q (nq,) [m, rad] and v (nv,) [m/s, rad/s].
 
-        Args:
-            q: (nq,) true configuration [m, rad].
-            v: (nv,) true velocity [m/s, rad/s].
-            contact: (2,) whether each foot touches the ground.
-
-        Returns:
-            The q and v that the controller gets.
+        The true arrays are not changed; ``contact`` (2,) says whether each foot touches the ground.
         """
 
     def expect(self, acceleration: Array) -> None:
-        """Hear what the controller expects to happen until the next tick.
-
-        Args:
-            acceleration: (nv,) [m/s^2, rad/s^2].
-        """
+        """Take the acceleration (nv,) that the controller expects until the next tick."""
 
 
 class Sensors:
-    """Measures the state of a robot.
-
-    Args:
-        options: the noise.
-        robot: whose state.
-        template: of the robot.
-    """
+    """Measures the state of a robot, with noise scaled to its template."""
 
     def __init__(self, options: SensorOptions, robot: Biped, template: SlipParameters) -> None:
         self.deviations = options.deviations(Scale.of(template))
@@ -126,11 +110,9 @@ class Sensors:
 
 
 class ForeseeingSensors:
-    """Sensors that tell the state in which the torques of this tick will act.
+    """Sensors that give the state in which the torques of this tick will act.
 
-    Args:
-        sensors: which measure it.
-        delay: that is learnt.
+    ``sensors`` measure it; ``delay`` is learnt.
     """
 
     def __init__(self, sensors: Sensors, delay: DelayCompensation) -> None:
@@ -154,11 +136,8 @@ class ContactSensors:
     """Contact flags and forces of the feet; a share of them is wrong, drawn anew at every tick.
 
     A wrong flag comes with the force that it stands for: a foot that seems to be in the air with
-    none, one that seems to touch with the least that counts, straight up.
-
-    Args:
-        options: share of wrong flags, and the seed.
-        threshold: a foot touches the ground if it carries more than this [N].
+    none, one that seems to touch with the least that counts, straight up. A foot touches the ground
+    if it carries more than the ``threshold`` [N].
     """
 
     def __init__(self, options: SensorOptions | ImuOptions, threshold: float) -> None:
@@ -166,13 +145,9 @@ class ContactSensors:
         self._draws = np.random.default_rng((options.seed, _CONTACT_DRAWS))
 
     def measure(self, forces: Array) -> tuple[NDArray[np.bool_], Array]:
-        """Contact flags and forces as the controller gets them.
+        """Flags (2,) and forces (2, d) as the controller gets them; without errors the true forces.
 
-        Args:
-            forces: (2, d) the ground's force on each foot, up last [N]; left alone.
-
-        Returns:
-            (2,) flags and (2, d) forces; without errors the true forces themselves.
+        ``forces`` (2, d) are the ground's on each foot, up last [N]; they are not changed.
         """
         touching = forces[:, -1] > self._threshold
         if self._errors == 0.0:
@@ -188,9 +163,6 @@ class TorqueDelay:
     """Torques that take effect some ticks after the measurement they were computed from.
 
     Until the first one is due, it is held.
-
-    Args:
-        ticks: how many.
     """
 
     def __init__(self, ticks: int) -> None:
@@ -205,13 +177,7 @@ class TorqueDelay:
 
 
 class FilteredSensors:
-    """Measures as :class:`~template_control.run.sensing.Sensors`, and filters the noise.
-
-    Args:
-        sensors: that measure, with noise.
-        noise_filter: of the robot.
-        time_step: from tick to tick [s].
-    """
+    """Measures as :class:`~template_control.run.sensing.Sensors`, and filters the noise."""
 
     exact = False
 

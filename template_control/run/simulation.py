@@ -45,13 +45,9 @@ _TAKEN: set[int] = set()
 
 @contextmanager
 def exclusive(*parts: Any) -> Iterator[None]:
-    """Keep a run's parts from other runs: each keeps the state of one run at a time.
+    """Keep a run's parts (robot, route, planners) from other runs: each keeps one run's state.
 
-    Args:
-        parts: robot, route and planners.
-
-    Raises:
-        ParameterError: if another run, maybe of another thread, uses one of them.
+    A ParameterError if another run, maybe of another thread, uses one of them.
     """
     keys = {id(part) for part in parts}
     with _LOCK:
@@ -146,10 +142,9 @@ def simulate(experiment: Experiment, progress: Callable[[int], None] | None = No
 
 
 def _check_template(robot: Biped, given: SlipParameters) -> None:
-    """Check that a route's template is one of this robot.
+    """Check that a route's template is one of this robot; a ParameterError names both if not.
 
-    Raises:
-        ParameterError: naming both templates, if its mass, gravity or rest length is another.
+    Mass, gravity and rest length are compared.
     """
     own = template_for(robot)
     for name in ("mass", "gravity", "rest_length"):
@@ -165,11 +160,7 @@ def _told(p: SlipParameters) -> str:
 
 
 def _backend(robot: Biped) -> RobotBackend:
-    """How the robot is run.
-
-    Raises:
-        ParameterError: if it is neither planar nor free.
-    """
+    """Parts of a run that depend on the robot's base; a ParameterError if it is of neither kind."""
     if isinstance(robot, PlanarBiped):
         return PlanarBackend(robot)
     if isinstance(robot, FloatingBaseBiped):
@@ -190,11 +181,7 @@ def _controller(backend: RobotBackend, o: PreparedExperiment) -> EmbeddingContro
 
 
 def _last_step(controller: EmbeddingController, o: PreparedExperiment) -> float:
-    """How many steps the run has at most.
-
-    Raises:
-        ParameterError: if a push comes after the last of them.
-    """
+    """Number of steps that the run has at most; a ParameterError if a push comes after the last."""
     if o.steps is not None:
         return o.steps  # the options have looked at the pushes
     if not controller.supervisor.route.endless:

@@ -41,12 +41,12 @@ _RUN = 3.0 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length))
 
 @dataclass(frozen=True)
 class GaitSpec(Checked):
-    """Which gait of the robot's template.
+    """Specification of a gait of the robot's template.
 
     Attributes:
         name: "walk", the robot's own; "paper", the equilibrium of Section IV-D; or "run".
-        speed: of a walk the mean forward speed, instead of its own; of a run dx/dt at apex
-            [m/s]; None: 3 m/s for l0 = 1 m.
+        speed: of a walk the mean forward speed, instead of its own; of a run dx/dt at apex [m/s];
+            None: 3 m/s for l0 = 1 m.
         touchdown_angle: of a walk, from the ground to the leg, instead of its own [deg].
         apex_height: of a run [m]; None: one that suits its speed.
         from_stand: of a walk, whether the robot stands for 2 s first.
@@ -163,4 +163,4 @@ class OwnPlanner(Checked):
 
 
 PlannerSpec = LqrOptions | AheadOptions | ModifiedOptions | RunningOptions | OwnPlanner
-"""Which planner, with its tuning."""
+"""A planner with its tuning."""

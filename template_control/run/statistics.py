@@ -18,13 +18,7 @@ _AT_LIMIT = 0.999  # of a torque's limit: the solver comes no nearer
 
 @dataclass(frozen=True)
 class JointTorque:
-    """Torque of a joint [N m].
-
-    Attributes:
-        peak: largest size.
-        rms: root mean square.
-        limit: of the URDF.
-    """
+    """Torque of a joint [N m]: largest size, root mean square, and limit of the URDF."""
 
     peak: float
     rms: float
@@ -33,12 +27,7 @@ class JointTorque:
 
 @dataclass(frozen=True)
 class JointSpeed:
-    """Speed of a joint [rad/s].
-
-    Attributes:
-        peak: largest size.
-        limit: of the URDF.
-    """
+    """Speed of a joint [rad/s]: largest size, and limit of the URDF."""
 
     peak: float
     limit: float
@@ -46,12 +35,7 @@ class JointSpeed:
 
 @dataclass(frozen=True)
 class JointAngle:
-    """Angle of a joint [rad].
-
-    Attributes:
-        least, most: of the run.
-        lower, upper: of the URDF.
-    """
+    """Angle of a joint [rad]: ``least``, ``most`` of the run, ``lower``, ``upper`` of the URDF."""
 
     least: float
     most: float
@@ -61,11 +45,7 @@ class JointAngle:
 
 @dataclass(frozen=True)
 class PlanarError:
-    """Template less robot [m].
-
-    Attributes:
-        x, y: of the CoM.
-    """
+    """Template less robot, x and y of the CoM [m]."""
 
     x: float
     y: float
@@ -142,11 +122,9 @@ class Counts(NamedTuple):
 
 
 def count(block: Mapping[str, Array], torque_limit: Array) -> Counts:
-    """Counts over the rows of a block.
+    """Counts over the rows of a block, columns of the record by name.
 
-    Args:
-        block: columns of the record by name.
-        torque_limit: (nu,) [N m].
+    ``torque_limit`` (nu,) is in N m.
     """
     torque, nu = block["torque"], len(torque_limit)
     angle, speed = block["q"][:, -nu:], block["v"][:, -nu:]
@@ -180,12 +158,9 @@ def _together(counted: list[Counts]) -> Counts:
 
 
 def statistics(counted: list[Counts], robot: Biped, torque_limit: Array) -> Statistics:
-    """Statistics of a run.
+    """Statistics of a run from the counts of its blocks, one at least.
 
-    Args:
-        counted: of its blocks, one at least.
-        robot: that ran.
-        torque_limit: (nu,) that its controller had [N m].
+    ``torque_limit`` (nu,) are those that its controller had [N m].
     """
     found = _together(counted)
     ticks = max(int(found.ticks.sum()), 1)

@@ -63,11 +63,7 @@ def _sections(record: Record) -> dict[str, Any]:
 
 
 def completed_strides(record: Record) -> dict[str, int]:
-    """How many strides of each kind a run completed, the kinds in words.
-
-    Args:
-        record: the run.
-    """
+    """Number of completed strides of each kind, the kinds in words."""
     kinds = Counter(record.kinds_of_stride[:-1])
     names = STRIDES | OTHERS
     return {names.get(kind, kind): count for kind, count in kinds.items()}
@@ -99,7 +95,7 @@ def _speed_error(record: Record) -> float | None:
 
 
 def _accepted(record: Record) -> dict[str, Any]:
-    """Where the planner took another speed for the wanted one, and how well that was kept."""
+    """Strides whose planner took another speed for the wanted one, and errors from that speed."""
     accepted = record.section_accepted[:-1]
     off = np.abs(accepted - record.section_target[:-1, 0])
     error = record.section_state[1:, 0] - accepted
@@ -111,7 +107,7 @@ def _accepted(record: Record) -> dict[str, Any]:
 
 
 def _nearest(record: Record) -> dict[str, float]:
-    """Strides that were planned to end at another speed than the wanted one, and how far off.
+    """Strides that were planned to end at another speed than the wanted one, and the largest error.
 
     That is where the wanted speed is further away than a stride can lead.
     """
@@ -157,7 +153,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         plan_seconds (median, p99), real_time_factor, steps_not_nominal (plans that left the
         planner's own law),
         joint_angle (per joint least and most, and the range's lower and upper [rad]), record; of a
-        floating-base run also what :func:`~floating_summary` tells.
+        floating-base run also the entries of :func:`~floating_summary`.
     """
     duration = record.duration
     counted: dict[str, Any] = asdict(record.summary)
@@ -197,14 +193,10 @@ _ANGLES = ("roll", "pitch", "yaw")
 def floating_summary(record: FloatingRecord) -> dict[str, Any]:
     """Summary figures of a floating-base run: attitude, heading, step width.
 
-    Args:
-        record: the run.
-
-    Returns:
-        attitude_rms and attitude_max (roll, pitch, yaw in the heading frame [rad]), turned
-        (of the heading [rad]), mean_yaw_drift (of the trunk's mean yaw in the heading frame, from
-        the first to the last quarter of the run, over 100 steps [rad]), step_width (mean, standard
-        deviation, least [m]; None without a double stance).
+    attitude_rms and attitude_max (roll, pitch, yaw in the heading frame [rad]), turned (of the
+    heading [rad]), mean_yaw_drift (of the trunk's mean yaw in the heading frame, from the first to
+    the last quarter of the run, over 100 steps [rad]), step_width (mean, standard deviation, least
+    [m]; None without a double stance).
     """
     angles = record.attitude
     rms, most = np.sqrt(np.mean(angles**2, axis=0)), np.abs(angles).max(axis=0)
@@ -227,11 +219,7 @@ def floating_summary(record: FloatingRecord) -> dict[str, Any]:
 
 
 def step_widths(record: FloatingRecord) -> Array:
-    """(n,) distance aside between the feet in each double stance, left less right [m].
-
-    Args:
-        record: the run.
-    """
+    """(n,) lateral distance between the feet in each double stance, left less right [m]."""
     begun = np.flatnonzero(np.diff(record.in_phase(Phase.DS).astype(np.int8)) == 1) + 1
     apart = record.space_foot[begun, 0, :2] - record.space_foot[begun, 1, :2]
     angle = record.heading[begun]

@@ -66,12 +66,7 @@ _BY_TICK = ("tick_seconds", "solve_seconds")
 
 
 class Column(NamedTuple):
-    """One quantity of a run.
-
-    Attributes:
-        values: (T,) one at each sample.
-        unit: in SI; "" for a number without one.
-    """
+    """One quantity of a run: (T,) values at each sample, and their SI unit, "" without one."""
 
     values: NDArray[Any]
     unit: str
@@ -134,14 +129,7 @@ def columns(record: Any) -> dict[str, Column]:
 
 
 def to_dataframe(record: Any) -> Any:
-    """A run as a pandas ``DataFrame``, see :meth:`.record.Record.to_dataframe`.
-
-    Args:
-        record: the run, as for :func:`columns`.
-
-    Raises:
-        MissingPackageError: if pandas is not installed.
-    """
+    """A run as a pandas ``DataFrame``, see :meth:`.record.Record.to_dataframe`."""
     try:
         import pandas
     except ImportError:
@@ -155,14 +143,7 @@ def to_dataframe(record: Any) -> Any:
 
 
 def to_xarray(record: Any) -> Any:
-    """A run as an xarray ``Dataset``, see :meth:`.record.Record.to_xarray`.
-
-    Args:
-        record: the run, as for :func:`columns`.
-
-    Raises:
-        MissingPackageError: if xarray is not installed.
-    """
+    """A run as an xarray ``Dataset``, see :meth:`.record.Record.to_xarray`."""
     try:
         import xarray
     except ImportError:
