@@ -42,7 +42,7 @@ def bar(console: Console, note: str = "", **options: Any) -> Progress:
 
     ``note`` is rich's format of a text after the count, such as ``{task.fields[failed]} failed``.
     """
-    # Here, because whoever only asks for help should not wait for it.
+    # Here, so that nobody who only asks for help waits for it.
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -74,8 +74,8 @@ def counted(items: Iterable[T], total: int, text: str) -> Iterator[T]:
 def progress_bar(text: str, total: float | None) -> Iterator[Callable[[float], None]]:
     """Progress bar on standard error for as long as a ``with`` block lasts.
 
-    Yields:
-        The function that sets how much of ``total`` is done; ``total`` is None where nobody knows.
+    It gives the function that sets how much of ``total`` is done; None where the total is not
+    known.
     """
     with bar(plain_console(stderr=True)) as progress:
         task = progress.add_task(text, total=total)

@@ -48,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw and print as told; returns 0."""
+    """Draw and print as the options say; returns 0."""
     files, figure = Files(), None
     if not options.no_figure:
         _check(options.output)
@@ -72,13 +72,7 @@ def _print(figure: Path | None) -> None:
 def save(automaton: Automaton, path: Path) -> Path:
     """Draw an automaton into a file; folders on the way to it are made.
 
-    Args:
-        automaton: what to draw.
-        path: of the file, which ends in .png, .svg or .pdf.
-
-    Raises:
-        ParameterError: if the suffix is none of these.
-        RecordError: if the file cannot be written.
+    A ParameterError if the suffix is none of .png, .svg and .pdf.
     """
     _check(path)
     return save_figure(automaton_figure(automaton), path, dpi=100)
@@ -99,10 +93,8 @@ def _check(path: Path) -> None:
 def describe(automaton: Automaton) -> dict[str, Any]:
     """The whole automaton in JSON's types: its nodes in order, each with its edges in order.
 
-    ``starts`` names the first node of each kind of stride.
-
-    Phases, slots, events, resets and outcomes go by their names in
-    ``vocabulary``. An edge has either a ``target`` or a ``failure``.
+    ``starts`` names the first node of each kind of stride. Phases, slots, events, resets and
+    outcomes go by their names in ``vocabulary``. An edge has either a ``target`` or a ``failure``.
     """
     return {
         "starts": dict(automaton.starts),

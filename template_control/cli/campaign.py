@@ -1,4 +1,4 @@
-"""``template-control campaign``: how sure a gait is, with everything disturbed at once."""
+"""``template-control campaign``: robustness of a gait with everything disturbed at once."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the trials as told; returns 0, or 130 after Ctrl-C.
+    """Run the trials as the options say; returns 0, or 130 after Ctrl-C.
 
     Raises:
         TemplateControlError: naming the option that is wrong.
@@ -129,16 +129,11 @@ def _save_mix(mix: DisturbanceDistribution, folder: Path) -> Path:
 
 
 def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:
-    """The campaign as plain data.
+    """The campaign as plain data; ``falls`` are the files of the trials that went wrong, by number.
 
-    Args:
-        found: the campaign.
-        falls: the file of each trial that went wrong, by number.
-
-    Returns:
-        robot, gait, plant, trials, mix; fell and astray (count, share, and low and high of its
-        95 % interval); reasons (count by what went wrong first); wrong: number, fell, reason,
-        first, speed_error, severity, config.
+    robot, gait, plant, trials, mix; fell and astray (count, share, and low and high of its 95 %
+    interval); reasons (count by what went wrong first); wrong: number, fell, reason, first,
+    speed_error, severity, config.
     """
     conditions = found.conditions
     table = settings.to_table(conditions.experiment.resolved())

@@ -29,12 +29,7 @@ _LONG, _THIN = 200, 5  # steps beyond which by default every 5th sample is kept
 
 
 def add_flags(parser: argparse.ArgumentParser, flags: Sequence[Flag]) -> None:
-    """Add ``--config``, flags, and one for every key.
-
-    Args:
-        parser: of the command.
-        flags: some of ``ALL``.
-    """
+    """Add ``--config``, flags (some of ``ALL``), and one for every key."""
     parser.add_argument(
         "--config",
         type=values.path,
@@ -68,14 +63,9 @@ class _Key(argparse.Action):
 
 
 def experiment_from(options: argparse.Namespace, default: Experiment) -> Experiment:
-    """The experiment that was asked for.
+    """The experiment that was asked for; ``default`` holds where no option or file says otherwise.
 
-    Args:
-        options: as parsed.
-        default: what holds where neither an option nor a file says otherwise.
-
-    Raises:
-        TemplateControlError: naming the option or the key that is wrong.
+    A TemplateControlError names the option or the key that is wrong.
     """
     base = default if options.config is None else Experiment.load(options.config)
     given: dict[str, Any] = {}
@@ -107,7 +97,7 @@ def _check_motion(base: Experiment, options: argparse.Namespace, given: dict[str
 
 
 def _complete(base: Experiment, options: argparse.Namespace, given: dict[str, Any]) -> None:
-    """Set what a flag means besides its own key, which depends on the rest of the experiment."""
+    """Set a flag's further keys, which depend on the rest of the experiment."""
     if not isinstance(base.world, PlantOptions):
         given.pop("world.friction", None)  # the ideal world has none
     elif "world.terrain" in given:

@@ -184,8 +184,7 @@ def run(options: argparse.Namespace) -> int:
 def _wanted(options: argparse.Namespace) -> _Wanted | None:
     """The branch that was asked for; None for the family by speed.
 
-    Raises:
-        ParameterError: naming the option that is out of its range or does not fit another.
+    A ParameterError names the option that is out of its range or does not fit another.
     """
     if options.family:
         idle = [n for n in ("fix", "controlled", "start", "limits") if getattr(options, n)]
@@ -267,11 +266,7 @@ def _si(name: str, value: float) -> float:
 
 
 def _quantities(option: str, pairs: list[str] | None) -> dict[str, float]:
-    """``QUANTITY=VALUE`` strings as numbers, the angle in degrees.
-
-    Raises:
-        ParameterError: naming what is no quantity or no number.
-    """
+    """``QUANTITY=VALUE`` as numbers, the angle in degrees; a ParameterError names a bad one."""
     found = typed.entries(option, pairs or [], "QUANTITY=VALUE, such as height=0.98")
     for name in found:
         if name not in QUANTITIES:
@@ -337,15 +332,9 @@ _TABLE_STEP = 0.1  # [m/s]
 
 
 def make_family(folder: Path | None, as_json: bool, effort: SearchEffort) -> int:
-    """Search the family, write ``walking.json`` and its figure, print a table.
+    """Search the family, write ``walking.json`` and its figure, print a table; the exit status.
 
-    Args:
-        folder: for the files; None: none is written.
-        as_json: print the family instead of the table.
-        effort: how to search.
-
-    Returns:
-        The exit status.
+    Without a folder no file is written; ``as_json`` prints the family instead of the table.
     """
     weights, files = FamilyCost(), Files()
     chains = search_family(weights, effort, lambda text: print(text, file=sys.stderr))

@@ -28,10 +28,7 @@ _FROM_THE_RUN = (
 def summarise_route(record: Record, template: ScenarioRecord, path: str | None) -> dict[str, Any]:
     """Figures of a robot's way through a scenario, and of its template's, SI units.
 
-    Args:
-        record: the robot's run.
-        template: the same scenario on the robot's template.
-        path: where the run was saved; None if it was not.
+    ``template`` is the record of the same scenario on the robot's template.
     """
     run = summarise(record, path)
     error = template.section_state[1:, 0] - template.wanted_speed
@@ -53,11 +50,7 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
 
 
 def print_route_table(figures: dict[str, Any]) -> None:
-    """The figures as a table on standard output.
-
-    Args:
-        figures: of :func:`summarise_route`.
-    """
+    """The figures of :func:`summarise_route` as a table on standard output."""
     table = Table(title=f"{figures['robot']} and its template")
     for name in ("", "robot", "template"):
         table.add_column(name, justify="right" if name else "left")

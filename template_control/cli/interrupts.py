@@ -1,4 +1,4 @@
-"""What Ctrl-C, SIGTERM and the end of the terminal do to a command."""
+"""Effect of Ctrl-C, SIGTERM and the end of the terminal on a command."""
 
 from __future__ import annotations
 
@@ -20,16 +20,12 @@ _RECEIVED: list[int] = []  # signals that stopped the command
 
 
 def stopped() -> bool:
-    """Whether a signal has stopped the command."""
+    """True if a signal has stopped the command."""
     return bool(_RECEIVED)
 
 
 def on_signals(handler: Callable[[int, FrameType | None], None]) -> None:
-    """What Ctrl-C does, SIGTERM does too, and the end of the terminal; not what nohup ignores.
-
-    Args:
-        handler: of this module.
-    """
+    """Set the handler of Ctrl-C, SIGTERM and the end of the terminal; not of what nohup ignores."""
     if threading.current_thread() is not threading.main_thread():
         return
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -38,23 +34,13 @@ def on_signals(handler: Callable[[int, FrameType | None], None]) -> None:
 
 
 def end_at_once(number: int, frame: FrameType | None) -> None:
-    """While a command is imported, which Ctrl-C cannot end well.
-
-    Args:
-        number: the signal's.
-        frame: where it came.
-    """
+    """Handler while a command is imported, which Ctrl-C cannot end well."""
     os.write(_STDERR, b"template-control: interrupted before anything was done\n")
     os._exit(INTERRUPTED)
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """While a command runs: it keeps what it has done.
-
-    Args:
-        number: the signal's.
-        frame: where it came.
-    """
+    """Handler while a command runs: it keeps what it has done."""
     # A process that was just forked still has the handler, but is not the command.
     if os.getpid() == _PROCESS:
         _RECEIVED.append(number)
@@ -62,20 +48,15 @@ def interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def end_quietly(number: int, frame: FrameType | None) -> None:
-    """When all is written and told.
-
-    Args:
-        number: the signal's.
-        frame: where it came.
-    """
+    """Handler when all is written and printed."""
     os._exit(INTERRUPTED)
 
 
 def insist() -> None:
-    """An interrupt that Python swallows comes again.
+    """Send an interrupt that Python swallows once more.
 
-    Python goes on after an exception in a callback of C code, in a finaliser or beside a fork. A
-    signal that arrives while LLVM compiles, for one, is handled in its next callback.
+    Python goes on after an exception in a callback of C code, in a finaliser or at a fork. A signal
+    that arrives while LLVM compiles, for one, is handled in its next callback.
     """
     before = sys.unraisablehook
 

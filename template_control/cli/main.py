@@ -26,12 +26,10 @@ from template_control.errors import ParameterError, TemplateControlError
 
 
 class _Command(NamedTuple):
-    """A command of the command line.
+    """A command of the command line, with one line about it.
 
-    Attributes:
-        module: where its ``add_options(parser)`` and its ``run(options)`` are; after a colon the
-            object of the module that has them.
-        about: one line.
+    ``module`` has its ``add_options(parser)`` and its ``run(options)``; after a colon it names the
+    object of the module that has them.
     """
 
     module: str
@@ -116,23 +114,14 @@ class _Parser(argparse.ArgumentParser):
     """
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """As :meth:`argparse.ArgumentParser.parse_known_args`.
-
-        Args:
-            args: the words; None: of the process.
-            namespace: to fill.
-        """
+        """As :meth:`argparse.ArgumentParser.parse_known_args`."""
         return super().parse_known_args(_with_values(args), namespace)
 
     def error(self, message: str) -> NoReturn:
-        """Refuse the words in one line.
+        """Refuse the words in one line, as a ParameterError.
 
-        Args:
-            message: of argparse, or of a type of :mod:`~template_control.checks.option_types`,
-                whose words follow the option's name.
-
-        Raises:
-            ParameterError: always.
+        ``message`` is argparse's, or that of a type of
+        :mod:`~template_control.checks.option_types`, whose words follow the option's name.
         """
         option, ours, reason = re.sub(r"^argument (\S+): ", r"\1: ", message).partition(": is ")
         if ours:
@@ -179,11 +168,8 @@ def _with_values(arguments: Sequence[str] | None) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit status.
 
-    A user's mistake is told in one line, status 2; Ctrl-C is status 130, and so is SIGTERM or a
-    terminal that was closed.
-
-    Args:
-        arguments: the command's words; None for those of this process, which then ends with it.
+    A user's mistake is one line, status 2; Ctrl-C is status 130, and so is SIGTERM or a terminal
+    that was closed. ``arguments`` None are those of this process, which then ends with it.
     """
     if arguments is not None:
         return _command(arguments)

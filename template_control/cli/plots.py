@@ -78,11 +78,7 @@ def draw(
 ) -> list[Path]:
     """Draw a run's figures as the options say; returns their files.
 
-    Args:
-        options: as parsed.
-        record: the run.
-        folder: for the files.
-        template: the same scenario on the robot's template, of a run that has one.
+    ``template`` is the same scenario on the robot's template, of a run that has one.
     """
     look = Look(options.start, options.end, not options.no_title)
     drawn = {"dpi": options.dpi, "look": look, "file_format": options.format}

@@ -27,12 +27,7 @@ from template_control.terminal import Table, plain_console, progress_bar
 
 
 def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
-    """Add ``--output``, ``--json``, and which figures are drawn.
-
-    Args:
-        parser: of the command.
-        folder: where runs go if nothing else is said.
-    """
+    """Add ``--output`` (by default ``folder``), ``--json``, and which figures are drawn."""
     parser.add_argument(
         "--output",
         type=values.path,
@@ -49,16 +44,9 @@ def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
 
 @contextmanager
 def output_folder(folder: Path) -> Iterator[Path]:
-    """Keep a folder for a run; says on stderr if a run in it will be replaced.
+    """Keep a folder for a run, see :func:`~template_control.storage.writing`.
 
-    Args:
-        folder: as asked for.
-
-    Yields:
-        The folder; see :func:`~template_control.storage.writing`.
-
-    Raises:
-        RecordError: if nothing can be written there, or another command writes there now.
+    Says on stderr if a run in it will be replaced.
     """
     with writing(folder):
         if (folder / "run.npz").exists():
@@ -71,24 +59,17 @@ def output_folder(folder: Path) -> Iterator[Path]:
 
 @dataclass(frozen=True)
 class Kept:
-    """A run, and where it is.
-
-    Attributes:
-        record: the run.
-        path: of its file; None if that could not be written.
-        files: that were written, or not.
-    """
+    """A run, its files, and the path of its own file; None if that could not be written."""
 
     record: Record
     path: str | None
     files: Files
 
     def interrupted(self) -> bool:
-        """Say what became of the files, once the table is printed; whether Ctrl-C ended the run.
+        """True if Ctrl-C ended the run; reports on the files, once the table is printed.
 
-        Raises:
-            TemplateControlError: if a file could not be written.
-            KeyboardInterrupt: if Ctrl-C came while files were written.
+        A TemplateControlError if a file could not be written, a KeyboardInterrupt if Ctrl-C came
+        while files were written.
         """
         self.files.raise_pending()
         if not self.record.interrupted:
@@ -108,16 +89,11 @@ def run_and_keep(
 ) -> Kept:
     """Do a run; write it, what repeats it, and its figures.
 
-    Args:
-        options: as parsed: where it is kept.
-        experiment: as it is written.
-        prepared: the same, as it is run.
-        doing: what the progress bar says.
-        template: the same scenario on the robot's template, kept and drawn with the run.
-
-    Raises:
-        TemplateControlError: if a part of the user's own fails, or answers with nonsense; what was
-            recorded until then is kept, and its traceback is printed if it is another error.
+    ``experiment`` is as it is written, ``prepared`` the same as it is run; ``doing`` is shown by
+    the progress bar. ``template`` is the same scenario on the robot's template, kept and drawn with
+    the run. If a part of the user's own fails, or answers with nonsense, that goes up as a
+    TemplateControlError; what was recorded until then is kept, and the traceback of any other error
+    is printed.
     """
     files = Files()
     ends = isinstance(prepared.planner, Mapping)  # of a route; a gait is kept for ever
@@ -164,13 +140,10 @@ def _failures_told() -> Iterator[None]:
 
 
 def _give_up(error: Exception, experiment: Experiment, folder: Path) -> NoReturn:
-    """Keep what a run had recorded when an error ended it, and tell the error.
+    """Keep what a run had recorded when an error ended it, and raise the error.
 
-    Args:
-        error: that is being handled. Of one that is not this library's the traceback is printed:
-            it leads into the user's own code.
-        experiment: that was run.
-        folder: for its files.
+    Of an error that is not this library's the traceback is printed: it leads into the user's own
+    code.
     """
     record, files = recorded(error), Files()
     line = one_line(error) if record is None else record.error
@@ -190,11 +163,7 @@ _MEAN = 50  # strides at most whose section states the summary averages
 
 
 def print_table(figures: dict[str, Any]) -> None:
-    """The summary as a table on standard output.
-
-    Args:
-        figures: of the run, from :func:`~template_control.run.summary.summarise`.
-    """
+    """The summary, from :func:`~template_control.run.summary.summarise`, as a table on stdout."""
     table = Table(title=f"{figures['robot']}, gait {figures['gait']}", show_header=False)
     table.add_column()
     table.add_column(justify="right")
@@ -272,12 +241,7 @@ def print_table(figures: dict[str, Any]) -> None:
 
 
 def floating_rows(figures: dict[str, Any], row: Callable[[str, str], None]) -> None:
-    """The rows of a robot that nothing holds.
-
-    Args:
-        figures: of the run.
-        row: adds one.
-    """
+    """The rows of a robot that nothing holds; ``row`` adds one."""
     rms, most = figures["attitude_rms"], figures["attitude_max"]
     for angle in rms:
         row(f"{angle}, RMS / max", f"{rms[angle]:.4f} / {most[angle]:.4f} rad")
@@ -299,30 +263,18 @@ def floating_rows(figures: dict[str, Any], row: Callable[[str, str], None]) -> N
 
 
 def speed_text(speed: dict[str, float]) -> str:
-    """Peak speed of a joint and its limit, marked where it was exceeded.
-
-    Args:
-        speed: an entry of ``joint_speed`` of a summary.
-    """
+    """Peak speed of a joint and its limit (of a summary), marked where it was exceeded."""
     peak, limit = speed["peak"], speed["limit"]
     return f"{peak:.3g} of {limit:g} rad/s" + past_limit(peak > limit)
 
 
 def past_limit(past: bool) -> str:
-    """The mark of a figure that is past its limit.
-
-    Args:
-        past: whether it is.
-    """
+    """The mark of a figure that is past its limit."""
     return ", past its limit" if past else ""
 
 
 def failures_text(figures: dict[str, Any]) -> str:
-    """In how many ticks the QP had no solution, and what many of them mean.
-
-    Args:
-        figures: of the run.
-    """
+    """Number and share of ticks without a solution of the QP, and what many of them mean."""
     count, share = figures["qp_failures"], figures["qp_failed_share"]
     if not count:
         return "0"
@@ -331,11 +283,7 @@ def failures_text(figures: dict[str, Any]) -> str:
 
 
 def nearest_text(nearest: dict[str, float]) -> str:
-    """Where the wanted speed was out of a stride's reach.
-
-    Args:
-        nearest: ``nearest_speed_taken`` of a summary.
-    """
+    """Number of strides whose wanted speed was out of reach, and the largest difference."""
     return f"{nearest['strides']} times, {nearest['most']:.2f} m/s off"
 
 

@@ -75,7 +75,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure as told; returns 0, or 130 after Ctrl-C."""
+    """Measure as the options say; returns 0, or 130 after Ctrl-C."""
     experiment = experiment_from(options, Experiment())
     where = experiment.prepare()  # before a folder is made for it
     with writing(folder_of(options, experiment, "runs/robustness", where.robot.name)) as folder:
@@ -104,11 +104,10 @@ def _measure(options: argparse.Namespace, experiment: Experiment, folder: Path) 
 def data(found: Robustness) -> dict[str, Any]:
     """The findings as plain data; levels and breaking points in SI units.
 
-    Returns:
-        robot, plant, gait (mean_speed, and vlo_height or, of a run, apex_height), undisturbed
-        (speed_error, height_error), disturbances: by name trials, breaking_point, half_point,
-        standing_point (null where the mildest level is beyond it), template (its own limit; null
-        without one) and levels (level, success_rate, interval with 95 %, fell, astray).
+    robot, plant, gait (mean_speed, and vlo_height or, of a run, apex_height), undisturbed
+    (speed_error, height_error), disturbances: by name trials, breaking_point, half_point,
+    standing_point (null where the mildest level is beyond it), template (its own limit; null
+    without one) and levels (level, success_rate, interval with 95 %, fell, astray).
     """
     height = "apex_height" if isinstance(found.gait, RunningGait) else "vlo_height"
     return {
@@ -158,7 +157,7 @@ def _row(finding: Finding) -> tuple[str, ...]:
 
 
 def _sure(finding: Finding) -> str:
-    """How many trials of the breaking point's level would succeed, with 95 % confidence."""
+    """Share of trials that would succeed at the breaking point's level, with 95 % confidence."""
     for level in finding.levels:
         if level.level == finding.breaking_point:
             return f"{100 * level.interval[0]:.0f} to {100 * level.interval[1]:.0f} %"

@@ -1,4 +1,4 @@
-"""What the commands that make trials have in common."""
+"""Common parts of the commands that make trials."""
 
 from __future__ import annotations
 
@@ -45,14 +45,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def folder_of(options: argparse.Namespace, experiment: Experiment, root: str, robot: str) -> Path:
-    """The folder for trials: as asked for, or by robot, base, gait and engine.
-
-    Args:
-        options: as parsed.
-        experiment: that is disturbed.
-        root: of the command's folders.
-        robot: its name.
-    """
+    """The folder for trials: as asked for, or in ``root`` by robot, base, gait and engine."""
     parts = [robot]
     if experiment.free:
         parts.append("free")
@@ -65,11 +58,7 @@ def folder_of(options: argparse.Namespace, experiment: Experiment, root: str, ro
 
 
 def kept(folder: Path) -> int:
-    """Say after Ctrl-C where the finished trials are; returns the command's exit status.
-
-    Args:
-        folder: of the trials.
-    """
+    """Say after Ctrl-C where the finished trials are; returns the command's exit status."""
     print(
         f"template-control: interrupted; finished trials are in {folder}, the same command"
         " goes on from there",
@@ -79,14 +68,6 @@ def kept(folder: Path) -> int:
 
 
 def draw(figure: Callable[[], Figure], path: Path) -> Path:
-    """Draw a figure of trials, and write it.
-
-    Args:
-        figure: makes it.
-        path: of the file.
-
-    Raises:
-        RecordError: if the file cannot be written.
-    """
+    """Draw a figure of trials, and write it."""
     with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         return save_figure(figure(), path)

@@ -8,11 +8,7 @@ from template_control.terminal import plain_console
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The command has no options: everything is compiled.
-
-    Args:
-        parser: of the command.
-    """
+    """The command has no options: everything is compiled."""
     parser.description = (
         "Compile all functions of the library and keep their machine code, so that no later"
         " command compiles. Each command compiles what it needs without it, once."
