@@ -188,7 +188,7 @@ def _route(start: Array, end: Array, bend: float, outward: Array) -> Array:
 
 
 def _hides(a: str, b: str, centre: dict[str, Array]) -> bool:
-    """Whether the straight line from ``a`` to ``b`` passes through another node."""
+    """True if the straight line from ``a`` to ``b`` passes through another node."""
     span = centre[b] - centre[a]
     others = np.array([point - centre[a] for name, point in centre.items() if name not in (a, b)])
     if a == b or not others.size:
@@ -313,7 +313,7 @@ def _draw_arrow(axes: Axes, arrow: Array, color: str, width: float, line: str) -
 
 
 def _place(axes: Axes, text: Text, arrow: Array, ink: Array, taken: list[Bbox]) -> None:
-    """Put ``text`` beside ``arrow`` where it covers the least ink and nothing ``taken``."""
+    """Put ``text`` next to ``arrow`` where it covers the least ink and nothing ``taken``."""
     data, page = axes.transData, axes.bbox
     corner = data.inverted().transform(text.get_window_extent().get_points())
     half = 0.5 * (corner[1] - corner[0])

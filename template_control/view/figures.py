@@ -54,9 +54,7 @@ _MOST_POSES = 40
 def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
     """The robot at regular times, with its CoM and the template's path (Fig. 12).
 
-    Args:
-        record: the run.
-        look: of the figure; by default the 2.2 s that show what the run is about.
+    By default the look is of the 2.2 s that show what the run is about.
     """
     w = look.rows(record, WINDOW)
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
@@ -89,12 +87,7 @@ def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
 
 
 def com_tracking(record: Record, look: Look = _LOOK) -> Figure:
-    """CoM x and y against the template (Fig. 13a).
-
-    Args:
-        record: the run.
-        look: of the figure.
-    """
+    """CoM x and y against the template (Fig. 13a)."""
     w = look.rows(record, WINDOW)
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
@@ -129,22 +122,12 @@ def _of_joints(record: Record, values: Array, limits: Array, what: str, look: Lo
 
 
 def joint_torques(record: Record, look: Look = _LOOK) -> Figure:
-    """Joint torques with their limits (Fig. 13b).
-
-    Args:
-        record: the run.
-        look: of the figure.
-    """
+    """Joint torques with their limits (Fig. 13b)."""
     return _of_joints(record, record.torque, record.torque_limit, "torque|N m", look)
 
 
 def joint_speeds(record: Record, look: Look = _LOOK) -> Figure:
-    """Joint speeds with their limits.
-
-    Args:
-        record: the run.
-        look: of the figure.
-    """
+    """Joint speeds with their limits."""
     speed = record.v[:, -len(record.joints) :]
     return _of_joints(record, speed, record.velocity_limit, "speed|rad/s", look)
 
@@ -154,10 +137,6 @@ def ground_forces(record: Record, look: Look = _LOOK) -> Figure:
 
     A landing foot's first sample is its impulse over one physics step. The scale is that of the
     template's forces.
-
-    Args:
-        record: the run.
-        look: of the figure.
     """
     w = look.rows(record, WINDOW)
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
@@ -182,12 +161,8 @@ def ground_forces(record: Record, look: Look = _LOOK) -> Figure:
 def apex_return(record: Record, look: Look = _LOOK) -> Figure:
     """Each apex against the one before it, in speed and in height; the run has two at least.
 
-    A gait that holds ends on the diagonal, at the target. A pair of points on either side of it
-    is a limp: the state alternates from step to step.
-
-    Args:
-        record: the run.
-        look: of the figure.
+    A gait that holds ends on the diagonal, at the target. A pair of points on either side of it is
+    a limp: the state alternates from step to step.
     """
     apex = record.section == record.sections.index(Event.APEX.name)
     follows = apex[:-1] & apex[1:]
@@ -229,10 +204,6 @@ def turning(record: Record, look: Look = _LOOK) -> Figure:
     """Pitch of the trunk, and angular momentum about the CoM.
 
     In flight the angular momentum keeps its value: the trunk turns against the legs.
-
-    Args:
-        record: the run.
-        look: of the figure.
     """
     rows = (
         (np.degrees(record.q[:, 2]), "trunk pitch [deg]", TRUNK),
@@ -243,12 +214,7 @@ def turning(record: Record, look: Look = _LOOK) -> Figure:
 
 
 def attitude(record: FloatingRecord, look: Look = _LOOK) -> Figure:
-    """Roll, pitch and yaw of the trunk in the heading frame.
-
-    Args:
-        record: the run.
-        look: of the figure.
-    """
+    """Roll, pitch and yaw of the trunk in the heading frame."""
     angles = np.degrees(record.attitude)
     rows = [
         (angles[:, i], f"{name} [deg]", TRUNK) for i, name in enumerate(("roll", "pitch", "yaw"))
@@ -257,14 +223,14 @@ def attitude(record: FloatingRecord, look: Look = _LOOK) -> Figure:
 
 
 def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
-    """Where and when a foot stood.
+    """Footholds of one foot, in the middle of each stance.
 
     Args:
         record: the run.
         foot: its index.
 
     Returns:
-        (n, 2) x and y in the world in the middle of each stance [m]; (n,) times [s].
+        (n, 2) x and y in the world [m]; (n,) times [s].
     """
     stands = record.space_force[:, foot, 2] > 0.02 * record.weight
     edges = np.flatnonzero(np.diff(np.concatenate(([0], stands.astype(np.int8), [0]))))
@@ -274,12 +240,7 @@ def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
 
 
 def from_above(record: FloatingRecord, look: Look = _LOOK) -> Figure:
-    """The CoM's path from above with the footholds.
-
-    Args:
-        record: the run.
-        look: of the figure.
-    """
+    """The CoM's path from above with the footholds."""
     w = look.rows(record)
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     axes = figure.subplots()
@@ -295,12 +256,7 @@ def from_above(record: FloatingRecord, look: Look = _LOOK) -> Figure:
 
 
 def lateral_portrait(record: FloatingRecord, look: Look = _LOOK) -> Figure:
-    """Sway over its rate in single stance, from the foot that stands: left and right mirrored.
-
-    Args:
-        record: the run.
-        look: of the figure.
-    """
+    """Sway over its rate in single stance, from the foot that stands: left and right mirrored."""
     w = look.rows(record)
     figure = Figure(figsize=(6.0, 5.0), layout="constrained")
     axes = figure.subplots()
@@ -334,17 +290,13 @@ FREE_FIGURES: dict[str, Draw] = {
     "lateral_portrait": lateral_portrait,
     "attitude": attitude,
 }
-"""What only a floating-base run has, by file name."""
+"""Figures that only a floating-base run has, by file name."""
 
 _PLANAR_ONLY = ("energies", "turning", "apex_return")
 
 
 def figures_of(record: Record) -> dict[str, Draw]:
-    """The figures that have something to show of a run: apexes need two that follow each other.
-
-    Args:
-        record: the run.
-    """
+    """The figures that have something to show of a run: apexes need two that follow each other."""
     if isinstance(record, FloatingRecord):
         shared = {name: draw for name, draw in FIGURES.items() if name not in _PLANAR_ONLY}
         return {**shared, **FREE_FIGURES}
@@ -357,9 +309,7 @@ def figures_of(record: Record) -> dict[str, Draw]:
 def _chosen(record: Record, names: Sequence[str] | None) -> dict[str, Draw]:
     """Figures of a run by name.
 
-    Raises:
-        ParameterError: if there is no figure of a name.
-        RecordError: if the run cannot be shown.
+    A ParameterError if there is no figure of a name, a RecordError if the run cannot be shown.
     """
     record.check_shown()
     known = figures_of(record)

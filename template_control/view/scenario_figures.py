@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 _LOOK = Look()
 _WHOLE = slice(None)
 ROUTE_FIGURES = ("scenario", "transitions")
-"""What a way through a scenario has in addition, by file name."""
+"""File names of a scenario's further figures."""
 _AROUND = 1.2  # [s] shown on either side of a transition
 
 
@@ -179,7 +179,7 @@ def _stiffnesses(record: Record) -> Array:
 
 
 def _template_begins(record: Record) -> tuple[float, float]:
-    """When [s] and where [m] the robot comes to the first stride that the template makes, too."""
+    """Time [s] and place [m] of the robot's first stride that the template makes, too."""
     kinds = record.kinds_of_stride
     first = next((i for i, kind in enumerate(kinds) if kind not in STANDING), 0)
     if first == 0:
@@ -191,12 +191,8 @@ def _template_begins(record: Record) -> tuple[float, float]:
 def route_figure(record: Record, template: ScenarioRecord, look: Look = _LOOK) -> Figure:
     """Speed, path of the CoM with footholds, leg stiffnesses and torques.
 
-    Where the robot stands first, the template begins when the robot has walked off.
-
-    Args:
-        record: the robot's run.
-        template: the same scenario on the robot's template.
-        look: of the figure.
+    ``template`` is the same scenario on the robot's template; where the robot stands first, it
+    begins when the robot has walked off.
     """
     figure = Figure(figsize=(9.0, 9.6), layout="constrained")
     panels = speed, path, stiffness, torque = figure.subplots(4, 1)
@@ -257,9 +253,7 @@ def _transitions(record: Record | ScenarioRecord) -> list[tuple[float, float, st
 def transition_energies(record: Record, look: Look = _LOOK) -> Figure:
     """Energies of the robot's CoM and of the template around each transition (Fig. 10c, d).
 
-    Args:
-        record: the run; it has one transition at least.
-        look: of the figure.
+    The run has one transition at least.
     """
     p = record.template
     named = {
@@ -275,10 +269,7 @@ def route_figures(
 ) -> dict[str, Figure]:
     """Figures of a way through a scenario, by name; without transitions there are no energies.
 
-    Args:
-        record: the robot's run.
-        template: the same scenario on the robot's template.
-        look: of the figures.
+    ``template`` is the same scenario on the robot's template.
     """
     figures = {"scenario": route_figure(record, template, look)}
     if _transitions(record):

@@ -170,10 +170,9 @@ def speed_family_figure(
 ) -> Figure:
     """Gaits against their mean speed, one line for each chain of a family.
 
-    Args:
-        quantities: by the axis' label, values of each chain; "mean speed [m/s]" is the horizontal
-            axis of all panels.
-        pairs: by the axis' label and the curve's, values that share a panel.
+    ``quantities`` are by the axis' label, values of each chain; "mean speed [m/s]" is the
+    horizontal axis of all panels. ``pairs`` are by the axis' label and the curve's, values that
+    share a panel.
     """
     x = quantities["mean speed [m/s]"]
     panels = {k: {"": v} for k, v in quantities.items() if k != "mean speed [m/s]"} | dict(pairs)

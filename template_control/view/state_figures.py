@@ -57,12 +57,8 @@ def _broken(values: Array, rear: NDArray[np.int64]) -> Array:
 def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
     """y against dy/dt, and x from the rear stance foot against dx/dt, with every section.
 
-    The whole run is pale, what the look shows is strong. The planner's state has its dx/dt from
-    the angular momentum about the stance foot.
-
-    Args:
-        record: the run.
-        look: of the figure.
+    The whole run is pale, what the look shows is strong. The planner's state has its dx/dt from the
+    angular momentum about the stance foot.
     """
     figure = Figure(figsize=(9.0, 4.4), layout="constrained")
     upright, forward = figure.subplots(1, 2)
@@ -108,12 +104,7 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
 
 
 def tracking_errors(record: Record, look: Look = _LOOK) -> Figure:
-    """CoM errors in x and y, template less robot, over the run.
-
-    Args:
-        record: the run.
-        look: of the figure.
-    """
+    """CoM errors in x and y, template less robot, over the run."""
     w = look.rows(record)
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
@@ -137,13 +128,10 @@ def tracking_errors(record: Record, look: Look = _LOOK) -> Figure:
 
 
 def template_energies(record: Record) -> dict[str, Array]:
-    """The template's energies along the run, each (T,) [J].
+    """The template's energies along the run, each (T,) [J]: kinetic, gravity, spring, total.
 
     A leg's spring energy is F^2 / (2 k) of its recorded force, with the stiffness that the
     automaton gives to the leg in the node and that the planner chose for the step.
-
-    Returns:
-        kinetic, gravity, spring, total.
     """
     p = record.template
     step = np.maximum(np.searchsorted(record.section_time, record.time, side="right") - 1, 0)
@@ -173,12 +161,7 @@ def template_energies(record: Record) -> dict[str, Array]:
 
 
 def energies(record: Record, look: Look = _LOOK) -> Figure:
-    """Energies of the robot's CoM and of the template.
-
-    Args:
-        record: the run.
-        look: of the figure.
-    """
+    """Energies of the robot's CoM and of the template."""
     w = look.rows(record, WINDOW)
     p = record.template
     template = template_energies(record)
@@ -213,12 +196,8 @@ def energies(record: Record, look: Look = _LOOK) -> Figure:
 def section_states(record: Record, look: Look = _LOOK) -> Figure:
     """State and energy at each section against the target's and what the planner expected.
 
-    dx/dt is from the angular momentum where a foot stands. The energy is E = m v^2 / 2 + m g y,
-    at VLO with k0 (l0 - y)^2 / 2, as in Section IV-D.
-
-    Args:
-        record: the run.
-        look: of the figure.
+    dx/dt is from the angular momentum where a foot stands. The energy is E = m v^2 / 2 + m g y, at
+    VLO with k0 (l0 - y)^2 / 2, as in Section IV-D.
     """
     state, expected = record.section_state, record.section_predicted[:-1]
     # What a stride was to end in is the target of the section where it began.

@@ -40,15 +40,9 @@ DPI = 110
 
 
 def moment(value: float | None, default: float, last: float) -> float:
-    """Time that a user gives [s].
+    """Time that a user gives [s], negative from the run's end; None: ``default``.
 
-    Args:
-        value: from the run's beginning, negative from its end; None: ``default``.
-        default: [s].
-        last: end of the run [s].
-
-    Raises:
-        ParameterError: if it is not finite.
+    A ParameterError if it is not finite.
     """
     if value is None:
         return default
@@ -60,15 +54,9 @@ def moment(value: float | None, default: float, last: float) -> float:
 def interval(
     record: Record, start: float | None, end: float | None, default: tuple[float, float]
 ) -> tuple[float, float]:
-    """Part of a run that a user asks for [s].
+    """Part of a run that a user asks for [s], negative from its end; None: the default's.
 
-    Args:
-        record: the run.
-        start, end: of the part [s], negative from the run's end; None: the default's.
-        default: begin and end [s].
-
-    Raises:
-        ParameterError: if nothing lies between them.
+    A ParameterError if nothing lies between its ends.
     """
     first, last = float(record.time[0]), float(record.time[-1])
     begin, stop = moment(start, default[0], last), moment(end, default[1], last)
@@ -82,7 +70,7 @@ def interval(
 
 @dataclass(frozen=True)
 class Look(Checked):
-    """How figures of a run are drawn.
+    """Part of a run that its figures show, and their titles.
 
     Attributes:
         start, end: part of the run [s], negative from its end; None: what each figure shows by
@@ -112,14 +100,10 @@ class Look(Checked):
 
 
 def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:
-    """Part of a run that shows what it is about [s].
+    """Part of a run, ``seconds`` long, that shows what it is about [s].
 
     That is a fall, the first push, the first change of the stride's kind, or the first uneven
     ground; else the end.
-
-    Args:
-        record: the run.
-        seconds: its length [s].
     """
     time, last = record.time, float(record.time[-1])
     pushed = np.flatnonzero(record.push)
@@ -149,13 +133,9 @@ def as_text(name: str) -> str:
 def shade(
     axes: Axes, record: Record | ScenarioRecord, w: slice, horizontal: Array | None = None
 ) -> None:
-    """Shade single stance in grey, as in Fig. 13.
+    """Shade single stance in grey, as in Fig. 13, for the samples ``w`` that the panel shows.
 
-    Args:
-        axes: a panel.
-        record: the run.
-        w: the samples that the panel shows.
-        horizontal: (T,) what it has on its abscissa; None: time [s].
+    ``horizontal`` (T,) is what it has on its abscissa; None: time [s].
     """
     single = np.array([name == Phase.SS.name for name in record.metadata["phases"]])[record.node]
     axes.fill_between(
@@ -167,24 +147,13 @@ def shade(
 
 
 def mark_transitions(axes: Axes, spans: Iterable[tuple[float, float, str]]) -> None:
-    """Shade strides from gait to gait in green.
-
-    Args:
-        axes: a panel over time [s].
-        spans: begin and end of each [s], and its name.
-    """
+    """Shade strides from gait to gait in green: begin and end of each [s], and its name."""
     for begin, end, _ in spans:
         axes.axvspan(begin, end, color=COM, alpha=_GREEN, linewidth=0, label=_TRANSITION)
 
 
 def mark_limits(axes: Axes, limits: Sequence[float], unit: str) -> None:
-    """Dotted lines at ± each limit; a limit far beyond the data is written instead.
-
-    Args:
-        axes: a panel that shows its data.
-        limits: [unit].
-        unit: for the text.
-    """
+    """Dotted lines at ± each limit; a limit far beyond the data is written instead."""
     largest = max((np.nanmax(np.abs(line.get_ydata())) for line in axes.lines), default=0.0)
     near = sorted({limit for limit in limits if limit <= _ROOMY * largest})
     far = sorted({limit for limit in limits if limit > _ROOMY * largest})
@@ -197,13 +166,9 @@ def mark_limits(axes: Axes, limits: Sequence[float], unit: str) -> None:
 
 
 def mark_peaks(axes: Axes, time: Array, values: Array, color: str) -> None:
-    """Mark what sticks out of a panel, such as impacts, with its size.
+    """Mark what sticks out of a panel over time [s], such as impacts, with its size.
 
-    Args:
-        axes: a panel over time [s], whose limits are set.
-        time: (n,) [s].
-        values: (n,) [N].
-        color: of the marks.
+    The panel's limits are set; ``time`` (n,) is in s, ``values`` (n,) in N.
     """
     low, high = axes.get_ylim()
     out = (values > high) | (values < low)
@@ -227,13 +192,9 @@ def mark_peaks(axes: Axes, time: Array, values: Array, color: str) -> None:
 
 
 def finish(figure: Figure, panels: Iterable[Axes], title: str, look: Look) -> Figure:
-    """Give a figure one legend, outside of its panels, and its title.
+    """Give a figure one legend, outside of its panels, and its title if the look has one.
 
-    Args:
-        figure: with its panels.
-        panels: whose lines are explained, each name once.
-        title: of the figure.
-        look: whether it has one.
+    The panels' lines are explained, each name once.
     """
     found: dict[str, Any] = {}
     for axes in panels:
@@ -257,13 +218,7 @@ def finish(figure: Figure, panels: Iterable[Axes], title: str, look: Look) -> Fi
 def save_figure(figure: Figure, path: str | Path, dpi: int = DPI) -> Path:
     """Write a figure; a file that is there is replaced by a whole one or stays.
 
-    Args:
-        figure: what to draw.
-        path: of the file; its ending tells the format.
-        dpi: dots per inch, of a picture made of dots.
-
-    Raises:
-        RecordError: if the file cannot be written.
+    The path's ending chooses the format; ``dpi`` are dots per inch, of a picture made of dots.
     """
     with atomic_path(path) as place:
         figure.savefig(place, dpi=dpi)

@@ -33,14 +33,11 @@ _COLUMNS = 3
 
 
 def campaign_figure(campaign: Campaign) -> Figure:
-    """Shares of trials, by severity and by each number that is drawn.
+    """Shares of trials, by severity and by each number that is drawn; there is one trial at least.
 
     Each mark is a sixth of the trials, at their mean: the share without a fall, and the share on
     the gait. Bars are Wilson's 95 % intervals; the scale begins below the lowest of them. Pushes,
     lengths and times are those of the reference template.
-
-    Args:
-        campaign: with at least one trial.
     """
     mix = campaign.conditions.mix
     panels = {"severity": np.array([t.severity for t in campaign.trials])}

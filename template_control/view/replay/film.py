@@ -56,16 +56,11 @@ FROM_THE_SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 class Stage:
-    """The picture, whose artists each frame moves.
+    """The picture of a run, whose artists each frame moves.
 
-    Args:
-        playback: of a run.
-
-    Attributes:
-        figure: it.
-        camera: (2, 3) from the world to the picture.
-        legs: the lines of the left and the right one, down to the foot.
-        body: where joints and trunk are in the frame that is shown.
+    ``camera`` (2, 3) leads from the world to the picture; ``legs`` are the lines of the left and
+    the right one, down to the foot; ``body`` has the places of joints and trunk in the frame that
+    is shown.
     """
 
     def __init__(self, playback: Playback) -> None:
@@ -143,11 +138,7 @@ class Stage:
         self._axes.add_collection(LineCollection(lines, colors="0.82", linewidths=0.8))
 
     def show(self, frame: int) -> None:
-        """Draw a frame.
-
-        Args:
-            frame: its number.
-        """
+        """Draw a frame."""
         record, space, rows = self.playback.record, self._space, self.playback.rows
         row, seen = rows[frame], self.seen
         com, feet = space.com[row], space.foot[row]
@@ -175,7 +166,7 @@ class Stage:
 
 
 class _Body:
-    """Where joints and trunk are in a configuration, by Pinocchio."""
+    """Places of joints and trunk in a configuration, by Pinocchio."""
 
     def __init__(self, record: Record) -> None:
         self._model = model_of(record)
@@ -209,17 +200,10 @@ def write_film(
     progress: Callable[[int], None] | None = None,
     dpi: int = 100,
 ) -> Path:
-    """Draw every frame into a ``.gif`` or ``.mp4``.
+    """Draw every frame into a ``.gif`` or ``.mp4``, 6.4 x 4.4 inches at ``dpi``.
 
-    Args:
-        path: of the film; its ending tells the format.
-        playback: the frames.
-        fps: frames per second, as the frames were chosen with.
-        progress: called with the number of frames done.
-        dpi: dots per inch of the 6.4 x 4.4 inch picture.
-
-    Raises:
-        RecordError: if the ending is another, ffmpeg is missing, or the file cannot be written.
+    ``fps`` is that with which the frames were chosen; ``progress`` gets the number of frames done.
+    A RecordError if the ending is another, ffmpeg is missing, or the file cannot be written.
     """
     writer = _writer(path, fps, len(playback.rows))
     with atomic_path(path) as place:

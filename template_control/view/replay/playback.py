@@ -1,4 +1,4 @@
-"""What a replay shows of a run, frame by frame: samples, template legs, forces, footholds."""
+"""Contents of a replay, frame by frame: samples, template legs, forces, footholds."""
 
 from __future__ import annotations
 
@@ -29,12 +29,9 @@ FRAME_RATES = Range(1.0, 120.0)
 
 @dataclass(frozen=True)
 class Playback:
-    """Frames of a run; F of them.
+    """F frames of a run: the sample of each, ``rows`` (F,), and its time ``clock`` (F,) [s].
 
-    Attributes:
-        record: the run.
-        rows: (F,) sample shown in each frame.
-        clock: (F,) seconds from the replay's beginning at which a frame is shown.
+    The clock begins at the replay's beginning.
     """
 
     record: Record
@@ -44,13 +41,7 @@ class Playback:
 
 @dataclass(frozen=True)
 class Foothold:
-    """A place a foot stood on.
-
-    Attributes:
-        foot: 0 left, 1 right.
-        x: where [m].
-        time: from when on [s].
-    """
+    """A place x [m] that a foot, 0 left or 1 right, stood on from a ``time`` on [s]."""
 
     foot: int
     x: float
@@ -71,8 +62,8 @@ def playback(
         record: the run.
         fps: frames per second of the replay, 1 to 120.
         speed: seconds of the run per second of the replay, 0.01 to 100.
-        start, end: part of the run to show [s]; None for its beginning and end. Negative
-            values count from the run's end.
+        start, end: part of the run to show [s]; None for its beginning and end. Negative values
+            count from the run's end.
 
     Raises:
         ParameterError: if a number is out of its range.
@@ -104,9 +95,7 @@ def carrying(record: Record) -> NDArray[np.bool_]:
 def template_legs(record: Record) -> tuple[Array, NDArray[np.bool_]]:
     """The template's rear and front leg, which run from its CoM to the robot's feet.
 
-    Returns:
-        toes: (T, 2, 2) of the rear and the front leg [m].
-        loaded: (T, 2) whether the leg pushes.
+    Their toes (T, 2, 2) [m], and (T, 2) whether each leg pushes.
     """
     samples = np.arange(len(record.time))
     toes = np.stack(
@@ -125,11 +114,9 @@ def spring(radius: float) -> Array:
 
 
 def coil(shape: Array, begin: Array, end: Array) -> Array:
-    """(2, N) x and y of a leg's spring between two points of the picture.
+    """(2, N) x and y of a leg's spring between two points (2,) of the picture [m].
 
-    Args:
-        shape: from :func:`spring`.
-        begin, end: (2,) [m].
+    ``shape`` is from :func:`spring`.
     """
     span = end - begin
     normal = np.array([-span[1], span[0]]) / max(float(np.linalg.norm(span)), 1e-12)
@@ -148,12 +135,7 @@ def force_arrows(record: Record) -> Array:
 
 
 def arrows_of(force: Array, record: Record) -> Array:
-    """Forces as arrows, see :func:`force_arrows`.
-
-    Args:
-        force: (..., 2) or (..., 3) [N].
-        record: the run.
-    """
+    """Forces (..., 2) or (..., 3) [N] as arrows, see :func:`force_arrows`."""
     arrow = force / record.weight
     size = np.linalg.norm(arrow, axis=-1, keepdims=True)
     arrow = arrow * np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))
@@ -161,7 +143,7 @@ def arrows_of(force: Array, record: Record) -> Array:
 
 
 def footholds(record: Record) -> list[Foothold]:
-    """Where the feet stood, by time."""
+    """Footholds by time."""
     found = []
     for foot, on in enumerate(carrying(record).T):
         edges = np.flatnonzero(np.diff(np.concatenate(([False], on, [False])).astype(np.int8)))

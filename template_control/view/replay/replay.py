@@ -105,7 +105,7 @@ def save_film(
 
     Args:
         record: the run.
-        path: of the film; its ending tells the format.
+        path: of the film; its ending is the format.
         fps: frames per second; None for 20 in a GIF and 30 in a video.
         speed: seconds of the run per second of the film.
         start, end: part of the run [s]; negative values count from its end. Without ``start``

@@ -28,13 +28,10 @@ _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 @dataclass(frozen=True)
 class Visual:
-    """One shape of the robot.
+    """One shape of the robot, with a name that is unique in it and a geometry for meshcat.
 
-    Attributes:
-        name: unique in the robot.
-        geometry: for meshcat.
-        offset: (4, 4) of meshcat's shape in the URDF's visual frame.
-        color: red, green, blue, opacity, each from 0 to 1.
+    ``offset`` (4, 4) is of meshcat's shape in the URDF's visual frame; ``color`` is red, green,
+    blue, opacity, each from 0 to 1.
     """
 
     name: str
@@ -50,14 +47,8 @@ Robot = tuple[pin.Model, pin.GeometryModel, list[Visual]]
 def load_visuals(record: Record) -> Robot:
     """The robot of a run, and its shapes in the geometry model's order.
 
-    A mesh that is missing or cannot be read is left out. Legs and trunk that have no shape then
-    are drawn as sticks.
-
-    Args:
-        record: the run.
-
-    Raises:
-        RecordError: if the run carries no URDF.
+    A mesh that is missing or cannot be read is left out. Legs and trunk that have no shape then are
+    drawn as sticks. A RecordError if the run carries no URDF.
     """
     text = record.urdf
     if not text:
@@ -94,12 +85,7 @@ def _with_meshes(text: str) -> str:
 
 
 def sticks(record: Record, model: pin.Model) -> list[pin.GeometryObject]:
-    """Cylinders from joint to joint, to the feet, and up from the hips to twice the trunk's CoM.
-
-    Args:
-        record: the run.
-        model: of its robot.
-    """
+    """Cylinders from joint to joint, to the feet, and up from the hips to twice the trunk's CoM."""
     radius = _STICK * float(record.template.rest_length)
     joints = [[model.getJointId(record.joints[i]) for i in leg] for leg in record.legs]
     made = []
@@ -135,11 +121,7 @@ def _stick(
 
 
 def model_of(record: Record) -> pin.Model:
-    """The robot's model, with a free flyer where nothing held it.
-
-    Args:
-        record: the run, which carries a URDF.
-    """
+    """The robot's model, with a free flyer where nothing held it; the run carries a URDF."""
     text = record.urdf
     if isinstance(record, FloatingRecord):
         return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
@@ -147,16 +129,10 @@ def model_of(record: Record) -> pin.Model:
 
 
 def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[Array, Array]:
-    """Where the shapes are in each of several configurations.
+    """Places of the shapes in configurations ``q`` (F, nq) [m, rad].
 
-    Args:
-        model: of the robot.
-        shapes: its shapes, from :func:`load_visuals`.
-        q: (F, nq) configurations [m, rad].
-
-    Returns:
-        positions: (F, shapes, 3) x forward, y to the left, z up [m].
-        quaternions: (F, shapes, 4) x, y, z, w.
+    Positions (F, shapes, 3), x forward, y to the left, z up [m], and quaternions (F, shapes, 4) x,
+    y, z, w.
     """
     data, shape_data = model.createData(), shapes.createData()
     positions = np.empty((len(q), len(shapes.geometryObjects), 3))
@@ -170,15 +146,7 @@ def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[A
 
 
 def foot_sides(model: pin.Model, feet: Sequence[str]) -> Array:
-    """How far the feet are to the left of the sagittal plane.
-
-    Args:
-        model: of the robot.
-        feet: names of the two foot frames.
-
-    Returns:
-        (2,) y of each foot frame [m]; to the left is positive.
-    """
+    """(2,) y of each foot frame from the sagittal plane, to the left positive [m]."""
     data = model.createData()
     pin.framesForwardKinematics(model, data, pin.neutral(model))
     return np.array([data.oMf[foot_frame(model, foot)].translation[1] for foot in feet])

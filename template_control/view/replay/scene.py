@@ -38,14 +38,9 @@ _AROUND = 11  # places that a height is the mean of
 
 
 def plates(centres: Array, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
-    """Rectangles that lie level.
+    """Level rectangles: vertices (4 N, 3) and faces (2 N, 3) from centres (N, 3) [m].
 
-    Args:
-        centres: (N, 3) [m].
-        size: along x and y [m].
-
-    Returns:
-        Vertices (4 N, 3) and faces (2 N, 3).
+    ``size`` is along x and y [m].
     """
     corners = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*size, 0.0]
     faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(centres))[:, None, None]
@@ -53,15 +48,10 @@ def plates(centres: Array, size: tuple[float, float]) -> tuple[Array, NDArray[np
 
 
 def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tuple[Any, Array]:
-    """The ground under a line: a board where it is level, else its surface.
+    """The ground under a line, a board where it is level, else its surface; its (4, 4) placement.
 
-    Args:
-        line: (N, 2) x and height of its points [m].
-        sides: y of its right and its left edge [m].
-        length: the template's rest length [m].
-
-    Returns:
-        The shape and its placement (4, 4).
+    ``line`` (N, 2) is x and height of its points [m], ``sides`` y of its right and its left edge
+    [m], ``length`` the template's rest length [m].
     """
     place = np.eye(4)
     (low, level), (high, _), (right, left) = line[0], line[-1], sides
@@ -79,12 +69,9 @@ def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tupl
 
 
 def smoothed(ground: Terrain, x: Array, length: float) -> Array:
-    """Height of the ground around places, without its edges: a camera goes up and down with it.
+    """Height of the ground around places x (N,), as a mean over ``length`` [m] without its edges.
 
-    Args:
-        ground: whose height.
-        x: (N,) the places [m].
-        length: over which the mean is taken [m].
+    A camera goes up and down with it.
     """
     around = np.linspace(-0.5, 0.5, _AROUND) * length
     return np.array([np.mean([ground.height_at(p) for p in place + around]) for place in x])
@@ -95,7 +82,7 @@ _LANDED = 0.015  # [s] after its touchdown a foot rests
 
 @dataclass(frozen=True)
 class Space:
-    """Where things are; x forward or as the world's, y to the left, z up [m].
+    """Places of CoM, legs and feet; x forward or as the world's, y to the left, z up [m].
 
     Attributes:
         com: (T, 3) of the robot.
@@ -117,9 +104,7 @@ class Space:
 def in_space(record: Record, sides: Array) -> Space:
     """A run in three directions.
 
-    Args:
-        record: the run.
-        sides: (2,) how far to the left a planar robot's feet are [m]; not asked of a free one.
+    ``sides`` (2,) is how far to the left a planar robot's feet are [m]; not used for a free one.
     """
     if isinstance(record, FloatingRecord):
         return _free(record)
@@ -162,25 +147,14 @@ def _free(record: FloatingRecord) -> Space:
 
 
 def raised(points: Array) -> Array:
-    """Points of the plane in space.
-
-    Args:
-        points: (..., 2) x and height [m].
-
-    Returns:
-        (..., 3) with y = 0 [m].
-    """
+    """(..., 3) points with y = 0 from (..., 2) x and height [m]."""
     return np.stack((points[..., 0], np.zeros(points.shape[:-1]), points[..., 1]), axis=-1)
 
 
 def turned_to(direction: Array) -> Array:
-    """Quaternions that turn the vertical z into directions.
+    """(F, 4) quaternions x, y, z, w that turn the vertical z into directions (F, 3).
 
-    Args:
-        direction: (F, 3); where it is zero nothing turns.
-
-    Returns:
-        (F, 4) x, y, z, w.
+    Where a direction is zero nothing turns.
     """
     x, y, z = direction.T
     size = np.linalg.norm(direction, axis=1)
@@ -234,7 +208,7 @@ class _Track:
 
 
 class _LastAnimation(SetAnimation):
-    """Filed under a path of its own: the server tells late browsers the root's first of all."""
+    """Filed under a path of its own: the server sends late browsers the root's first of all."""
 
     def lower(self) -> dict[str, Any]:
         return {**super().lower(), "path": "/animation"}
@@ -286,8 +260,7 @@ class _Scene:
 def scene_commands(playback: Playback) -> list[Any]:
     """Commands that build and animate the scene; each has meshcat's ``lower()``.
 
-    Raises:
-        RecordError: if the robot's visuals cannot be loaded.
+    A RecordError if the robot's visuals cannot be loaded.
     """
     scene, record = _Scene(playback.clock), playback.record
     length = float(record.template.rest_length)

@@ -73,12 +73,7 @@ _LEGEND = (
 
 
 def page_of(title: str, commands: list[Any]) -> str:
-    """Meshcat's viewer with the commands of a scene as one HTML page.
-
-    Args:
-        title: of the page.
-        commands: as :func:`~template_control.view.replay.scene.scene_commands` makes them.
-    """
+    """Meshcat's viewer as one HTML page, with the commands of :func:`.scene.scene_commands`."""
     packed = (base64.b64encode(umsgpack.packb(c.lower())).decode() for c in commands)
     return _PAGE.substitute(
         title=html.escape(title),
@@ -92,17 +87,10 @@ _PORTS = range(7000, 7100)
 
 
 class ReplayServer:
-    """A running server of a replay's page; ends with :meth:`close` or the ``with`` block.
+    """A running server of a replay's HTML page; ends with :meth:`close` or the ``with`` block.
 
-    Args:
-        page: HTML text.
-        port: of the server; None for the first free one from 7000 up.
-
-    Attributes:
-        url: where a browser finds the replay.
-
-    Raises:
-        RecordError: if the server does not start.
+    ``port`` None takes the first free one from 7000 up; ``url`` is where a browser finds the
+    replay. A RecordError if the server does not start.
     """
 
     def __init__(self, page: str, port: int | None = None) -> None:
@@ -148,11 +136,7 @@ class ReplayServer:
 
 
 def _listening(answer: type[BaseHTTPRequestHandler], ports: Sequence[int]) -> ThreadingHTTPServer:
-    """A server on the first free port.
-
-    Raises:
-        RecordError: if none is free.
-    """
+    """A server on the first free port; a RecordError if none is free."""
     for port in ports:
         try:
             return _Server(("127.0.0.1", port), answer)
