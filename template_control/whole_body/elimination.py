@@ -24,12 +24,8 @@ Array = NDArray[np.float64]
 def cholesky(matrix: Array, size: int) -> bool:
     """Factor the leading block of a symmetric matrix in place; its lower triangle becomes L.
 
-    Args:
-        matrix: (n, n) of which only the lower triangle is read and overwritten.
-        size: rows of the block, at most n.
-
-    Returns:
-        False where the block is not positive definite; it is then half overwritten.
+    Only the lower triangle of the (n, n) matrix is read and overwritten; ``size`` are the block's
+    rows. False where the block is not positive definite; it is then half overwritten.
     """
     for j in range(size):
         pivot = matrix[j, j]
@@ -49,12 +45,9 @@ def cholesky(matrix: Array, size: int) -> bool:
 
 @compiled
 def solve_cholesky(factor: Array, size: int, columns: Array) -> None:
-    """Solve L L^T x = b in place for several right-hand sides b.
+    """Solve L L^T x = b in place for several right-hand sides b, ``columns`` (size, m).
 
-    Args:
-        factor: (n, n) matrix that :func:`cholesky` has factored.
-        size: rows of the factored block.
-        columns: (size, m) right-hand sides, one a column; overwritten with the solutions.
+    ``factor`` (n, n) is from :func:`cholesky`, ``size`` its block's rows.
     """
     width = columns.shape[1]  # side by side: one instruction takes several
     for i in range(size):

@@ -63,8 +63,7 @@ QP_DATA = np.dtype(
 def rows_per_foot(directions: int) -> int:
     """Constraints of a stance foot: two for each tangential direction, one for the normal one.
 
-    Args:
-        directions: of its force, 2 in the plane, 3 in space.
+    ``directions`` are those of its force, 2 in the plane, 3 in space.
     """
     return 2 * directions - 1
 
@@ -80,7 +79,7 @@ class Matrices(NamedTuple):
         constraint: (nu + (2 d - 1) c, nu) rows of unit length; nu more where accelerations are
             bounded.
         lower, upper: bounds of the rows times w.
-        minimum: (nu,) the w of least cost, constraints left aside.
+        minimum: (nu,) the w of least cost without the constraints.
     """
 
     a_map: Array
@@ -97,11 +96,8 @@ class Matrices(NamedTuple):
 def matrices(work: Array, nv: int, nu: int, forces: int, rows: int) -> tuple[Array, ...]:
     """:class:`Matrices`, as a plain tuple of views into one array: a call takes one in less time.
 
-    Args:
-        work: all their numbers; it may be longer.
-        nv, nu: degrees of freedom, and actuated ones.
-        forces: d c, numbers of all contact forces.
-        rows: constraints.
+    ``work`` holds all their numbers and may be longer; ``nv``, ``nu`` are degrees of freedom and
+    actuated ones; ``forces`` d c, numbers of all contact forces; ``rows`` constraints.
     """
     a = nv * (nu + 1)
     b = a + forces * (nu + 1)
@@ -122,11 +118,7 @@ def matrices(work: Array, nv: int, nu: int, forces: int, rows: int) -> tuple[Arr
 
 @compiled
 def sizes(p: Any, arrays: tuple[Any, ...], bounds: Array) -> tuple[int, int, int, int]:
-    """Arguments of :func:`matrices` after the first.
-
-    Args:
-        p, arrays, bounds: as for :func:`assemble`.
-    """
+    """Arguments of :func:`matrices` after the first; arguments as for :func:`assemble`."""
     directions, nv, nu = arrays[4].shape[1], arrays[0].shape[0], arrays[6].shape[1]
     rows = nu + rows_per_foot(directions) * p.feet + bounds.shape[1]
     return nv, nu, directions * p.feet, rows
@@ -249,7 +241,7 @@ def assemble(
 
 @compiled
 def _keeps(constraint: Array, lower: Array, upper: Array, z: Array) -> bool:
-    """Whether lower <= constraint z <= upper; ``z`` may be longer."""
+    """True if lower <= constraint z <= upper; ``z`` may be longer."""
     for i in range(constraint.shape[0]):
         value = 0.0
         for j in range(constraint.shape[1]):
@@ -279,18 +271,13 @@ def _backward(factor: Array, vector: Array) -> None:
 
 @compiled
 def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
-    """Write the joint torques of the QP's solution, tau_max * (L^-T w), into ``out``.
+    """Write the joint torques of the QP's solution, tau_max * (L^-T w), into ``out`` (nu,) [N m].
 
-    They are kept within tau_max and rounded to 2^-24 of it, which is near ProxQP's tolerance.
-    Where a process has loaded another build of ProxQP than :func:`.solver.load_proxqp` does, the
-    last digits of the solution depend on where its workspace happens to lie in memory; without the
-    rounding such a walk would not be the same twice.
-
-    Args:
-        factor: (nu, nu) L in its lower triangle, from :func:`assemble`.
-        w: (nu,) solution of the QP.
-        torque_limit: (nu,) tau_max [N m].
-        out: (nu,) overwritten with the torques [N m].
+    They are kept within tau_max and rounded to 2^-24 of it, which is near ProxQP's tolerance. Where
+    a process has loaded another build of ProxQP than :func:`.solver.load_proxqp` does, the last
+    digits of the solution depend on where its workspace happens to lie in memory; without the
+    rounding such a walk would not be the same twice. ``factor`` (nu, nu) has L in its lower
+    triangle, ``w`` (nu,) is the solution, ``torque_limit`` (nu,) tau_max [N m].
     """
     for i in range(w.shape[0]):
         out[i] = w[i]
@@ -316,13 +303,10 @@ def _add_square(
 
 @compiled
 def follow(a_map: Array, f_map: Array, tau: Array, acceleration: Array, force: Array) -> None:
-    """Write the accelerations and contact forces that joint torques bring about.
+    """Write the accelerations and contact forces that joint torques (nu,) [N m] bring about.
 
-    Args:
-        a_map, f_map: affine maps that :func:`assemble` has filled.
-        tau: (nu,) joint torques [N m].
-        acceleration: (nv,) overwritten with the generalised accelerations [m/s^2, rad/s^2].
-        force: (d c,) overwritten with the force on each stance foot [N].
+    The maps are those of :func:`assemble`. ``acceleration`` (nv,) [m/s^2, rad/s^2] and ``force`` (d
+    c,), on each stance foot [N], are overwritten.
     """
     _affine(a_map, tau, acceleration)
     _affine(f_map, tau, force)
@@ -343,11 +327,9 @@ def _affine(matrix: Array, tau: Array, out: Array) -> None:
 def answer(p: Any, work: Array, found: tuple[Array, ...]) -> None:
     """Write the answer of a tick from the joint torques of the model.
 
-    Args:
-        p: of ``QP_DATA``.
-        work: of :func:`matrices`, which :func:`assemble` has filled.
-        found: (nu,) the model's torques; overwritten: (nu,) the robot's torques [N m], (d c,) the
-            force on each stance foot [N], (nv,) generalised accelerations [m/s^2, rad/s^2].
+    ``p`` is of ``QP_DATA``, ``work`` of :func:`matrices`, filled by :func:`assemble`. ``found`` has
+    the model's torques (nu,), and is overwritten: (nu,) the robot's torques [N m], (d c,) the force
+    on each stance foot [N], (nv,) generalised accelerations [m/s^2, rad/s^2].
     """
     model, torque, force, acceleration = found
     out = matrices(work, acceleration.shape[0], torque.shape[0], force.shape[0], 0)
@@ -358,11 +340,9 @@ def answer(p: Any, work: Array, found: tuple[Array, ...]) -> None:
 
 @compiled
 def bounds_needed(p: Any, r: Any) -> bool:
-    """Whether a joint is near its limit of speed, or the one that it has before its stop.
+    """True if a joint is near its limit of speed, or the one that it has before its stop.
 
-    Args:
-        p: of ``QP_DATA``.
-        r: of ``ROBOT_DATA``.
+    ``p`` is of ``QP_DATA``, ``r`` of ``ROBOT_DATA``.
     """
     if r.fastest <= p.stop_share:
         return False
@@ -375,15 +355,10 @@ def solve_free(
 ) -> int:
     """Solve a tick in which no limit acts.
 
-    Args:
-        qp, data: (1,) of ``QP_DATA`` and of ``ROBOT_DATA``.
-        arrays, tasks: as for :func:`assemble`.
-        room: ``torque_limit``, ``bounds`` and ``work`` as for :func:`assemble`; ``found`` as for
-            :func:`answer`, overwritten where the tick is solved.
-
-    Returns:
-        ``FREE`` where it is; else what :func:`assemble` finds, or ``BRAKED`` where accelerations
-        are to be bounded and nothing has been assembled yet.
+    ``qp``, ``data`` (1,) are of ``QP_DATA`` and of ``ROBOT_DATA``; ``room`` is ``torque_limit``,
+    ``bounds`` and ``work`` as for :func:`assemble`, and ``found`` as for :func:`answer`,
+    overwritten where the tick is solved. Returns ``FREE`` where it is; else what :func:`assemble`
+    finds, or ``BRAKED`` where accelerations are to be bounded and nothing has been assembled yet.
     """
     p, r = qp[0], data[0]
     if bounds_needed(p, r):

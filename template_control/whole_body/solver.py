@@ -65,7 +65,7 @@ TORQUE_COST = 1e-4
 """Of the joint torques, per squared limit. Smaller: it only makes the optimum unique."""
 
 _CHECKS = "proxsuite.instructionset"
-"""Where proxsuite asks, while it is imported, which of its builds the processor can run."""
+"""Module that proxsuite asks at its import which of its builds the processor can run."""
 
 
 def load_proxqp() -> Any:
@@ -173,12 +173,9 @@ def bound_joints(robot: Biped, options: QpOptions, bounds: Array, slack: float) 
 
     with T the horizon in which a limit of speed is met, and T_s that in which a stop is.
 
-    Args:
-        robot: the model; its last update is read.
-        options: shares and horizons of speeds and stops.
-        bounds: (2, nu) least and greatest accelerations, overwritten [rad/s^2].
-        slack: what is allowed at least in either direction [rad/s^2]: -inf, or 0 where a joint
-            that is too fast may stay so.
+    ``bounds`` (2, nu), least and greatest [rad/s^2], are overwritten; the robot's last update is
+    read. ``slack`` is allowed at least in either direction [rad/s^2]: -inf, or 0 where a joint that
+    is too fast may stay so.
     """
     o, limit = options, robot.velocity_limit
     place, speed, (low, high) = robot.joint_angle, robot.joint_velocity, robot.joint_range.T
@@ -191,14 +188,8 @@ def bound_joints(robot: Biped, options: QpOptions, bounds: Array, slack: float) 
 class Workspace:
     """Matrices and ProxQP object for one number of stance feet.
 
-    Args:
-        robot: whose.
-        feet: on the ground.
-        bounded: how many accelerations of joints have bounds: none, or all.
-
-    Attributes:
-        work: the numbers of the matrices, in one array.
-        bounds: (2, bounded) of the joints' accelerations [rad/s^2].
+    ``bounded`` is how many accelerations of joints have bounds, none or all; they are ``bounds``
+    (2, bounded) [rad/s^2]. ``work`` holds the numbers of the matrices, in one array.
     """
 
     def __init__(self, robot: Biped, feet: int, bounded: int = 0) -> None:

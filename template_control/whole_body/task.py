@@ -38,7 +38,7 @@ REFERENCES = np.dtype(
     ],
     align=True,
 )
-"""What tasks read beside the robot's own state; :class:`References` explains the fields."""
+"""Values that tasks read with the robot's state; :class:`References` explains the fields."""
 
 
 class References:
@@ -78,7 +78,7 @@ class References:
 
 
 class Rows(NamedTuple):
-    """Where a task writes its r rows; views into the stack.
+    """The r rows that a task writes; views into the stack.
 
     Attributes:
         jacobian: (r, nv) T.
@@ -113,10 +113,6 @@ class Task(Protocol):
 
 
 def task_name(task: Task) -> str:
-    """Name of a task in options: its class's without "Task", as in ``side_foot``.
-
-    Args:
-        task: of a phase.
-    """
+    """Name of a task in options: its class's without "Task", as in ``side_foot``."""
     name = type(task).__name__.removesuffix("Task")
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

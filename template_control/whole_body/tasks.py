@@ -129,10 +129,7 @@ class ComTask(CompiledTask):
 
 @compiled
 def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the rows of a :class:`ComTask`, and ``lift`` of the references.
-
-    Arguments as for :func:`write_rows`, one of each.
-    """
+    """Write the rows of a :class:`ComTask`, and ``lift`` of references; see :func:`write_rows`."""
     com, momentum = arrays[2], arrays[3]
     kp, kd, nv, up, pitch = (
         task.gains[0],
@@ -186,10 +183,7 @@ class FootTask(CompiledTask):
 
 @compiled
 def foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the rows of a :class:`FootTask`.
-
-    Arguments as for :func:`write_rows`, one of each.
-    """
+    """Write the rows of a :class:`FootTask`; arguments as for :func:`write_rows`."""
     contact, foot = arrays[4], want.feet[task.leg]
     kp, kd, hold_p, hold_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
     nv = contact.shape[2]
@@ -237,10 +231,7 @@ class MomentumTask(CompiledTask):
 
 @compiled
 def momentum_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the row of a :class:`MomentumTask`.
-
-    Arguments as for :func:`write_rows`, one of each.
-    """
+    """Write the row of a :class:`MomentumTask`; arguments as for :func:`write_rows`."""
     momentum, height = arrays[3], want.com_now[1]
     pitch, nv = len(momentum) // 2, momentum.shape[1]
     inertia = r.mass * (height * height)
@@ -271,10 +262,7 @@ class PostureTask(CompiledTask):
 
 @compiled
 def posture_rows(task: Any, r: Any, want: Any, rows: Array) -> None:
-    """Write the row of a :class:`PostureTask`.
-
-    Arguments as for :func:`write_rows`, one of each.
-    """
+    """Write the row of a :class:`PostureTask`; arguments as for :func:`write_rows`."""
     nv = rows.shape[1] - 3
     rows[0, _PITCH] = 1.0
     away = task.gains[0] * (want.pitch - r.attitude[1])
@@ -316,10 +304,7 @@ class OrientationTask(CompiledTask):
 
 @compiled
 def orientation_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the rows of an :class:`OrientationTask`.
-
-    Arguments as for :func:`write_rows`, one of each.
-    """
+    """Write the rows of an :class:`OrientationTask`; arguments as for :func:`write_rows`."""
     turning, nv = arrays[5], rows.shape[1] - 3
     kp, kd, yaw_p, yaw_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
     for axis in range(turning.shape[0]):
@@ -332,7 +317,7 @@ def orientation_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows
 
 @dataclass(frozen=True)
 class SideFootTask(CompiledTask):
-    """One row: y of a foot p towards its reference r, beside the two of a ``FootTask``.
+    """One row: y of a foot p towards its reference r, in addition to the two of a ``FootTask``.
 
         J a + dJ/dt v = r'' + kp (r - p) + kd (r' - p')
 
@@ -352,10 +337,7 @@ class SideFootTask(CompiledTask):
 
 @compiled
 def side_foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the row of a :class:`SideFootTask`.
-
-    Arguments as for :func:`write_rows`, one of each.
-    """
+    """Write the row of a :class:`SideFootTask`; arguments as for :func:`write_rows`."""
     contact, foot, nv = arrays[4], want.feet[task.leg], rows.shape[1] - 3
     for k in range(nv):
         rows[0, k] = contact[foot, _SIDE, k]
@@ -391,10 +373,7 @@ class SpareJointTask(CompiledTask):
 
 @compiled
 def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) -> None:
-    """Write the rows of a :class:`SpareJointTask`.
-
-    Arguments as for :func:`write_rows`, one of each.
-    """
+    """Write the rows of a :class:`SpareJointTask`; arguments as for :func:`write_rows`."""
     joints, nv = arrays[6], rows.shape[1] - 3
     base_dof = nv - joints.shape[1]
     for row in range(2):
@@ -411,14 +390,10 @@ def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) ->
 def write_rows(
     program: Any, data: Any, arrays: tuple[Any, ...], references: Any, table: Array
 ) -> None:
-    """Let tasks write their rows.
+    """Let tasks write their rows into the table of a :class:`~.stack.TaskStack`.
 
-    Args:
-        program: (n,) of ``TASK``.
-        data: (1,) of ``ROBOT_DATA``.
-        arrays: of the robot.
-        references: (1,) of ``REFERENCES``.
-        table: of a :class:`~.stack.TaskStack`; the tasks' rows are overwritten.
+    ``program`` (n,) is of ``TASK``, ``data`` (1,) of ``ROBOT_DATA``, ``references`` (1,) of
+    ``REFERENCES``.
     """
     r, want = data[0], references[0]
     for i in range(program.shape[0]):
