@@ -45,8 +45,8 @@ class Curve(NamedTuple):
     Attributes:
         coefficients: (2, n, ORDER + 1) polynomials of x and y.
         meta: (n, 7) start time, duration, node, toes, stiffnesses.
-        look: (3,) x of the template's rear toe, from which x is taken [m]; how far its
-            polynomials are followed past their ends, and the longest step of a search [s].
+        look: (3,) x of the template's rear toe, from which x is taken [m]; how far its polynomials
+            are followed past their ends, and the longest step of a search [s].
     """
 
     coefficients: Array
@@ -57,9 +57,7 @@ class Curve(NamedTuple):
 class Landing(NamedTuple):
     """Next touchdown of a leg; (nan, inf) if it does not land on this path.
 
-    Attributes:
-        x: of its toe in the world [m].
-        time: on the path [s].
+    ``x`` is its toe's in the world [m], ``time`` is on the path [s].
     """
 
     x: float
@@ -74,8 +72,8 @@ class TemplatePath:
         strides: of which it is made, from its start on.
         curve: the segments.
         events: time on the path [s] and guard of each event.
-        landings: next touchdown of the leg that is rear, and of the one that is front, at the
-            start of the path.
+        landings: next touchdown of the leg that is rear, and of the one that is front, at the start
+            of the path.
         toes: x of the rear and the front toe at the start [m].
         section_state: (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex.
         outcome: how the first stride ends.
@@ -92,12 +90,7 @@ class TemplatePath:
     duration: float
 
     def time_of(self, event: Event, passed: int = 0) -> float:
-        """Time of the next ``event`` [s], inf if there is none.
-
-        Args:
-            event: the guard.
-            passed: number of the path's events that are over already.
-        """
+        """Time of the next ``event`` [s], inf if there is none, once ``passed`` events are over."""
         return next((time for time, found in self.events[passed:] if found is event), np.inf)
 
     def event_times(self, passed: int) -> list[float]:
@@ -110,12 +103,7 @@ class TemplatePath:
     def after(self, event: Event, passed: int) -> int:
         """Number of the path's events that are over once the next ``event`` is.
 
-        Args:
-            event: the guard that fires.
-            passed: number of the path's events that are over already.
-
-        Returns:
-            The new number; ``passed`` where no such event is left.
+        ``passed`` are over already; also returned where no such event is left.
         """
         for i in range(passed, len(self.events)):
             if self.events[i][1] is event:
@@ -124,11 +112,9 @@ class TemplatePath:
 
 
 def join(strides: Sequence[Stride], time_unit: float = 1.0) -> TemplatePath:
-    """Join strides, each of which starts where the one before ended.
+    """Join strides, each of which starts where the one before ended; the section is the first's.
 
-    Args:
-        strides: at least one; the path's section is the first one's.
-        time_unit: of the template, over the reference template's.
+    ``time_unit`` is the template's over the reference template's.
     """
     meta = np.concatenate([stride.meta for stride in strides])
     coefficients = np.empty((2, len(meta), ORDER + 1))
@@ -214,16 +200,11 @@ def sample(coefficients: Array, meta: Array, look: Array, time: float, out: Arra
 def at_direction(
     coefficients: Array, meta: Array, look: Array, x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
-    """Time at which the template sees its CoM in the direction of (x, y), and its path there.
+    """Time at which the template's CoM is in the direction of (x, y) [s], and its segment.
 
-    Args:
-        coefficients, meta, look: of a :class:`Curve`.
-        x, y: the robot's CoM relative to its rear stance foot [m].
-        guess: a time close to the answer [s].
-        out: (6,) overwritten with the path there, x relative to the template's rear toe.
-
-    Returns:
-        Template time [s], and its segment.
+    ``x``, ``y`` are the robot's CoM relative to its rear stance foot [m]; the arrays are a
+    :class:`Curve`'s; ``guess`` is a time close to the answer [s]. ``out`` (6,) is overwritten with
+    the path there, x relative to the template's rear toe.
     """
     last = meta[meta.shape[0] - 1]
     end, leap = last[0] + last[1], look[2]
@@ -253,11 +234,9 @@ TERMS = 6
 
 
 class Quintic(NamedTuple):
-    """A piece of a curve.
+    """A piece of a curve, of a duration [s].
 
-    Attributes:
-        coefficients: (2, 6) of x and y, constant term first, x in the world [m].
-        duration: [s].
+    ``coefficients`` (2, 6) are of x and y, constant term first, x in the world [m].
     """
 
     coefficients: Array
@@ -271,10 +250,7 @@ class Quintic(NamedTuple):
 def quintics(start: Array, ends: Array, durations: Array) -> Array:
     """Coefficients (..., 2, 6) of the quintics from ``start`` to ``ends``, constant term first.
 
-    Args:
-        start: (..., 2, 3) x and y, each position, velocity, acceleration.
-        ends: (..., 2, 3) the same at the end.
-        durations: (...) [s].
+    Both ends (..., 2, 3) are x and y, each position, velocity, acceleration; durations (...) [s].
     """
     t = np.asarray(durations, dtype=float)[..., None]
     p, v, a = start[..., 0], start[..., 1], start[..., 2]
@@ -292,9 +268,7 @@ def quintics(start: Array, ends: Array, durations: Array) -> Array:
 def derivatives(coefficients: Array, times: Array) -> Array:
     """Values (..., 3) of polynomials (..., n), their first and their second derivatives.
 
-    Args:
-        coefficients: constant term first.
-        times: (...) [s], of a shape that broadcasts with the polynomials'.
+    Constant terms are first; the shape of ``times`` [s] broadcasts with the polynomials'.
     """
     p = d = dd = np.zeros(np.broadcast_shapes(coefficients.shape[:-1], np.shape(times)))
     for n in range(coefficients.shape[-1] - 1, -1, -1):
@@ -309,11 +283,8 @@ def timed_stride(
 ) -> Stride:
     """The stride along a curve, to the first event that leads out of its node.
 
-    Args:
-        automaton: of the stride.
-        node: the robot's.
-        pieces: of the curve, each from where the one before ends.
-        toes: x of the rear and the front foot [m].
+    Each of the ``pieces`` starts where the one before ends; ``toes`` are x of the rear and the
+    front foot [m].
     """
     edge = next(edge for edge in automaton.node(node).edges if isinstance(edge.target, str))
     durations = np.array([piece.duration for piece in pieces])
@@ -350,12 +321,7 @@ def timed_stride(
 
 
 def chained(first: Stride, second: Stride) -> Stride:
-    """Two parts of one stride; the second starts where the first ended.
-
-    Args:
-        first: to an event within the stride.
-        second: from there on.
-    """
+    """Two parts of one stride; the second starts where the first ended, at an event within it."""
     meta = second.meta.copy()
     meta[:, 0] += first.duration
     events = (

@@ -65,7 +65,7 @@ CONTACTS = np.dtype(
 """State of the contacts."""
 
 IN_AIR, ON_GROUND, DUE = 0, 1, 2
-"""What the path expects of a foot; one that is due to land may do either."""
+"""Expectation of the path for a foot; one that is due to land may do either."""
 
 NO_FORCE: Array = np.zeros((0, 0))
 """In place of forces that are not measured."""
@@ -75,12 +75,9 @@ NO_FORCE: Array = np.zeros((0, 0))
 def update_contacts(c: Any, flags: NDArray[np.bool_], force: Array, dt: float) -> None:
     """Take in the flags of a tick.
 
-    Args:
-        c: of ``CONTACTS``, overwritten but for ``expected``.
-        flags: (2,) whether each foot touches anything, as its sensor says.
-        force: (2, d) force on each foot, forward first and up last [N]; ``NO_FORCE``: walls are
-            not looked for.
-        dt: since the last tick [s].
+    ``c``, of ``CONTACTS``, is overwritten but for ``expected``. ``flags`` (2,) say whether each
+    foot touches anything, ``force`` (2, d) is on each foot, forward first and up last [N];
+    ``NO_FORCE``: walls are not looked for. ``dt`` is since the last tick [s].
     """
     for foot in range(2):
         flag = 1 if flags[foot] else 0
@@ -98,19 +95,12 @@ def update_contacts(c: Any, flags: NDArray[np.bool_], force: Array, dt: float) -
 
 
 class ContactMonitor:
-    """Debounced contact state of both feet.
+    """Debounced contact state of both feet, of which ``standing`` (2,) are on ground to stand on.
 
-    A flag that says what the path expects of its foot is believed at once: a foot stands, is in
-    the air, or is due to land, where either flag is expected. Any other flag is believed after
-    ``ContactOptions.doubt``. A foot pressed against a wall does not stand.
-
-    Args:
-        options: tuning.
-        weight: of the robot [N].
-        data: (1,) of ``CONTACTS``; own memory if not given.
-
-    Attributes:
-        standing: (2,) whether each foot is on ground to stand on.
+    A flag that says what the path expects of its foot is believed at once: a foot stands, is in the
+    air, or is due to land, where either flag is expected. Any other flag is believed after
+    ``ContactOptions.doubt``. A foot pressed against a wall does not stand. ``weight`` is the
+    robot's [N]; ``data`` (1,) are of ``CONTACTS``, own memory if not given.
     """
 
     def __init__(self, options: ContactOptions, weight: float, data: Any = None) -> None:
@@ -126,7 +116,7 @@ class ContactMonitor:
             self.data[name] = 0
 
     def blocked(self, foot: int) -> bool:
-        """Whether a wall is in front of a foot."""
+        """True if a wall is in front of a foot."""
         return bool(self.data["wall"][0, foot] > 0.0)
 
     def update(
@@ -138,9 +128,7 @@ class ContactMonitor:
     ) -> None:
         """Take in the flags of a tick; see :func:`update_contacts`.
 
-        Args:
-            flags, force, dt: as there, but for ``force`` None.
-            expected: whether each foot is to touch the ground now; None: it is due to land.
+        ``expected`` is whether each foot is to touch the ground now; None: it is due to land.
         """
         self.data["expected"] = [DUE if due is None else int(due) for due in expected]
         update_contacts(self.data[0], flags, NO_FORCE if force is None else force, dt)

@@ -264,7 +264,7 @@ class EmbeddingController:
             contact: (2,) whether each foot touches the ground, as its sensor says.
             dt: control period [s].
             force: (2, d) the ground's force on each foot, forward first and up last [N], by which
-                a foot in the air tells a wall, and one that slides how slippery the ground is;
+                a foot in the air shows a wall, and one that slides how slippery the ground is;
                 None: they tell neither. Feet that also swing sideways tell no walls.
 
         Raises:

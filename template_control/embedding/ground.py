@@ -39,13 +39,8 @@ class SlopeEstimate:
     """The median of the slopes between any two of the last footholds (Theil and Sen).
 
     A single foothold that is off moves it little. Before a run the ground is taken to be level.
-
-    Args:
-        length: l0 of the template [m].
-
-    Attributes:
-        slope: the estimate, uphill positive [rad].
-        last: from the last foothold but one to the last [rad].
+    ``length`` is the template's l0 [m]; ``slope`` is the estimate, uphill positive, ``last`` the
+    slope from the last foothold but one to the last [rad].
     """
 
     def __init__(self, length: float) -> None:
@@ -54,11 +49,7 @@ class SlopeEstimate:
         self.slope = self.last = 0.0
 
     def begin(self, place: tuple[float, float]) -> None:
-        """Forget an earlier run.
-
-        Args:
-            place: x and height of the foot that stands [m].
-        """
+        """Forget an earlier run; a foot stands at a place, x and height [m]."""
         x, height = place
         before = range(_FOOTHOLDS - 1, -1, -1)
         self._places.extend((x - 0.5 * i * self._length, height) for i in before)
@@ -67,8 +58,7 @@ class SlopeEstimate:
     def stand(self, rear: tuple[float, float], front: tuple[float, float]) -> None:
         """Both feet stand where a run begins: as if the ground before had been such.
 
-        Args:
-            rear, front: x and height of the feet in the world [m].
+        ``rear`` and ``front`` are x and height of the feet in the world [m].
         """
         (x, height), (ahead, above) = rear, front
         slope = atan((above - height) / (ahead - x))
@@ -81,11 +71,9 @@ class SlopeEstimate:
         self._places.extend([(last[0] - i * away, last[1] - i * away * rise) for i in before])
 
     def land(self, place: tuple[float, float], other: tuple[float, float]) -> None:
-        """A foot has landed.
+        """A foot has landed at a place, x and height in the world [m].
 
-        Args:
-            place: its x and height in the world [m].
-            other: those of the other foot, which may have slid off an edge since it landed.
+        ``other`` is that of the other foot, which may have slid off an edge since it landed.
         """
         (x, height), (before, below) = place, other
         if abs(x - before) > _SHORTEST * self._length:
@@ -108,13 +96,10 @@ _BASE = 2  # the first coordinates are the base's place
 
 
 class SlopeFrame:
-    """Turns states into the ground's axes and what comes of them back into the world's.
+    """Turns states into the ground's axes, and results back into the world's.
 
-    Args:
-        robot: the model, whose gravity is turned as well; a free one stays in the world's axes.
-
-    Attributes:
-        angle: of the ground, uphill positive [rad].
+    The robot's gravity is turned as well; a free robot stays in the world's axes. ``angle`` is the
+    ground's, uphill positive [rad].
     """
 
     def __init__(self, robot: Biped) -> None:
@@ -132,15 +117,13 @@ class SlopeFrame:
 
     @property
     def turns(self) -> bool:
-        """Whether the robot's kind can be looked at in other axes."""
+        """True if the robot's kind can be looked at in other axes."""
         return self._planar is not None
 
     def tilt(self, angle: float, place: Array) -> None:
-        """Take other axes.
+        """Take the axes of an angle of the ground [rad].
 
-        Args:
-            angle: of the ground [rad].
-            place: (2,) a point in the present axes that keeps its coordinates [m].
+        ``place`` (2,) is a point in the present axes that keeps its coordinates [m].
         """
         if self._planar is None or angle == self.angle:
             return
@@ -153,12 +136,7 @@ class SlopeFrame:
         self._planar.turn_gravity(angle)
 
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """A robot's state in these axes; the arrays that are given stay as they are.
-
-        Args:
-            q: (nq,) configuration in the world.
-            v: (nv,) velocity in the world.
-        """
+        """q (nq,) and v (nv,) of the world in these axes; the given arrays stay as they are."""
         if self._level:
             return q, v
         inside, speed = q.copy(), v.copy()
@@ -215,11 +193,7 @@ class SlopingGround:
         self.slope.begin(self._foothold(foot))
 
     def stand(self, foot: int, other: int) -> None:
-        """Both feet stand: the ground is as steep as the line through them.
-
-        Args:
-            foot, other: the rear and the front one.
-        """
+        """Both feet, rear and front, stand: the ground is as steep as the line through them."""
         self.slope.stand(self._foothold(foot), self._foothold(other))
 
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -234,16 +208,10 @@ class SlopingGround:
     def tilt(
         self, slope: float, foot: int, supervisor: StrideSupervisor, observer: StateObserver
     ) -> bool:
-        """Turn the axes about a foot, and read the robot's model in them.
+        """Turn the axes about a foot, and read the robot's model in them; True if they turned.
 
-        Args:
-            slope: of the ground [rad].
-            foot: that keeps its coordinates.
-            supervisor: which is asked what slope it plans for.
-            observer: whose state has to be read again if the axes have turned.
-
-        Returns:
-            Whether they turned.
+        ``slope`` is the ground's [rad], as far as the supervisor plans for one; ``foot`` keeps its
+        coordinates. The observer's state has to be read again then.
         """
         robot, frame = self._robot, self.frame
         slope = supervisor.on_slope(slope) if frame.turns else 0.0

@@ -20,9 +20,7 @@ _FLOOR = 0.025  # of the weight: it leaves a foot no load to lift off with, and 
 def unload_cap(template_force: float, weight: float) -> float:
     """Largest normal force of a foot that is about to lift off [N]: near the template's.
 
-    Args:
-        template_force: vertical force of the template's leg at this phase [N].
-        weight: of the robot, m g [N].
+    ``template_force`` is the vertical force of the template's leg at this phase [N].
     """
     return _UNLOADED * max(template_force, 0.0) + _FLOOR * weight
 

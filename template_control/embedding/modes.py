@@ -105,7 +105,7 @@ _FRONT_LIFTOFF, _REST = int(Event.FRONT_LIFTOFF), int(Event.REST)
 def fired(
     g: Any, edge: tuple[int, int], s: Any, f: Any, contact: NDArray[np.uint8], time_to_go: float
 ) -> bool:
-    """Whether an edge's event has happened.
+    """True if an edge's event has happened.
 
     Args:
         g: of ``GUARDS``.
@@ -139,11 +139,8 @@ def fired(
 def first_fired(g: Any, mode: Any, path: Any, s: Any, f: Any, c: Any) -> int:
     """Number of the first edge of a mode that the robot fires; -1: none.
 
-    Args:
-        g, s, f: as for :func:`fired`.
-        mode: of ``MODE``.
-        path: of ``PATH``.
-        c: of :data:`~.contacts.CONTACTS`.
+    ``mode`` is of ``MODE``, ``path`` of ``PATH``, ``c`` of :data:`~.contacts.CONTACTS`; the rest as
+    for :func:`fired`.
     """
     for i in range(mode.edges):
         event = mode.event[i]
@@ -154,12 +151,9 @@ def first_fired(g: Any, mode: Any, path: Any, s: Any, f: Any, c: Any) -> int:
 
 
 class RobotGuards:
-    """The automaton's guards, as the robot feels them.
+    """The automaton's guards on the robot's measured state.
 
-    Args:
-        parameters: the template.
-        options: tuning.
-        data: (1,) of ``GUARDS``; own memory if not given.
+    ``data`` (1,) are of ``GUARDS``, own memory if not given.
     """
 
     def __init__(self, parameters: SlipParameters, options: GuardOptions, data: Any = None) -> None:
@@ -173,13 +167,7 @@ class RobotGuards:
         now["overstretch"] = _OVERSTRETCH * p.rest_length
 
     def fired(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
-        """Whether the edge's event has happened.
-
-        Args:
-            edge: a way out of a node.
-            sensed: the robot.
-            time_to_go: time until the template's path comes to that event [s].
-        """
+        """True if the edge's event has happened; see :func:`fired`."""
         state, feet = np.zeros(1, SENSED), np.zeros(1, FEET)
         state["state"], state["toes"] = sensed.state, sensed.toes
         feet["roles"], feet["swing_time"] = sensed.feet, sensed.swing_time
@@ -274,16 +262,10 @@ def _mode(node: Node, control: PhaseControl, nv: int, trimmed: bool) -> Mode:
 
 
 def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:
-    """A mode for each node, by its name.
+    """A mode for each node, by its name, for a robot with ``nv`` degrees of freedom.
 
-    Args:
-        automaton: whose nodes.
-        nv: degrees of freedom of the robot.
-        phases: what the controller does in each phase. Entries for nodes of the library's
-            automaton may stand in it, whatever ``automaton`` is.
-
-    Raises:
-        ParameterError: if a node has no entry, or an entry is for no node.
+    Entries for nodes of the library's automaton may stand in ``phases``, whatever ``automaton`` is.
+    A ParameterError if a node has no entry, or an entry is for no node.
     """
     known = {*automaton.index, *AUTOMATON.index}
     strangers = [key for key in phases if key not in known and key not in list(Phase)]
@@ -338,13 +320,9 @@ def move_clock(
 ) -> None:
     """Go on along the path to where the robot is now.
 
-    Args:
-        path: of ``PATH``, overwritten.
-        curve: of the path.
-        s: of :data:`~.state.SENSED`.
-        mode: of ``MODE``.
-        want: of ``REFERENCES``; ``com`` is overwritten.
-        motion: dx/dt of the CoM [m/s], and the time since the last tick [s].
+    ``path``, of ``PATH``, is overwritten, and so is ``com`` of ``want``, of ``REFERENCES``; ``s``
+    is of :data:`~.state.SENSED`, ``mode`` of ``MODE``. ``motion`` is dx/dt of the CoM [m/s], and
+    the time since the last tick [s].
     """
     speed, dt = motion
     coefficients, meta, look = curve
@@ -367,14 +345,10 @@ def move_clock(
 
 @compiled
 def plan_is_due(path: Any, mode: Any, speed: float, reference: float, now: float) -> bool:
-    """Whether the supervisor is to be asked for a new plan.
+    """True if the supervisor is to be asked for a new plan, at the time ``now`` [s].
 
-    Args:
-        path: of ``PATH``.
-        mode: of ``MODE``.
-        speed: forward, as the phase senses it [m/s].
-        reference: the path's [m/s].
-        now: time [s].
+    ``path`` is of ``PATH``, ``mode`` of ``MODE``; ``speed`` is forward, as the phase senses it,
+    ``reference`` the path's [m/s].
     """
     if path.without_touchdown:
         return False
@@ -390,17 +364,9 @@ def plan_is_due(path: Any, mode: Any, speed: float, reference: float, now: float
 class PathClock:
     """Place of the robot on the path; it persists from tick to tick.
 
-    Args:
-        parameters: the template.
-        options: when to plan again.
-        reference: (6,) template CoM x (relative to its rear toe), y, and two derivatives, which
-            the ticks write.
-        data: (1,) of ``PATH``.
-
-    Attributes:
-        time: along the path [s].
-        reference: see above.
-        forces: (2, 2) leg forces of the template there [N], rear and front.
+    ``time`` is along the path [s]. Ticks write ``reference`` (6,), the template's CoM x (relative
+    to its rear toe), y, and two derivatives; ``forces`` (2, 2) are its leg forces there [N], rear
+    and front. ``data`` (1,) are of ``PATH``.
     """
 
     time = Number("time")
@@ -422,11 +388,7 @@ class PathClock:
             self.data[name] = value
 
     def take(self, supervisor: StrideSupervisor) -> None:
-        """Take what the supervisor has planned.
-
-        Args:
-            supervisor: whose path is followed.
-        """
+        """Take what the supervisor has planned, whose path is followed."""
         now, s = self.data[0], supervisor
         gait, controls = s.planner.gait, s.decision.controls
         now["event_times"] = s.event_times

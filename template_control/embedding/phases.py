@@ -145,15 +145,7 @@ PHASES: Phases = {
 
 
 def phase_control(phases: Phases, node: Node) -> PhaseControl:
-    """The entry of a node.
-
-    Args:
-        phases: the table.
-        node: of the automaton.
-
-    Raises:
-        ParameterError: if the table has none for it.
-    """
+    """The entry of a node; a ParameterError if the table has none for it."""
     if node.name in phases:
         return phases[node.name]
     if node.phase not in phases:

@@ -29,12 +29,9 @@ Array = NDArray[np.float64]
 
 
 class Exit(NamedTuple):
-    """A way out of a stride.
+    """A way out of a stride, at a ``node`` of the automaton, into another kind of stride.
 
-    Attributes:
-        node: of the automaton, where the robot leaves its stride.
-        stride: kind of the other stride.
-        entry: node where that one goes on.
+    ``entry`` is the node where that one goes on.
     """
 
     node: str
@@ -62,10 +59,8 @@ Where both feet stand and the CoM cannot come to rest, a step is made."""
 def entry(node: str, left: str, stride: str) -> str | None:
     """Node where a stride goes on from another one; None where it cannot.
 
-    Args:
-        node: of the automaton, the robot's.
-        left: kind of the stride that is left.
-        stride: kind of the other; the same one goes on where it is.
+    The robot is in ``node`` of the kind of stride that is ``left``; the same kind goes on where it
+    is.
     """
     if stride == left:
         return node
@@ -92,7 +87,7 @@ NEEDED = frozenset((StrideKind.WALK_TO_RUN, StrideKind.RUN, StrideKind.RUN_TO_WA
 
 @dataclass(frozen=True)
 class CatchOptions(Checked):
-    """When a walk breaks into another stride, and when a run that catches it is over.
+    """Limits at which a walk breaks into another stride, and a run that catches it is over.
 
     Attributes:
         excess: a walk that is faster than wanted by less than this is left to its planner,
@@ -113,12 +108,7 @@ class CatchOptions(Checked):
 
 
 class Recovery:
-    """Goals of a walk that breaks into other strides, until it walks again.
-
-    Args:
-        parameters: the template.
-        options: when it breaks into what, and when the run is over.
-    """
+    """Goals of a walk that breaks into other strides, until it walks again."""
 
     def __init__(self, parameters: SlipParameters, options: CatchOptions | None = None) -> None:
         self.parameters = parameters
@@ -130,11 +120,7 @@ class Recovery:
         self.follow(None)
 
     def follow(self, goal: StrideGoal | None) -> None:
-        """The stride that begins is the route's own.
-
-        Args:
-            goal: of it; None at the route's end.
-        """
+        """The stride that begins is the route's own; None at the route's end."""
         self._walk = goal if goal is not None and goal.stride in _WALKS else None
         self._taken = ""  # the stride that was broken into
 
@@ -143,14 +129,9 @@ class Recovery:
         self._taken = goal.stride
 
     def goal(self, section: Section, z: Array) -> StrideGoal | None:
-        """The stride that begins where another one was broken into before.
+        """The stride that begins after one that was broken into; None where the route goes on.
 
-        Args:
-            section: that was reached.
-            z: (n,) state there.
-
-        Returns:
-            None where the route goes on.
+        ``z`` (n,) is the state at the section that was reached.
         """
         walk, back = self._walk, _AFTER.get((self._taken, section))
         if walk is None or back is None:
@@ -160,13 +141,10 @@ class Recovery:
         return replace(walk, stride=back, then=walk.stride)
 
     def ways(self, goal: StrideGoal, speed: float, excess: float) -> Sequence[StrideGoal]:
-        """What the robot can break into within a stride, the best first; empty: nothing.
+        """Strides that the robot can break into within a stride, the best first.
 
-        Args:
-            goal: of that stride.
-            speed: dx/dt now [m/s].
-            excess: by which the robot is faster than wanted [m/s]: dx/dt at the section less the
-                target's, and what disturbances have added since.
+        ``speed`` is dx/dt now; ``excess`` is by how much the robot is faster than wanted: dx/dt at
+        the section less the target's, and what disturbances have added since [m/s].
         """
         slowest, fastest = running_speeds(self.parameters)
         o, at_vlo = self.options, float(goal.target[0]) + excess

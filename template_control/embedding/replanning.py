@@ -72,12 +72,7 @@ _ASSIST = 1.5  # largest change of the forward acceleration that two legs add in
 
 
 def free_controls(automaton: Automaton, node: Node) -> list[int]:
-    """Slots of the stiffnesses that the rest of a stride depends on.
-
-    Args:
-        automaton: of the stride.
-        node: that the rest begins in.
-    """
+    """Slots of the stiffnesses on which the rest of a stride depends, from a node on."""
     later = automaton.stride(node.name)
     return sorted({int(k) for n in later for k in (n.rear, n.front) if k is not None})
 
@@ -85,15 +80,10 @@ def free_controls(automaton: Automaton, node: Node) -> list[int]:
 def touchdown_angle_after(
     sensed: TemplateState, parameters: SlipParameters, stiffness: float, time: float
 ) -> float:
-    """Touchdown angle of a front leg that comes to l0 some time from now [rad].
+    """Touchdown angle of a front leg that comes to l0 ``time`` [s] from now [rad].
 
-    The height then comes from its Taylor series to the second order.
-
-    Args:
-        sensed: the robot in single stance.
-        parameters: the template.
-        stiffness: of the leg that stands [N/m].
-        time: from now [s].
+    The height then comes from its Taylor series to the second order. The robot is in single stance,
+    on a leg of a stiffness [N/m].
     """
     x, y, _, dy = sensed.state.tolist()
     length = parameters.rest_length
@@ -106,11 +96,7 @@ def touchdown_angle_after(
 def ballistic_touchdown_angle(sensed: TemplateState, parameters: SlipParameters) -> float:
     """Angle of the template's leg as it comes to l0 on the ballistic path through the robot [rad].
 
-    The robot's foot meets the ground a little before or after.
-
-    Args:
-        sensed: the robot as its rear foot meets the ground.
-        parameters: the template.
+    ``sensed`` is the robot as its rear foot meets the ground, which is a little before or after.
     """
     x, y, dx, dy = sensed.state.tolist()
     x -= float(sensed.toes[0])
@@ -128,9 +114,7 @@ def ballistic_touchdown_angle(sensed: TemplateState, parameters: SlipParameters)
 class _Pricing(NamedTuple):
     """Price of a choice: of the state that it leads to, and of its distance from the gait's.
 
-    Attributes:
-        price: of a state.
-        gait: (f,) the gait's stiffnesses [N/m].
+    ``gait`` (f,) are the gait's stiffnesses [N/m].
     """
 
     price: Callable[[Array], float]
@@ -208,9 +192,7 @@ def _cheapest(
 def reachable_turn(scale: Scale, time_to_go: float) -> float:
     """Change of the touchdown angle that the swing foot can still make [rad].
 
-    Args:
-        scale: units of the template.
-        time_to_go: until the touchdown is due [s].
+    ``time_to_go`` is until the touchdown is due [s].
     """
     rate = AGILITY * scale.factor(RATE_SQUARED)
     return rate * min(max(time_to_go, 0.0), _FORESIGHT * scale.time) ** 2
@@ -241,12 +223,7 @@ class Situation(NamedTuple):
 
 
 def reachable_angles(rollout: TemplateRollout, s: Situation) -> tuple[float, float]:
-    """Least and greatest touchdown angle that the swing foot can still land with [rad].
-
-    Args:
-        rollout: of the present stride.
-        s: where the robot is.
-    """
+    """Least and greatest touchdown angle that the swing foot can still land with [rad]."""
     planners, u = rollout.planners, s.decision.controls
     change, angle = reachable_turn(rollout.scale, s.to_go), float(u[Slot.TOUCHDOWN_ANGLE])
     most = angle + change
@@ -265,15 +242,10 @@ def choose_all_controls(
 ) -> Decision | None:
     """Decide anew at the section state from which the template would have come to here.
 
-    Where no stride goes on from there, the gait's legs may have led to here from another one.
-
-    Args:
-        rollout: of the present stride.
-        s: where the robot is, in the first node of a stride.
-        angles: least and greatest touchdown angle that the swing foot can still reach [rad].
-
-    Returns:
-        None where the template cannot have come from a section.
+    Where no stride goes on from there, the gait's legs may have led to here from another one. The
+    robot is in the first node of a stride; ``angles`` are the least and greatest touchdown angle
+    that the swing foot can still reach [rad]. None where the template cannot have come from a
+    section.
     """
     planner = rollout.planners.of(s.goal)
 
@@ -292,12 +264,9 @@ def choose_all_controls(
 
 
 def choose_stiffnesses(rollout: TemplateRollout, s: Situation) -> Decision | None:
-    """Let the planner choose the stiffnesses that the rest of the stride depends on.
+    """Let the planner choose the stiffnesses on which the rest of the stride depends.
 
-    Arguments as for :func:`reachable_angles`.
-
-    Returns:
-        None of a planner of whole strides.
+    None of a planner of whole strides.
     """
     free = free_controls(rollout.automaton, s.node)
     ahead = rollout.ahead(s.node, s.sensed)
@@ -334,10 +303,9 @@ def _after_deviation(rollout: TemplateRollout, s: Situation) -> Decision | None:
 class Rule(NamedTuple):
     """Row of the table of causes.
 
-    Attributes:
-        choose: what can still be chosen; None where what was decided holds.
-        recovers: the robot may break into another stride.
-        angle_drop: how much lower the touchdown angle is than decided [rad].
+    ``choose`` makes what can still be chosen, None where what was decided holds; ``recovers``: the
+    robot may break into another stride; ``angle_drop`` is how much lower the touchdown angle is
+    than decided [rad].
     """
 
     choose: Callable[[TemplateRollout, Situation], Decision | None]
@@ -364,11 +332,7 @@ def choose_assist(rollout: TemplateRollout, s: Situation) -> None:
 
     For the speed at the step's end, where a foot has landed off: near a symmetric gait neither the
     touchdown angle nor a stiffness changes it. Forces of two feet do, as the assist of a template
-    on a slope.
-
-    Args:
-        rollout: of the present stride; it keeps the assist until it stands on other ground.
-        s: where the robot is.
+    on a slope. The rollout keeps the assist until it stands on other ground.
     """
     bound = _ASSIST * rollout.scale.factor(ACCELERATION)
     gait: Gait = rollout.planners.of(s.goal).gait
@@ -413,16 +377,10 @@ _LEGS = (0.4, 0.6, 0.8, 1.1)
 def find_recovery(
     rollout: TemplateRollout, s: Situation, recovery: Recovery, excess: float
 ) -> Situation | None:
-    """Another stride from here.
+    """The robot in another stride from here, one that the recovery may break into.
 
-    Args:
-        rollout: of the present stride.
-        s: where the robot is.
-        recovery: what it may break into.
-        excess: how far off the robot's speed is [m/s].
-
-    Returns:
-        The robot in that stride; None where there is none, or the template does not complete it.
+    ``excess`` is how far off the robot's speed is [m/s]. None where there is no such stride, or the
+    template does not complete it.
     """
     automaton, speed = rollout.automaton, float(s.sensed.state[2])
     for goal in recovery.ways(s.goal, speed, excess):
@@ -440,7 +398,7 @@ def find_recovery(
 
 
 def _goes_on(rollout: TemplateRollout, s: Situation) -> bool:
-    """Whether the template completes the present stride from here, with these legs or others."""
+    """True if the template completes the present stride from here, with these legs or others."""
     ahead, u = rollout.ahead(s.node, s.sensed), s.decision.controls
     legs = [u]
     free = free_controls(rollout.automaton, s.node)
@@ -473,14 +431,9 @@ def curve_or_step(
 ) -> tuple[StrideGoal, Decision, Stride]:
     """The curve of the stride's planner from here, or else the first step that leads to rest.
 
-    Args:
-        rollout: of the present stride.
-        s: where the robot is, in a node where a curve carries it.
-        state: (4,) x, y, dx/dt, dy/dt.
-
-    Returns:
-        Goal and decision that hold from now on, and the stride from here: where a step is made
-        instead, the goal's stride and the first node are others.
+    The robot is in a node where a curve carries it; ``state`` (4,) is x, y, dx/dt, dy/dt. Returns
+    goal and decision that hold from now on, and the stride from here: where a step is made instead,
+    the goal's stride and the first node are others.
     """
     planners = rollout.planners
     node, planner = s.node.name, planners.of(s.goal)

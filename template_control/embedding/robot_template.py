@@ -169,10 +169,7 @@ def startable_slopes(robot: Biped) -> tuple[float, float]:
     """Steepest ground, downhill and uphill, on which a robot sets off from a stand [rad].
 
     The template's legs weigh nothing, and its body does not turn: the heavier a robot's legs and
-    the larger its inertia, the gentler the slope.
-
-    Args:
-        robot: its last update is overwritten.
+    the larger its inertia, the gentler the slope. The robot's last update is overwritten.
     """
     gait = default_gait(robot)
     p = gait.parameters
@@ -186,13 +183,9 @@ def startable_slopes(robot: Biped) -> tuple[float, float]:
 def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
     """Speed and torque of the legs' swing, estimated with a straight leg that follows the quintic.
 
-    Args:
-        robot: last updated with straight legs, as :func:`template_for` leaves it.
-        gait: that is walked.
-
-    Returns:
-        The largest difference that it makes between the speeds of CoM and template [m/s], and the
-        largest hip torque over its limit.
+    The robot was last updated with straight legs, as :func:`template_for` leaves it. Returns the
+    largest difference that the swing makes between the speeds of CoM and template [m/s], and the
+    largest hip torque over its limit.
     """
     p = gait.parameters
     stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
@@ -218,11 +211,7 @@ def knee_torque(robot: Biped, gait: RunningGait) -> float:
     """Torque that a knee needs at the bottom of a stance, estimated [N m].
 
     A share of the template's leg force times the distance of a knee from the line between hip and
-    foot, with a thigh as long as the shank.
-
-    Args:
-        robot: its last update is overwritten.
-        gait: on the robot's template.
+    foot, with a thigh as long as the shank. The robot's last update is overwritten.
     """
     template_for(robot)  # which leaves the robot updated with straight legs
     above_hip = float(robot.com[1])
@@ -241,16 +230,10 @@ def _shortest_leg(gait: RunningGait) -> float:
 
 
 def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Positive = 1.0) -> None:
-    """Check that a robot can run with an apex of a given height.
+    """Check that a robot can run with an apex of dx/dt ``speed`` [m/s] and y ``height`` [m].
 
-    Args:
-        robot: its last update is overwritten.
-        speed: dx/dt at apex [m/s].
-        height: y there [m].
-        torque_scale: share of the URDF's torque limits that may be used.
-
-    Raises:
-        GaitError: naming the heights that can be had, if not; or if no gait has this speed.
+    Its last update is overwritten; ``torque_scale`` is the share of the URDF's torque limits that
+    may be used. A GaitError names the heights that can be had, or says that no gait has this speed.
     """
     if _bears(robot, speed, height, torque_scale):
         return
@@ -264,7 +247,7 @@ def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Posit
 
 
 def _bears(robot: Biped, speed: float, height: float, torque_scale: float) -> bool:
-    """Whether there is such a gait, and its stance does not ask too much of a knee."""
+    """True if there is such a gait, and its stance does not ask too much of a knee."""
     p = template_for(robot)
     try:
         gait = running_gait(p, speed, height)

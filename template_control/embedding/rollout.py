@@ -63,14 +63,7 @@ _TARGETS = {size: Annotated[Array, Shape((size,))] for size in (2, 3)}
 
 
 class RoutePlanners:
-    """Decisions at the sections of a route.
-
-    Args:
-        route: which stride comes next, and towards which state.
-        planners: one for each kind of stride of the route.
-        automaton: of the strides.
-        recovery: what its walks break into; None: nothing.
-    """
+    """Decisions at the sections of a route; its walks may break into a recovery's strides."""
 
     def __init__(
         self,
@@ -93,29 +86,17 @@ class RoutePlanners:
             asked(planner.reset)
 
     def first_goal(self) -> StrideGoal:
-        """The stride that the route begins with.
-
-        Raises:
-            ParameterError: if the route is empty.
-        """
+        """The stride that the route begins with; a ParameterError if the route is empty."""
         goal = self.ahead(self.route.section, self.route.start, 0.0)
         if goal is None:
             raise ParameterError("the route ends where it begins: give one with a stride")
         return goal
 
     def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
-        """The stride that begins: a recovery's, or the route's.
+        """The stride that begins: a recovery's, or the route's; None where the route ends.
 
-        Args:
-            section: where the robot is.
-            z: (n,) its state there.
-            now: time [s].
-
-        Returns:
-            None where the route ends.
-
-        Raises:
-            ParameterError: naming the route's class, if it asks for no stride that there is.
+        ``z`` (n,) is the state at the section, at the time ``now`` [s]. A ParameterError names the
+        route's class, if it asks for no stride that there is.
         """
         if self.recovery is None:
             return self._goal(self.route.next, section, z, now)
@@ -126,10 +107,7 @@ class RoutePlanners:
         return goal
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
-        """What :meth:`next` would return here; neither the route nor the recovery goes on.
-
-        Arguments as for :meth:`next`.
-        """
+        """Goal that :meth:`next` would return here; neither the route nor the recovery goes on."""
         goal = None if self.recovery is None else self.recovery.goal(section, z)
         return goal or self._goal(self.route.ahead, section, z, now)
 
@@ -153,11 +131,7 @@ class RoutePlanners:
         return goal
 
     def of(self, goal: StrideGoal) -> Planner:
-        """The planner of a goal's stride.
-
-        Raises:
-            ParameterError: if there is none.
-        """
+        """The planner of a goal's stride; a ParameterError if there is none."""
         if goal.stride not in self.planners:
             raise ParameterError(
                 f"the route asks for a stride {goal.stride!r}, and there are planners for"
@@ -175,22 +149,16 @@ class RoutePlanners:
     ) -> tuple[SectionReport, Array, bool]:
         """Learn from the stride that ended, ask the route for the next one, and plan it.
 
-        Args:
-            section: that was reached.
-            z: (n,) state there.
-            now: time [s].
-            estimators: what the controller has learnt, for the report.
-            last: of the stride that ended; None at the start.
-
-        Returns:
-            What was decided, the section state from which its path starts, and whether the route
-            goes on.
+        ``z`` (n,) is the state at the section that was reached, at the time ``now`` [s];
+        ``estimators`` are for the report, ``last`` is that of the stride that ended, None at the
+        start. Returns what was decided, the section state from which its path starts, and whether
+        the route goes on.
         """
         begin = time.perf_counter()
         if last is not None:
             asked(self.of(last.goal).observe, last.decision, z)
         wanted = self.next(section, z, now)
-        # The last stride goes on until whoever drives the robot ends the run.
+        # The last stride goes on until the loop that drives the robot ends the run.
         goal = wanted or (self.first_goal() if last is None else last.goal)
         planner = self.of(goal)
         if last is not None and last.goal.stride != goal.stride:
@@ -216,16 +184,11 @@ class RoutePlanners:
         return end.padded(goal.target)
 
     def plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
-        """A decision at ``z``, and the section state from which its path starts.
+        """A decision at ``z`` (n,), and the section state from which its path starts.
 
-        The template's leg ends at l0, cannot pull, and pushes as its spring does; the robot's
-        need not. Where the template would leave the ground or come to no second stride, the
-        path starts from a state that does, and the robot is let down or pushed up to it.
-
-        Args:
-            section: that was reached.
-            z: (n,) state there.
-            goal: the stride that begins.
+        The template's leg ends at l0, cannot pull, and pushes as its spring does; the robot's need
+        not. Where the template would leave the ground or come to no second stride, the path starts
+        from a state that does, and the robot is let down or pushed up to it.
         """
         planner = self.of(goal)
         decision = decided(planner.decide, Context(z, goal.target))
@@ -243,15 +206,9 @@ class RoutePlanners:
 class TemplateRollout:
     """Strides of the template from the robot's state.
 
-    Args:
-        planners: of the route.
-        automaton: of the strides.
-        curved: nodes in which the planner's curve is followed, not the template's springs.
-
-    Attributes:
-        scale: units of the template, by which tuned numbers are multiplied.
-        height_error: of the ground under a foot that has landed, from which on it is unexpected
-            [m].
+    In ``curved`` nodes the planner's curve is followed, not the template's springs. ``scale`` are
+    the template's units, by which tuned numbers are multiplied; ``height_error`` is that of the
+    ground under a foot that has landed, from which on it is unexpected [m].
     """
 
     def __init__(self, planners: RoutePlanners, automaton: Automaton, curved: Set[str]) -> None:
@@ -264,14 +221,7 @@ class TemplateRollout:
         self._simulator = self._mirrored = StrideSimulator(self._parameters, automaton)
 
     def set_ground(self, ground: SlipParameters) -> bool:
-        """Run the template on other ground.
-
-        Args:
-            ground: whose slope and assist count.
-
-        Returns:
-            Whether it is other ground.
-        """
+        """Run the template on ground of this slope and assist; True if it is other ground."""
         p = replace(self._parameters, slope=ground.slope, assist=ground.assist)
         if p == self._simulator.parameters:
             return False
@@ -286,13 +236,9 @@ class TemplateRollout:
         return self._simulator.parameters
 
     def forward(self, node: str, sensed: TemplateState, state: Array, u: Array) -> Stride:
-        """The template's stride from ``node`` on.
+        """The template's stride from a node on, in which its springs carry it.
 
-        Args:
-            node: of the automaton, where its springs carry it.
-            sensed: the robot, for its toes.
-            state: (4,) x, y, dx/dt, dy/dt.
-            u: controls by Slot.
+        ``sensed`` has the toes; ``state`` (4,) is x, y, dx/dt, dy/dt, ``u`` are controls by Slot.
         """
         return self._simulator.run(node, state, u, _toes(sensed))
 
@@ -301,15 +247,8 @@ class TemplateRollout:
     ) -> tuple[Decision, Stride]:
         """The planner's curve from here; what it decides on the way holds from now on.
 
-        Args:
-            node: of the automaton, where a curve carries the robot.
-            sensed: the robot, for its toes and the acceleration wanted so far.
-            state: (4,) x, y, dx/dt, dy/dt.
-            planner: of the stride.
-            decision: what holds so far.
-
-        Raises:
-            ParameterError: if the planner has none.
+        A curve carries the robot in ``node``; ``sensed`` has the toes and the acceleration wanted
+        so far; ``state`` (4,) is x, y, dx/dt, dy/dt. A ParameterError if the planner has none.
         """
         start = np.column_stack((state[:2], state[2:4], sensed.acceleration))
         return curved(planner.curve, node, start, _toes(sensed), decision)
@@ -319,17 +258,10 @@ class TemplateRollout:
     ) -> tuple[list[Stride], bool]:
         """A stride and those after it whose footholds must be known.
 
-        The next foothold must be known when the swing begins, before the next section. Where
-        no foot stands, the second one's is still further.
-
-        Args:
-            node: that the first stride begins in.
-            first: the first stride.
-            goal: of strides after the route's end.
-            now: time at which the first stride begins [s].
-
-        Returns:
-            The strides, and whether the template completes them all and lasts.
+        The next foothold must be known when the swing begins, before the next section. Where no
+        foot stands, the second one's is still further. ``first``, in ``node``, begins at the time
+        ``now`` [s]; ``goal`` is of strides after the route's end. Also returns whether the template
+        completes them all and lasts.
         """
         strides, whole, start, at = [first], True, node.name, now
         more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
@@ -351,12 +283,7 @@ class TemplateRollout:
         return strides, whole and all(stride.completed for stride in strides)
 
     def ahead(self, node: Node, sensed: TemplateState) -> EndOfStride:
-        """End of the present stride from here, by its controls.
-
-        Args:
-            node: of the automaton, the robot's.
-            sensed: the robot's state.
-        """
+        """End of the present stride from here, by its controls."""
         toes, state = _toes(sensed), sensed.state.copy()
         end = section_of(self.automaton.sections(node.name)[1])
 
@@ -371,16 +298,9 @@ class TemplateRollout:
     ) -> Array | None:
         """The section state from which the template would have come to where the robot is.
 
-        The template's dynamics are the same forward and backward: its past is the mirror
-        image of the future of the mirrored state.
-
-        Args:
-            node: of the automaton, the robot's.
-            controls: (NUM_SLOTS,) that the stride so far had.
-            sensed: the robot's state.
-
-        Returns:
-            None where the template cannot have come from there.
+        The template's dynamics are the same forward and backward: its past is the mirror image of
+        the future of the mirrored state. ``controls`` (NUM_SLOTS,) are those of the stride so far.
+        None where the template cannot have come from there.
         """
         x, y, dx, dy = sensed.state.tolist()
         before = self.automaton.before(node.name)

@@ -24,32 +24,20 @@ Array = NDArray[np.float64]
 
 @compiled
 def unrolled(lowest: float, state: Array, radius: float) -> float:
-    """Place of a rolling foot's lowest point as the CoM is over it.
+    """x of the template's toe [m] by a rolling foot's lowest point, as the CoM is over it.
 
     That point moves on by the radius times the angle that the leg turns by. So the phase would go
-    on more slowly than the CoM, and the step would end later and slower than planned.
-
-    Args:
-        lowest: x of the foot's lowest point [m].
-        state: (4,) x, y, dx/dt, dy/dt of the CoM.
-        radius: of the foot [m].
-
-    Returns:
-        x of the template's toe [m].
+    on more slowly than the CoM, and the step would end later and slower than planned. ``lowest`` is
+    x of the foot's lowest point [m], ``state`` (4,) x, y, dx/dt, dy/dt of the CoM.
     """
     return lowest - radius * np.arctan2(state[0] - lowest, state[1])
 
 
 @compiled
 def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
-    """Landing place of the lowest point of a foot whose toe is to be at ``toe``.
+    """x of the lowest point of a foot at landing [m] whose template's toe is to be at ``toe`` [m].
 
-    The inverse of :func:`unrolled`.
-
-    Args:
-        toe: x of the template's toe [m].
-        touchdown_angle: from the ground to the leg [rad].
-        radius: of the foot [m].
+    The inverse of :func:`unrolled`; the touchdown angle is from the ground to the leg [rad].
     """
     return toe - radius * (0.5 * np.pi - touchdown_angle)
 
@@ -71,16 +59,10 @@ SENSED = np.dtype(
 
 @compiled
 def read_state(s: Any, f: Any, r: Any, mode: Any) -> bool:
-    """Read the state of this tick.
+    """Read the state of this tick; True if the forward speed is finite.
 
-    Args:
-        s: of ``SENSED``, overwritten.
-        f: of :data:`~.swing.FEET`.
-        r: of ``ROBOT_DATA``.
-        mode: of :data:`~.modes.MODE`.
-
-    Returns:
-        Whether the forward speed is finite.
+    ``s``, of ``SENSED``, is overwritten; ``f`` is of :data:`~.swing.FEET`, ``r`` of ``ROBOT_DATA``,
+    ``mode`` of :data:`~.modes.MODE`.
     """
     if mode.stances > 0:
         s.ground = r.foot_position[f.landed, UP]
@@ -92,12 +74,10 @@ def read_state(s: Any, f: Any, r: Any, mode: Any) -> bool:
 
 @compiled
 def read_speed(s: Any, r: Any, mode: Any) -> bool:
-    """Read the forward speed as the phase has it.
+    """Read the forward speed as the phase has it; as :func:`read_state`.
 
-    Arguments as for :func:`read_state`, and what is returned.
-
-    The swing leg's angular momentum makes dx/dt of the CoM swing within a step while the
-    momentum about the foot, which is what the template predicts, does not.
+    The swing leg's angular momentum makes dx/dt of the CoM swing within a step while the momentum
+    about the foot, which is what the template predicts, does not.
     """
     s.state[2] = r.com_velocity[0]
     if mode.momentum_speed:
@@ -107,10 +87,7 @@ def read_speed(s: Any, r: Any, mode: Any) -> bool:
 
 @compiled
 def read_toes(s: Any, f: Any, r: Any, mode: Any) -> None:
-    """Read the template's toes.
-
-    Arguments as for :func:`read_state`.
-    """
+    """Read the template's toes; arguments as for :func:`read_state`."""
     for leg in range(2):
         toe = r.foot_position[f.roles[leg], 0]
         s.toes[leg] = unrolled(toe, s.state, r.foot_radius) if mode.rolling_contact else toe
@@ -119,12 +96,9 @@ def read_toes(s: Any, f: Any, r: Any, mode: Any) -> None:
 
 @compiled
 def predict_velocity(s: Any, acceleration: Array, dt: float) -> None:
-    """Predict the velocity that the next tick has if nothing hits the robot.
+    """Predict the velocity that the next tick, ``dt`` [s] on, has if nothing hits the robot.
 
-    Args:
-        s: of ``SENSED``, overwritten.
-        acceleration: (2,) wanted of the CoM [m/s^2].
-        dt: duration of the tick [s].
+    ``s``, of ``SENSED``, is overwritten; ``acceleration`` (2,) is wanted of the CoM [m/s^2].
     """
     for axis in range(2):
         s.pre_impact_velocity[axis] = s.state[2 + axis] + acceleration[axis] * dt
@@ -135,10 +109,9 @@ class TemplateState:
     """State of the robot in the template's terms; overwritten at every tick.
 
     Attributes:
-        state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s], y over the template's ground. Where
-            the phase says so, dx/dt includes the angular momentum about the CoM as if it moved
-            the CoM, so that m y dx/dt - m x dy/dt is the robot's angular momentum about its
-            stance foot.
+        state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s], y over the template's ground. Where the
+            phase says so, dx/dt includes the angular momentum about the CoM as if it moved the CoM,
+            so that m y dx/dt - m x dy/dt is the robot's angular momentum about its stance foot.
         toes: (2,) x of the rear and the front foot [m].
         contact: (2,) whether each foot touches the ground.
         swing_time: (2,) time since each foot lifted off [s].
@@ -201,14 +174,7 @@ class StateObserver:
         self.ground = self._height(self._feet.landed) if stands else 0.0
 
     def read(self, mode: Any) -> None:
-        """Read the state of this tick.
-
-        Args:
-            mode: of :data:`~.modes.MODE`.
-
-        Raises:
-            DivergedError: if the speed is not finite.
-        """
+        """Read the state of this tick; a DivergedError if the speed is not finite."""
         if not read_state(*self._terms, mode):
             raise self.diverged()
 
@@ -226,11 +192,7 @@ class StateObserver:
         return DivergedError(f"the forward speed of {self._robot.name} is not finite")
 
     def take_roles(self, mode: Any) -> None:
-        """The feet have changed their roles, or one of them has lifted off.
-
-        Args:
-            mode: as for :meth:`read`.
-        """
+        """The feet have changed their roles, or one of them has lifted off."""
         self._rear_shift = 0.0
         self.now.feet = self._feet.foot_of_leg
         read_toes(*self._terms, mode)
@@ -241,13 +203,10 @@ class StateObserver:
         self.now.state[1] -= self._rise(foot)
 
     def land(self, leg: Leg) -> float:
-        """Put the ground under the foot which has landed.
+        """Put the ground under the foot which has landed; how much higher it is now [m].
 
-        Where that is higher or lower than the rear foot's, the template's rear toe is moved so
-        that its leg keeps its length, and with it its force.
-
-        Returns:
-            How much higher the ground is now [m].
+        Where that is higher or lower than the rear foot's, the template's rear toe is moved so that
+        its leg keeps its length, and with it its force.
         """
         s, foot = self.now, self._feet.foot_of_leg[leg]
         self._feet.landed = foot
@@ -317,10 +276,8 @@ class FloatingSnapshot(Snapshot):
 class EstimatorState:
     """Estimates of the controller's learners at a section.
 
-    Attributes:
-        load: the load factor.
-        trim: the momentum trim [m/s^2].
-        lean: what the trunk's reference adds to the wanted mean pitch [rad].
+    ``load`` is the load factor, ``trim`` the momentum trim [m/s^2], ``lean`` what the trunk's
+    reference adds to the wanted mean pitch [rad].
     """
 
     load: float

@@ -110,10 +110,8 @@ class StrideSupervisor:
     def begin(self, section: Section) -> tuple[Planner, Node]:
         """Planner and first node of the stride that the route begins with, at ``section``.
 
-        Everything of an earlier run is forgotten.
-
-        Raises:
-            ParameterError: if the route is empty, or there is no planner for that stride.
+        Everything of an earlier run is forgotten. A ParameterError if the route is empty, or there
+        is no planner for that stride.
         """
         self._planners.reset()
         self._rollout.set_ground(self.parameters)
@@ -124,11 +122,7 @@ class StrideSupervisor:
         return self._planners.of(goal), self.automaton.start(goal.stride)
 
     def first_goal(self) -> StrideGoal:
-        """The stride that the route begins with.
-
-        Raises:
-            ParameterError: if the route is empty.
-        """
+        """The stride that the route begins with; a ParameterError if the route is empty."""
         return self._planners.first_goal()
 
     @property
@@ -147,7 +141,7 @@ class StrideSupervisor:
 
     @property
     def deciding(self) -> bool:
-        """Whether a stride has been decided in this run."""
+        """True if a stride has been decided in this run."""
         return self._begun is not None
 
     @property
@@ -157,12 +151,12 @@ class StrideSupervisor:
 
     @property
     def changes_kind(self) -> bool:
-        """Whether the present stride is of another kind than the one before."""
+        """True if the present stride is of another kind than the one before."""
         return bool(self.log) and self.log[-1].goal.stride != self.goal.stride
 
     @property
     def _along_curve(self) -> bool:
-        """Whether a curve carries the present stride, at least in part."""
+        """True if a curve carries the present stride, at least in part."""
         return self.goal.stride in self._curved_kinds
 
     # -- decisions ----
@@ -172,14 +166,7 @@ class StrideSupervisor:
     ) -> Node:
         """At a section: learn from the stride that ended, choose the next one's controls.
 
-        Args:
-            section: that was reached.
-            sensed: the robot's state.
-            now: time [s].
-            estimators: what the controller has learnt, for the report.
-
-        Returns:
-            The node that the stride begins in.
+        ``estimators`` are for the report. Returns the node that the stride begins in.
         """
         z = section.of(sensed.state)
         ended = self.reports
@@ -200,17 +187,12 @@ class StrideSupervisor:
         return node
 
     def surprise(self, node: Node, deviation: float, phase_time: float, now: float) -> Cause | None:
-        """Why to plan again, if there is something.
+        """Cause to plan again, if there is one.
 
         OVERDUE: the swing foot should have found the ground by now. DEVIATION: a disturbance has
-        carried the robot away from its path. NO_FUTURE: the path leads nowhere, and the robot has
-        broken into its stride, no stride went on, or the planner may find another way.
-
-        Args:
-            node: of the automaton, the robot's.
-            deviation: of the forward speed from the path's [m/s].
-            phase_time: time along the path [s].
-            now: time [s].
+        carried the robot away from its path, by ``deviation`` of the forward speed [m/s].
+        NO_FUTURE: the path leads nowhere, and the robot has broken into its stride, no stride went
+        on, or the planner may find another way. ``phase_time`` is along the path [s].
         """
         o = self.options
         if self.without_touchdown:
@@ -227,7 +209,7 @@ class StrideSupervisor:
         return Cause.NO_FUTURE if stuck else None
 
     def _retries(self) -> bool:
-        """Whether the planner may find another way. One along a curve is left to it."""
+        """True if the planner may find another way. One along a curve is left to it."""
         if self._along_curve:
             return False
         return not self.decision.feasible or self.planner.retries
@@ -242,18 +224,10 @@ class StrideSupervisor:
         phase_time: float = 0.0,
         height_error: float = 0.0,
     ) -> Node:
-        """Plan again from here, as the table of causes says.
+        """Plan again from here, as the table of causes says; the node that the robot is in then.
 
-        Args:
-            cause: of the new plan.
-            node: of the automaton, the robot's.
-            sensed: the robot's state.
-            now: time [s].
-            phase_time: time along the path [s].
-            height_error: of the ground under a foot that has landed over the other foot's [m].
-
-        Returns:
-            The node that the robot is in then.
+        ``phase_time`` is along the path [s]; ``height_error`` is of the ground under a foot that
+        has landed over the other foot's [m].
         """
         rule, s = RULES[cause], self._situation(node, sensed, phase_time)
         s = s._replace(cause=cause, height_error=height_error)
@@ -280,11 +254,10 @@ class StrideSupervisor:
         return Situation(node, sensed, self.goal, self.decision, whole, to_go)
 
     def _recover(self, s: Situation, now: float) -> Node | None:
-        """Break into another stride where the present one cannot go on.
+        """Break into another stride where the present one cannot go on; the robot's node in it.
 
-        Returns:
-            The node that the robot is in then, with the path from there; None where there is no
-            other stride, or the template does not complete it.
+        The path starts there. None where there is no other stride, or the template does not
+        complete it.
         """
         if self._recovery is None:
             return None
@@ -296,22 +269,14 @@ class StrideSupervisor:
         return self.follow(found.node, s.sensed, now)
 
     def set_decision(self, decision: Decision | None) -> None:
-        """From now on this decision holds for the present stride, if it is one.
-
-        Args:
-            decision: for it; None: the one so far.
-        """
+        """Let a decision hold for the present stride from now on; None keeps the one so far."""
         if decision is not None:
             self.decision = decision
 
     def on_slope(self, slope: float) -> float:
-        """Plan for another slope from now on.
+        """Plan for another slope [rad] from now on; the slope that is planned for.
 
-        Args:
-            slope: angle of the ground [rad].
-
-        Returns:
-            The slope that is planned for: 0 by a planner that knows none, or no gait there.
+        That is 0 by a planner that knows none, or where no gait is.
         """
         # All of them: the strides ahead may be others' than the present one.
         answers = {
@@ -337,7 +302,7 @@ class StrideSupervisor:
     def choose_assist(self, node: Node, sensed: TemplateState) -> None:
         """Choose the assist of a double stance that begins on ground that was not expected.
 
-        Arguments as for :meth:`follow`. The assist is a slope's: it is left to planners of slopes.
+        The assist is a slope's: it is left to planners of slopes.
         """
         if self._knows_slopes and not self._along_curve:
             choose_assist(self._rollout, self._situation(node, sensed))
@@ -347,16 +312,10 @@ class StrideSupervisor:
     def follow(
         self, node: Node, sensed: TemplateState, now: float, angle_drop: float = 0.0
     ) -> Node:
-        """Template path from here to the touchdown after the next section.
+        """Template path from here to the touchdown after the next section; the node it begins in.
 
-        Args:
-            node: of the automaton, the robot's.
-            sensed: the robot's state.
-            now: time [s].
-            angle_drop: how much lower the touchdown angle is than decided [rad].
-
-        Returns:
-            The node that the path begins in: of another stride where a curve led to no rest.
+        That is of another stride where a curve led to no rest. ``angle_drop`` is how much lower the
+        touchdown angle is than decided [rad].
         """
         return self._follow(node, sensed.state, sensed, now, angle_drop)
 

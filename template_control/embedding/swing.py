@@ -92,14 +92,10 @@ FEET = np.dtype(
 
 @compiled
 def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
-    """Advance (position, velocity, acceleration) by ``dt`` along the quintic to its target.
+    """Advance (position, velocity, acceleration) by ``dt`` [s] along the quintic to its target.
 
-    Args:
-        state: (3,) position, velocity, acceleration now [m, m/s, m/s^2]; overwritten.
-        target, speed: position [m] and velocity [m/s] at the quintic's end; the acceleration
-            there is 0.
-        time: from now to the quintic's end [s].
-        dt: how far to advance [s].
+    ``state`` (3,) [m, m/s, m/s^2] is overwritten. ``target`` [m] and ``speed`` [m/s] are those at
+    the quintic's end, ``time`` [s] from now; the acceleration there is 0.
     """
     _advance(state, target, speed, time, dt)
 
@@ -108,14 +104,11 @@ def quintic_step(state: Array, target: float, speed: float, time: float, dt: flo
 def swing_step(
     f: Any, foot: int, x: Array, y: Array, foothold: tuple[float, float, float], dt: float
 ) -> None:
-    """Advance a foot's reference by ``dt`` towards its foothold.
+    """Advance a foot's reference by ``dt`` [s] towards its foothold.
 
-    Args:
-        f: of ``FEET``.
-        foot: which.
-        x, y: (3,) position, velocity, acceleration of either [m, m/s, m/s^2]; overwritten.
-        foothold: x and y of the foothold [m], and the time until the foot is due there [s].
-        dt: how far to advance [s].
+    ``f`` is of ``FEET``; ``x``, ``y`` (3,) are position, velocity, acceleration [m, m/s, m/s^2],
+    overwritten; ``foothold`` is x and y of the foothold [m], and the time until the foot is due
+    there [s].
     """
     place, ground, to_go = foothold
     horizon, landing_speed, elapsed = f.horizon[foot], f.landing_speed[foot], f.elapsed[foot]
@@ -144,11 +137,9 @@ def meet_wall(
 ) -> None:
     """Go up along a wall that a foot has met, and stay above it from then on; or down.
 
-    Args:
-        f, foot, x, y, dt: as for :func:`swing_step`.
-        at: (3,) the foot: forward first and up last [m].
-        aim: x of the foothold in the world [m], not finite where there is none; time until the
-            foot is due [s].
+    ``at`` (3,) is the foot, forward first and up last [m]; ``aim`` is x of the foothold in the
+    world [m], not finite where there is none, and the time until the foot is due [s]. The rest as
+    for :func:`swing_step`.
     """
     x[0], x[1], x[2] = at[0], 0.0, 0.0
     near = y[1] < 0.0 and abs(aim[0] - at[0]) < f.near[foot]
@@ -175,13 +166,9 @@ def drop(f: Any, foot: int, x: Array, y: Array, dt: float) -> None:
 
 @compiled
 def furthest(share: float, hip: tuple[float, float], height: float, leg_length: float) -> float:
-    """The furthest x that a leg reaches at a height [m].
+    """The furthest x that a share of a straight leg's length reaches at a foot's height [m].
 
-    Args:
-        share: of the leg's length that is used.
-        hip: x and y of the hip [m].
-        height: of the foot [m].
-        leg_length: of the straight leg [m].
+    ``hip`` is x and y of the hip [m].
     """
     below, reach = hip[1] - height, share * leg_length
     return hip[0] + np.sqrt(max(reach * reach - below * below, 0.0))
@@ -207,14 +194,8 @@ def _advance(state: Array, target: float, speed: float, time: float, dt: float) 
 class SwingFoot:
     """Reference of a foot in the air; it persists from liftoff to touchdown.
 
-    Args:
-        options: shape of the swing.
-        reference: (2, 3) where it is kept; own memory if not given.
-        data: (1,) of ``FEET``; own memory if not given.
-        foot: of those.
-
-    Attributes:
-        x, y: (3,) position, velocity, acceleration [m, m/s, m/s^2] in the world.
+    ``x``, ``y`` (3,) are position, velocity, acceleration [m, m/s, m/s^2] in the world, kept in
+    ``reference`` (2, 3). ``data`` (1,) are of ``FEET``. Both are own memory if not given.
     """
 
     def __init__(
@@ -249,25 +230,18 @@ class SwingFoot:
         self.data["over"][0, self._foot] = -inf
 
     def start(self, position: Array, velocity: Array, elapsed: float = 0.0) -> None:
-        """Begin a swing where the foot is now.
+        """Begin a swing at the foot's position (2,) [m] and velocity (2,) [m/s] in the world.
 
-        Args:
-            position: (2,) x and y of the foot in the world [m].
-            velocity: (2,) its velocity [m/s].
-            elapsed: time since the foot left the ground [s].
+        ``elapsed`` is since the foot left the ground [s].
         """
         self.x[:] = position[0], velocity[0], 0.0
         self.y[:] = position[1], velocity[1], 0.0
         self._begin(elapsed)
 
     def advance(self, foothold: float, time_to_go: float, dt: float, ground: float) -> None:
-        """Move the reference by ``dt`` towards its foothold.
+        """Move the reference by ``dt`` [s] towards x of its foothold in the world [m].
 
-        Args:
-            foothold: x of the foothold in the world [m].
-            time_to_go: time until the foot is due there [s].
-            dt: control period [s].
-            ground: height of the foothold [m].
+        ``time_to_go`` is until the foot is due there [s]; ``ground`` is the foothold's height [m].
         """
         swing_step(*self._place, (foothold, ground, time_to_go), dt)
 
@@ -361,12 +335,10 @@ class Feet:
         self.landed = rear
 
     def lift(self, foot: int, robot: Biped, swung: float = 0.0) -> None:
-        """Begin the swing of a foot that leaves the ground, or has left it already.
+        """Begin the swing of a foot that leaves the ground, or left it ``swung`` [s] ago.
 
-        Args:
-            foot: its index, 0 or 1, in the order of the robot's ``feet``.
-            robot: the model, updated; the swing begins at the foot's position and velocity there.
-            swung: time since the foot left the ground [s].
+        ``foot`` is its index in the order of the robot's ``feet``; the swing begins at its position
+        and velocity in the updated model.
         """
         self.swing_time[foot] = swung
         self.swing[foot].start(robot.foot_position[foot], robot.foot_velocity[foot], swung)

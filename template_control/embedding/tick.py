@@ -74,7 +74,7 @@ TICK = np.dtype(
 """State of the controller from tick to tick."""
 
 QUIET, EVENTFUL, DIVERGED = 0, 1, 2
-"""What :func:`sense` finds: nothing to decide; an event, or a plan that is due; no finite state."""
+"""Results of :func:`sense`: nothing to decide; an event, or a plan that is due; no finite state."""
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
 _REAR = 0
@@ -93,11 +93,9 @@ def sense(
 ) -> int:
     """Take in what was measured, and find out whether anything is to be decided.
 
-    Args:
-        tick, data, references, qp: see the module.
-        contact: (2,) whether each foot touches the ground, as its sensor says.
-        force: (2, 2) the ground's force on each foot, forward and up [N]; ``NO_FORCE``: none.
-        dt: control period [s].
+    ``tick``, ``data``, ``references``, ``qp``: see the module. ``contact`` (2,) says whether each
+    foot touches the ground, ``force`` (2, 2) is the ground's on each foot, forward and up [N], or
+    ``NO_FORCE``; ``dt`` is the control period [s].
     """
     t, r = tick[0], data[0]
     _expect(t, r)
@@ -116,7 +114,7 @@ def sense(
 
 @compiled
 def _expect(t: Any, r: Any) -> None:
-    """Whether each foot is to touch the ground now, or is due to land.
+    """Write whether each foot is to touch the ground now, or is due to land.
 
     An overdue foot is no longer due: where it meets the ground then, nothing has foretold.
     """
@@ -133,11 +131,9 @@ def _expect(t: Any, r: Any) -> None:
 
 @compiled
 def feel_friction(tick: Any, data: Any, qp: Any, force: Array, dt: float) -> None:
-    """Let the cones be as narrow as the friction that sliding feet have felt.
+    """Let the cones be as narrow as the friction that sliding feet have shown.
 
-    Args:
-        tick, data, qp: see the module.
-        force, dt: as for :func:`.feel_slides`.
+    ``tick``, ``data``, ``qp``: see the module; the rest as for :func:`.feel_slides`.
     """
     t = tick[0]
     if feel_slides(t.slides, t.contacts.standing, force, data[0].foot_velocity, dt):
@@ -146,12 +142,9 @@ def feel_friction(tick: Any, data: Any, qp: Any, force: Array, dt: float) -> Non
 
 @compiled
 def feel_in_space(tick: Any, data: Any, qp: Any, force: Array, axes: Array, dt: float) -> None:
-    """As :func:`feel_friction`, of forces in the world.
+    """As :func:`feel_friction`, of forces (2, 3) in the world's axes [N].
 
-    Args:
-        tick, data, qp, dt: as there.
-        force: (2, 3) the ground's force on each foot in the world's axes [N].
-        axes: (3, 3) of a floating-base robot.
+    ``axes`` (3, 3) are a floating-base robot's.
     """
     feel_friction(tick, data, qp, np.dot(force, axes), dt)
 
@@ -213,14 +206,9 @@ def act(
     lateral: tuple[Any, ...] | None,
     rest: tuple[Any, ...],
 ) -> int:
-    """As :func:`advance`; then solve the QP.
+    """As :func:`advance`; then solve the QP, as :func:`.solve_free` returns it.
 
-    Args:
-        tick, robot, references, qp, curve, lateral: as there.
-        rest: as there, and ``room`` of :func:`.solve_free`.
-
-    Returns:
-        As :func:`.solve_free`.
+    ``rest`` ends in ``room`` of :func:`.solve_free`.
     """
     program, table, dt, room = rest
     advance(tick, robot, references, qp, curve, lateral, (program, table, dt))
@@ -229,11 +217,9 @@ def act(
 
 @compiled
 def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
-    """Move the references of the feet in the air towards their footholds.
+    """Move the references of the feet in the air towards their footholds, by ``dt`` [s].
 
-    Args:
-        t, r, want: of ``TICK``, ``ROBOT_DATA`` and ``REFERENCES``.
-        dt: control period [s].
+    ``t``, ``r``, ``want`` are of ``TICK``, ``ROBOT_DATA`` and ``REFERENCES``.
     """
     f, mode, path = t.feet, t.mode, t.path
     overdue = -1  # the foot that should have found the ground by now

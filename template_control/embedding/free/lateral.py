@@ -54,9 +54,8 @@ _GAIN = 0.8  # share that a steeper angle must leave of the error's price to be 
 class LateralForecast(NamedTuple):
     """Forecast of the next foothold to the side.
 
-    Attributes:
-        beyond: how far the wanted foothold is beyond its bounds [m]; NaN where none is known.
-        price: of the error that is left at the section after the foothold.
+    ``beyond`` is how far the wanted foothold is beyond its bounds [m], NaN where none is known;
+    ``price`` is of the error that is left at the section after the foothold.
     """
 
     beyond: float
@@ -64,12 +63,7 @@ class LateralForecast(NamedTuple):
 
 
 def lateral_forecast(found: Placement, aim: LateralAim) -> LateralForecast:
-    """Forecast of a foothold.
-
-    Args:
-        found: the foothold.
-        aim: what it was chosen for.
-    """
+    """Forecast of a foothold that was chosen for ``aim``."""
     error = found.state(found.y) - aim.state
     return LateralForecast(abs(found.wanted - found.y), float(error @ aim.cost @ error))
 
@@ -82,15 +76,10 @@ def early_touchdown(
 ) -> Decision:
     """The decision for a step, with a steeper touchdown where the foothold is out of reach.
 
-    Args:
-        decision: for the step as it would be.
-        decide: the step with a touchdown angle of at least so much [rad].
-        look: what is expected of a decision to the side.
-        reach: a foothold that is wanted further than this beyond its bounds is out of it [m].
-
-    Returns:
-        ``decision`` itself where its foothold is in reach, or no steeper step helps; else the step
-        that leaves the least error. It is not nominal.
+    ``decision`` itself where its foothold is in reach, or no steeper step helps; else the step that
+    leaves the least error, which is not nominal. ``decide`` makes the step with a touchdown angle
+    of at least so much [rad], ``look`` is a decision's forecast to the side; a foothold that is
+    wanted further than ``reach`` [m] beyond its bounds is out of it.
     """
     best, now = decision, look(decision)
     if not now.beyond > reach:
@@ -147,12 +136,9 @@ def lateral_foothold(
 ) -> float:
     """y of the next foothold [m]; NaN where none is known.
 
-    Args:
-        lateral: of ``LATERAL``, overwritten.
-        arrays: coefficients, meta and footholds of the :class:`.LateralPath`.
-        time: on the path [s].
-        com: (2,) y of the CoM and dy/dt [m, m/s].
-        feet: (2,) y of the feet that were rear and front at the start of the path [m].
+    ``lateral``, of ``LATERAL``, is overwritten. ``arrays`` are coefficients, meta and footholds of
+    the :class:`.LateralPath`, on which ``time`` is [s]; ``com`` (2,) is y of the CoM and dy/dt [m,
+    m/s], ``feet`` (2,) y of the feet that were rear and front at the start of the path [m].
     """
     path = LateralPath(
         coefficients=arrays[0],
@@ -194,12 +180,11 @@ class LateralPlanner:
     Args:
         parameters: the template.
         options: of the reference template.
-        wish: step width, lateral motion, turn.
+        wish: step width, lateral motion, turn; it may be changed between two steps.
         data: (1,) of ``LATERAL``, which ticks read and write.
 
     Attributes:
         learnt: what the robot adds to the template's sideways motion.
-        wish: see above; it may be changed between two steps.
         cycle: the periodic motion of the wish.
     """
 
@@ -230,22 +215,14 @@ class LateralPlanner:
         return Placement(*(now[name].copy() for name in Placement._fields))
 
     def reset(self, gait: Gait) -> None:
-        """Begin anew; nothing is learnt yet.
-
-        Args:
-            gait: that is walked.
-        """
+        """Begin anew with a gait; nothing is learnt yet."""
         self.learnt, self._planar = LateralLearnt(), None
         self.data["placed"] = 0
         self._landed, self._due = None, np.inf
         self.walk(gait)
 
     def walk(self, gait: Gait) -> None:
-        """Take the periodic motion of a gait, and of what has been learnt.
-
-        Args:
-            gait: that is walked, or walked towards.
-        """
+        """Take the periodic motion of a gait, walked or walked towards, and of what is learnt."""
         if gait is not self._gait:
             self._gait = gait
             self._lateral = lateral_gait(gait, self._unscaled)
@@ -254,29 +231,19 @@ class LateralPlanner:
     def end_step(self, stance: Side, foot: float, com: Array) -> None:
         """Learn from a nominal step that has ended at a section.
 
-        Args:
-            stance: side of the foot that stands now.
-            foot: its y [m].
-            com: (2,) y of the CoM and dy/dt [m, m/s].
+        ``stance`` is the side of the foot that stands now, at y ``foot`` [m]; ``com`` (2,) is y of
+        the CoM and dy/dt [m, m/s].
         """
         if self._landed is not None:
             surprise = com - (foot, 0.0) - self._landed.state(foot)
             self.learnt = self.learnt.after_step(stance.other, surprise, self.options.learning)
 
     def expect(self, due: float) -> None:
-        """Take note of when the touchdown is due, at a section.
-
-        Args:
-            due: from now, as the template has it [s].
-        """
+        """Take note, at a section, of the time until the template's touchdown is due [s]."""
         self._due = due
 
     def touch_down(self, lasted: float) -> None:
-        """A foot has landed; that tells how long single stance takes.
-
-        Args:
-            lasted: since the section [s].
-        """
+        """Learn the duration of single stance from a touchdown so long after the section [s]."""
         if np.isfinite(self._due) and self._due > 0.0:
             options = self.options.learning
             self.learnt = self.learnt.after_stance(lasted, self._due, options)
@@ -284,22 +251,16 @@ class LateralPlanner:
         self.data["placed"] = 0
 
     def aim(self, stance: Side) -> None:
-        """A foot swings.
-
-        Args:
-            stance: side of the other one, beside which it is to land.
-        """
+        """Choose the target of a foot that swings, next to the foot on the side ``stance``."""
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
         for name, value in self._aim._asdict().items():
             self.data[name] = value
 
     def forecast(self, path: TemplatePath, com: Array, feet: Array) -> LateralForecast:
-        """Forecast of the next foothold, where a path begins.
+        """Forecast of the next foothold, where the planar path of the robot begins.
 
-        Args:
-            path: the planar path that the robot is on.
-            com: (2,) y of the CoM and dy/dt [m, m/s].
-            feet: (2,) y of the feet that were rear and front at the start of the path [m].
+        ``com`` (2,) is y of the CoM and dy/dt [m, m/s]; ``feet`` (2,) are y of the feet that were
+        rear and front at the start of the path [m].
         """
         self._take(path)
         return lateral_forecast(place(self._path, self._aim, 0.0, com, feet), self._aim)
@@ -307,12 +268,7 @@ class LateralPlanner:
     def follow(self, path: TemplatePath, feet: tuple[int, int]) -> tuple[Any, ...]:
         """Take the planar path that the robot is on from now on.
 
-        Args:
-            path: the path.
-            feet: that were rear and front at its start.
-
-        Returns:
-            The arrays that :func:`lateral_foothold` reads.
+        ``feet`` were rear and front at its start. Returns the arrays of :func:`lateral_foothold`.
         """
         self._take(path)
         self.data["feet"] = feet

@@ -54,7 +54,6 @@ class LateralMotion:
         reach: a foothold that is wanted further than this beyond its bounds is out of reach [m].
 
     Attributes:
-        robot, planner: see above.
         turning: rate of the heading by time [rad/s].
     """
 
@@ -80,13 +79,9 @@ class LateralMotion:
         references: References,
         data: Any,
     ) -> LateralMotion:
-        """That of a controller.
+        """Lateral motion of a controller; ``options`` are not scaled.
 
-        Args:
-            robot, feet, references: see the class.
-            parameters: the template.
-            options: tuning, not scaled.
-            data: (1,) of :data:`~.lateral.LATERAL`, which ticks read and write.
+        ``data`` (1,) are of :data:`~.lateral.LATERAL`, which ticks read and write.
         """
         ready(LATERAL)
         scale = Scale.of(parameters)
@@ -95,19 +90,13 @@ class LateralMotion:
         return cls(robot, planner, feet, references, BEYOND * scale.length)
 
     def begin(self, gait: Gait) -> None:
-        """Begin a run; nothing is learnt yet.
-
-        Args:
-            gait: of its first stride.
-        """
+        """Begin a run with the gait of its first stride; nothing is learnt yet."""
         self.planner.reset(gait)
 
     def state(self, height: float, momentum_speed: bool) -> Array:
-        """(2,) y of the CoM, and dy/dt with the angular momentum as the forward speed has it.
+        """(2,) y of the CoM, and dy/dt with the angular momentum if the forward speed has it.
 
-        Args:
-            height: of the CoM over the template's ground [m].
-            momentum_speed: whether the speed includes the angular momentum.
+        ``height`` is the CoM's over the template's ground [m].
         """
         s = self.robot.space
         speed = s.com_velocity[_SIDE]
@@ -122,12 +111,8 @@ class LateralMotion:
     def end_stride(self, com: Array, nominal: bool) -> bool:
         """Learn from the stride that has just ended, and turn the heading frame.
 
-        Args:
-            com: (2,) :meth:`state` where it ended.
-            nominal: whether it went near the gait.
-
-        Returns:
-            Whether the frame has turned: the robot has to be read again.
+        ``com`` (2,) is :meth:`state` where it ended; ``nominal`` says whether it went near the
+        gait. True if the frame has turned: the robot has to be read again.
         """
         planner, stance = self.planner, self._feet.foot_of_leg[Leg.REAR]
         if nominal:
@@ -159,17 +144,9 @@ class LateralMotion:
     ) -> Node:
         """Take note of the stride that begins, and let it end sooner where that is better.
 
-        Args:
-            section: at which it begins.
-            supervisor: which has decided it; it follows another decision where there is a better
-                one.
-            node: of the automaton, the robot's.
-            sensed: the robot's state.
-            com: (2,) :meth:`state`.
-            time: since the start [s].
-
-        Returns:
-            The node that the robot is in then.
+        ``com`` (2,) is :meth:`state`, ``node`` the robot's. The supervisor, which has decided the
+        stride, follows another decision where there is a better one; returns the node that the
+        robot is in then.
         """
         planner, gait = self.planner, supervisor.planner.gait
         planner.wish = replace(planner.wish, turn=self.turning(time) * gait.step_duration)
@@ -196,11 +173,7 @@ class LateralMotion:
         return node
 
     def touch_down(self, lasted: float) -> None:
-        """A foot has landed.
-
-        Args:
-            lasted: time since the section [s].
-        """
+        """A foot has landed, ``lasted`` [s] after the section."""
         self.planner.touch_down(lasted)
 
     def lift(self, foot: int) -> None:
@@ -210,9 +183,5 @@ class LateralMotion:
         self.planner.aim(SIDES[1 - foot])
 
     def arrays(self, supervisor: StrideSupervisor) -> tuple[Any, ...]:
-        """What :func:`.lateral_foothold` reads of a path.
-
-        Args:
-            supervisor: whose path it is.
-        """
+        """Arrays of the supervisor's path that :func:`.lateral_foothold` reads."""
         return self.planner.follow(supervisor.path, supervisor.feet)

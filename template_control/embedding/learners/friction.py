@@ -66,18 +66,15 @@ SLIDES = np.dtype(
 
 @compiled
 def feel_slides(s: Any, standing: NDArray[np.uint8], force: Array, speed: Array, dt: float) -> bool:
-    """Look at how the feet move, and what acts on them.
+    """Estimate friction from the motion of the feet and their forces; True if the estimate changed.
 
     Args:
         s: of ``SLIDES``, overwritten.
-        standing: (2,) whether each foot is on ground to stand on; one that chatters is, though
-            it carries nothing every other millisecond.
+        standing: (2,) whether each foot is on ground to stand on; one that chatters is, though it
+            carries nothing every other millisecond.
         force: (2, d) the ground's force on each foot, along the ground first and up last [N].
         speed: (2, d - 1 or more) of the feet's material points along the ground [m/s].
         dt: since the last look [s].
-
-    Returns:
-        Whether the estimate has changed.
     """
     before, level = s.coefficient, force.shape[1] - 1
     for foot in range(2):
@@ -104,7 +101,7 @@ def feel_slides(s: Any, standing: NDArray[np.uint8], force: Array, speed: Array,
 
 @compiled
 def _slides_on(s: Any, foot: int, force: Array, speed: Array) -> bool:
-    """Whether a foot that stands slides, so that friction holds it back."""
+    """True if a foot that stands slides, so that friction holds it back."""
     level, power = force.shape[1] - 1, 0.0
     if s.standing[foot] < s.settling or _size(speed, foot, level) <= s.speed:
         return False
@@ -131,8 +128,8 @@ class FrictionEstimate:
     """Coulomb coefficient of the ground.
 
     The force on a foot that slides lies on the friction cone, whatever was asked for. So its mean
-    ratio while the foot slides is the coefficient. It is only ever lowered: how far a foot that
-    stands is from sliding, nothing tells; and ground that was slippery once may be so again.
+    ratio while the foot slides is the coefficient. It is only ever lowered: nothing shows how far a
+    foot that stands is from sliding; and ground that was slippery once may be so again.
 
     Args:
         options: what counts as sliding.
@@ -140,9 +137,6 @@ class FrictionEstimate:
         weight: of the robot [N].
         scale: units of the template.
         data: (1,) of ``SLIDES``; own memory if not given.
-
-    Attributes:
-        coefficient: the estimate.
     """
 
     coefficient = Number("coefficient")

@@ -2,7 +2,7 @@
 
 A trunk that leans forward carries the CoM ahead of the hips, and moves load from the knees to the
 hips. Within a running stride the pitch oscillates, as the legs' swing takes angular momentum from
-the trunk, and its mean settles beside the reference: the mean is regulated from stride to stride.
+the trunk, and its mean settles off the reference: the mean is regulated from stride to stride.
 """
 
 from __future__ import annotations
@@ -122,12 +122,9 @@ LEAN = np.dtype(
 
 @compiled
 def advance_lean(lean: Any, pitch: float, dt: float) -> float:
-    """The reference of the pitch at this tick [rad].
+    """Reference of the pitch at this tick of ``dt`` [s], from the trunk's pitch [rad].
 
-    Args:
-        lean: of ``LEAN``, overwritten.
-        pitch: of the trunk [rad].
-        dt: duration of the tick [s].
+    ``lean``, of ``LEAN``, is overwritten.
     """
     most = lean.rate * dt
     lean.mean += min(max(lean.goal - lean.mean, -most), most)
@@ -137,17 +134,11 @@ def advance_lean(lean: Any, pitch: float, dt: float) -> float:
 
 
 class TrunkLean:
-    """The trunk's reference; it persists from stride to stride.
+    """The trunk's reference, by kind of stride and speed; it persists from stride to stride.
 
-    Args:
-        options: by kind of stride and speed.
-        upright: reference of the strides without a lean of their own [rad].
-        scale: units of the template.
-        data: (1,) of ``LEAN``; own memory if not given.
-
-    Attributes:
-        mean: the mean pitch that is wanted now [rad].
-        correction: what the reference adds to it [rad].
+    ``upright`` is the reference of strides without a lean of their own, ``mean`` the mean pitch
+    that is wanted now, ``correction`` what the reference adds to it [rad]. ``data`` (1,) are of
+    ``LEAN``, own memory if not given.
     """
 
     mean, correction, _goal, _sum, _time = (
@@ -172,11 +163,7 @@ class TrunkLean:
         self._sum = self._time = 0.0
 
     def aim(self, goal: StrideGoal) -> None:
-        """A stride begins.
-
-        Args:
-            goal: the stride, and where it leads.
-        """
+        """Begin a stride with this goal."""
         lean = self.options.of(goal)
         self._goal = self.options.pitch(goal, self._upright)
         if lean is not self._lean:
@@ -186,20 +173,11 @@ class TrunkLean:
             self.mean, self._begun = self._goal, True
 
     def advance(self, pitch: float, dt: float) -> float:
-        """The reference of the pitch at this tick [rad].
-
-        Args:
-            pitch: of the trunk [rad].
-            dt: duration of the tick [s].
-        """
+        """Reference of the pitch at this tick of ``dt`` [s], from the trunk's pitch [rad]."""
         return float(advance_lean(self.data[0], pitch, dt))
 
     def end_stride(self, nominal: bool) -> None:
-        """Learn from the stride that has just ended.
-
-        Args:
-            nominal: whether the stride went near the gait. Another one teaches nothing.
-        """
+        """Learn from the stride that has just ended, if it went near the gait."""
         if nominal and self._lean is not None and self._time > 0.0:
             error = min(max(self._sum / self._time, -ERROR_BOUND), ERROR_BOUND)
             correction = self.correction + GAIN * error

@@ -54,23 +54,18 @@ class Learners:
         return EstimatorState(self.load.factor, self.trim.acceleration, self.lean.correction)
 
     def end_stride(self, section: Section, state: Array, nominal: bool) -> None:
-        """Learn from the stride that has just ended.
+        """Learn from the stride that has just ended; one that is not near the gait teaches nothing.
 
-        Args:
-            section: where it ended.
-            state: (4,) x, y, dx/dt, dy/dt there.
-            nominal: whether the stride went near the gait. Another one teaches nothing.
+        ``state`` (4,) is x, y, dx/dt, dy/dt at its section.
         """
         self.load.end_stride(nominal)
         self.trim.end_stride(section.padded(section.of(state)), nominal)
         self.lean.end_stride(nominal)
 
     def begin_stride(self, supervisor: StrideSupervisor, trimmed: bool) -> None:
-        """Take note of the stride that begins.
+        """Take note of the stride that the supervisor has decided.
 
-        Args:
-            supervisor: which has decided it.
-            trimmed: whether the momentum trim acts somewhere in it.
+        ``trimmed`` says whether the momentum trim acts somewhere in it.
         """
         if supervisor.changes_kind:
             # A walk after a run stands up; one that leant had other drifts.

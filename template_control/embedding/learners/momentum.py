@@ -59,30 +59,23 @@ LOAD = np.dtype(
 
 @compiled
 def observe_load(load: Any, feedback: float, dt: float) -> None:
-    """Add the feedback of one tick to the mean over the present stride.
+    """Add the feedback of one tick of ``dt`` [s] to the mean over the present stride.
 
-    Args:
-        load: of ``LOAD``, overwritten.
-        feedback: the feedback part of the CoM's vertical acceleration, up positive [m/s^2].
-        dt: duration of the tick [s].
+    ``load``, of ``LOAD``, is overwritten; ``feedback`` is the feedback part of the CoM's vertical
+    acceleration, up positive [m/s^2].
     """
     load.sum += feedback * dt
     load.time += dt
 
 
 class LoadEstimate:
-    """Ratio of the real to the modelled weight.
+    """Ratio of the real to the modelled weight, ``factor``, 1 at first.
 
     Over a whole step the feedback part of the CoM's vertical acceleration averages to
     nothing, unless forces computed with the model's mass do not carry the robot. All joint
     torques are then scaled by the factor learnt here; the model itself stays nominal.
-
-    Args:
-        gravity: of the robot's model [m/s^2]; the feedback is measured in units of it.
-        data: (1,) of ``LOAD``; own memory if not given.
-
-    Attributes:
-        factor: the estimate, 1 at first.
+    Feedback is measured in units of the model's ``gravity`` [m/s^2]; ``data`` (1,) are of ``LOAD``,
+    own memory if not given.
     """
 
     _sum, _time = Number("sum"), Number("time")
@@ -93,20 +86,17 @@ class LoadEstimate:
         self._gravity = gravity
 
     def observe(self, feedback: float, dt: float) -> None:
-        """Add the feedback of one tick to the mean over the present stride.
+        """Add the feedback of one tick of ``dt`` [s] to the mean over the present stride.
 
-        Args:
-            feedback: the feedback part of the CoM's vertical acceleration, up positive [m/s^2].
-            dt: duration of the tick [s].
+        It is that part of the CoM's vertical acceleration, up positive [m/s^2].
         """
         observe_load(self.data[0], feedback, dt)
 
     def end_stride(self, nominal: bool) -> None:
         """Learn from the stride that has just ended.
 
-        Args:
-            nominal: whether the stride went near the gait. Another one, such as a stride with a
-                push, teaches nothing; the estimate then leaks.
+        One that is not near the gait, such as a stride with a push, teaches nothing; the estimate
+        then leaks.
         """
         if self._time == 0.0:
             return
@@ -122,12 +112,8 @@ class LoadEstimate:
 class MomentumTrim:
     """Horizontal acceleration added in double stance, learnt from step to step.
 
-    Args:
-        parameters: the template.
-
-    Attributes:
-        drift: average drift of a step, as a forward speed [m/s].
-        acceleration: to add to the CoM's in double stance [m/s^2], 0 at first.
+    ``drift`` is the average drift of a step, as a forward speed [m/s]; ``acceleration`` is to be
+    added to the CoM's in double stance [m/s^2], 0 at first.
     """
 
     def __init__(self, parameters: SlipParameters) -> None:
@@ -145,23 +131,19 @@ class MomentumTrim:
         self.drift = 0.0
 
     def expect(self, path: TemplatePath | None, gait: Gait) -> None:
-        """Take note of the exact template's path for the step that begins.
+        """Take note of the exact template's path from this VLO to the next.
 
-        Args:
-            path: from this VLO to the next; None where nothing is to be learnt from it.
-            gait: the stride's gait; :func:`uncontrolled` tells the direction that counts.
+        None where nothing is to be learnt from it; :func:`uncontrolled` of the gait is the
+        direction that counts.
         """
         self._path = path
         if path is not None and gait is not self._gait:
             self._gait, self._left_alone = gait, uncontrolled(gait)
 
     def end_stride(self, z: Array, nominal: bool) -> None:
-        """Learn from the step that has just ended.
+        """Learn from a step that has ended in the VLO state z (3,), dx/dt, y, dy/dt [m/s, m, m/s].
 
-        Args:
-            z: (3,) VLO state dx/dt, y, dy/dt in which it ended [m/s, m, m/s].
-            nominal: whether the step went near the gait. Another one, such as a step with a push,
-                teaches nothing.
+        One that is not near the gait, such as a step with a push, teaches nothing.
         """
         path = self._path
         if path is None or not nominal:

@@ -89,8 +89,8 @@ class AheadPlanner(Planner):
     """Planner of several steps at once towards a gait of the family by speed.
 
     A governor tries shares of the wanted change of speed and takes the first whose plan is cheap.
-    What it takes is told as :attr:`~.planner.Decision.accepted`. Where no plan is cheap, as after
-    a push, the LQR planner's search finds a step to a gait near the present speed.
+    Its choice is :attr:`~.planner.Decision.accepted`. Where no plan is cheap, as after a push, the
+    LQR planner's search finds a step to a gait near the present speed.
 
     Args:
         parameters: the template; its stiffness k0 counts for nothing, each gait has its own.
@@ -212,12 +212,7 @@ class AheadPlanner(Planner):
 
 
 def plan_problem(parameters: SlipParameters, table: GaitTable) -> PlanProblem:
-    """Model and costs of the plans on a template.
-
-    Args:
-        parameters: the template.
-        table: its gaits.
-    """
+    """Model and costs of the plans on a template, with the table of its gaits."""
     scale = Scale.of(parameters)
     beyond, tolerance = RISE
     return PlanProblem(
@@ -241,7 +236,7 @@ def plan_ahead() -> None:
 
 
 AHEAD = (Part(plan_ahead, 10.0),)
-"""What this planner calls, further than a walk."""
+"""Compiled functions of this planner, in addition to a walk's."""
 
 
 def check_feasibility(route: Route, planner: AheadPlanner) -> None:

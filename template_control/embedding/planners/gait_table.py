@@ -38,9 +38,7 @@ WIDTH = 52
 class GaitTable(NamedTuple):
     """Gaits at rising speeds; where one chain of the family ends and the next begins, two.
 
-    Attributes:
-        speed: (n,) dx/dt at VLO [m/s].
-        rows: (n, WIDTH) what belongs to each.
+    ``speed`` (n,) is dx/dt at VLO [m/s]; ``rows`` (n, WIDTH) are what belongs to each.
     """
 
     speed: Array
@@ -49,12 +47,9 @@ class GaitTable(NamedTuple):
 
 @compiled
 def gait_row(table: GaitTable, speed: float, row: Array) -> None:
-    """Row of a speed, interpolated; beyond the ends the end's own.
+    """Row of a speed dx/dt at VLO [m/s], interpolated, into ``row`` (WIDTH,).
 
-    Args:
-        table: the gaits.
-        speed: dx/dt at VLO [m/s].
-        row: (WIDTH,) overwritten.
+    Beyond the ends it is the end's own.
     """
     low, high = 0, table.speed.shape[0] - 1
     while high - low > 1:
@@ -83,12 +78,7 @@ COLUMNS = np.concatenate((np.arange(PADDED), PADDED + SLOTS))
 
 
 def row_at(table: GaitTable, speed: float) -> Array:
-    """Row (WIDTH,) of a speed; see :func:`~.gait_table.gait_row`.
-
-    Args:
-        table: the gaits.
-        speed: dx/dt at VLO [m/s].
-    """
+    """Row (WIDTH,) of a speed dx/dt at VLO [m/s]; see :func:`~.gait_table.gait_row`."""
     row = np.empty(WIDTH)
     gait_row(table, speed, row)
     return row
@@ -96,11 +86,7 @@ def row_at(table: GaitTable, speed: float) -> Array:
 
 @cache
 def gait_table(parameters: SlipParameters) -> GaitTable:
-    """The library's family on a template.
-
-    Args:
-        parameters: the template; its stiffness k0 counts for nothing, each gait has its own.
-    """
+    """The library's family on a template, whose k0 is not used: each gait has its own stiffness."""
     family = walking_by_speed()
     unit = parameters.speed_unit
     parts = [_rows(chain, parameters) for chain in family.chains]

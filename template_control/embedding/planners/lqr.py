@@ -3,7 +3,7 @@
 The robot is no template: its swing leg and its impacts add something systematic to each
 step. The planner learns it, z_next = P(z, u) + d with a slowly filtered d, and aims at the
 fixed point nearest the gait's that the robot then has, so that the walk settles on the
-gait and not beside it.
+gait and not near it.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ _FLIGHT = 0.005  # [m], for the reference template
 _KNEE_STRAIGHT = 1.095  # leg length at which the knee is straight [m]: it ends above the hip
 _KNEE_MOMENT = 0.41  # of the leg force about the knee, over the weight, that costs nothing [m]
 
-# Second steps that are tried besides the law's own: alpha relative to the gait's [rad], kappa_1,
+# Second steps that are tried after the law's own: alpha relative to the gait's [rad], kappa_1,
 # kappa_2 (and kappa_p) over k0. A leg that is stiffer before its virtual bottom than after takes
 # energy out, the reverse puts some in; so does a stiff push-off.
 _SECOND_STEPS = (
@@ -155,11 +155,8 @@ class LqrOptions(Checked):
 class _Weighed:
     """End of the rest of a step, in coordinates in which the cost-to-go is a squared length.
 
-    What the robot adds to a step has mostly come in by then.
-
-    Attributes:
-        ahead: the template's end.
-        root: (3, 3) with the cost-to-go root' root.
+    The cost-to-go is root' root, root (3, 3). What the robot adds to a step has mostly come in by
+    then.
     """
 
     ahead: EndOfStride
@@ -187,10 +184,7 @@ class Rest(NamedTuple):
 def choose_rest(law: Law, costs: Array, context: RestContext) -> Rest:
     """Controls with the least cost-to-go at the step's end, and the least change.
 
-    Args:
-        law: the planner's, with its bounds.
-        costs: (c,) of its controls' squared changes.
-        context: of the rest of the step.
+    ``costs`` (c,) are those of the controls' squared changes, within the law's bounds.
     """
     ahead, controls = context.ahead, context.decision.controls
     before, outcome = ahead(controls)
@@ -418,14 +412,9 @@ class LqrPlanner(Planner):
 def settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:
     """(3 + c, 3) map from an offset d to the shift (dz, du) of the fixed point.
 
-    Minimises |dz / tolerance|^2 + control_weight |du|^2 subject to (I - A) dz = B du + d. Without
-    push-off the controls act in two directions only, so not every offset can be cancelled with
-    dz = 0.
-
-    Args:
-        a, b: (3, 3), (3, c) Jacobians of the VLO map.
-        tolerance: (3,) changes of the state that cost 1.
-        control_weight: cost of a change of a control by 1.
+    Minimises |dz / tolerance|^2 + control_weight |du|^2 subject to (I - A) dz = B du + d, with
+    A (3, 3) and B (3, c) the Jacobians of the VLO map. Without push-off the controls act in two
+    directions only, so not every offset can be cancelled with dz = 0.
     """
     weight = np.concatenate((1.0 / tolerance**2, np.full(b.shape[1], control_weight)))
     constraint, n = np.hstack((np.eye(3) - a, -b)), len(weight)

@@ -185,7 +185,7 @@ class Planner(Protocol):
         """Plan for ground that rises from now on; :meth:`reset` makes it level.
 
         Args:
-            slope: its angle, uphill positive [rad]. States are told in axes that are turned with
+            slope: its angle, uphill positive [rad]. States are given in axes that are turned with
                 the ground. :attr:`gait` stays the one of level ground.
 
         Returns:
@@ -217,15 +217,9 @@ class Planner(Protocol):
 
 
 def decided(method: Callable[P, Decision], *args: P.args, **kwargs: P.kwargs) -> Decision:
-    """A planner's decision, which a stride can be made with.
+    """Decision of a planner's method, which a stride can be made with.
 
-    Args:
-        method: of the planner.
-        args, kwargs: its arguments.
-
-    Raises:
-        ParameterError: naming the planner's class, if it is no decision or its controls are not
-            finite.
+    A ParameterError names the planner's class, if it is no decision or its controls are not finite.
     """
     decision = answered(Decision, method, *args, **kwargs)
     _check_controls(method, decision)
@@ -233,15 +227,7 @@ def decided(method: Callable[P, Decision], *args: P.args, **kwargs: P.kwargs) ->
 
 
 def rest_decided(planner: Planner, context: RestContext) -> Decision | None:
-    """A planner's decision for the rest of a stride, checked as :func:`decided`; None: it has none.
-
-    Args:
-        planner: of the stride.
-        context: of its rest.
-
-    Raises:
-        ParameterError: as there.
-    """
+    """Decision of a planner for the rest of a stride, checked as :func:`decided`, or None."""
     decision = answered_or_none(Decision, planner.decide_rest, context)
     if decision is not None:
         _check_controls(planner.decide_rest, decision)
@@ -251,14 +237,9 @@ def rest_decided(planner: Planner, context: RestContext) -> Decision | None:
 def curved(
     method: Callable[P, tuple[Decision, Stride]], *args: P.args, **kwargs: P.kwargs
 ) -> tuple[Decision, Stride]:
-    """A planner's decision along a curve, and the stride from there.
+    """A planner's decision along a curve, and the stride from there, by its :meth:`Planner.curve`.
 
-    Args:
-        method: :meth:`Planner.curve` of the planner.
-        args, kwargs: its arguments.
-
-    Raises:
-        ParameterError: naming the planner's class, if it returns something else.
+    A ParameterError names the planner's class, if it returns something else.
     """
     pair = answered(tuple, method, *args, **kwargs)
     kinds = tuple(type(part) for part in pair)

@@ -60,7 +60,8 @@ def leg_bounds(
 ) -> Array:
     """Controls that a stride may have, about those of a gait.
 
-    Compiled: a run plans three times a stride, and each plan decides on two strides.
+    (4, 3) of a :class:`~.stride_solver.Prior`. Compiled: a run plans three times a stride, and each
+    plan decides on two strides.
 
     Args:
         z: (2,) apex that the stride begins at, dx/dt and y [m/s, m].
@@ -69,9 +70,6 @@ def leg_bounds(
         rest_length: l0 [m].
         change: of alpha [rad], k_sc and k_sd (shares of the gait's) that count as 1.
         stiffness_range: k_sc and k_sd over the gait's.
-
-    Returns:
-        (4, 3) of a :class:`~.stride_solver.Prior`.
     """
     table = np.empty((4, 3))
     top = np.arcsin(min(z[1] / rest_length, 1.0)) - _TOP_MARGIN

@@ -34,10 +34,10 @@ TOP_MARGIN = 0.01
 _FIRST_WEIGHT = 0.3  # of the cost-to-go after the first step, over that after the second
 EFFORT = 0.1
 """Weight of the LQR's own cost of the first step's controls."""
-# Near some gaits the law alone settles beside them, in states in which the map is not linear.
+# Near some gaits the law alone settles next to them, in states in which the map is not linear.
 _SETTLED_PRICE = 0.01  # cost-to-go up to which a step with push-off may lead further away
 # Most points are in alpha, which decides where the foot lands; kappa_1, which matters least near
-# the best, gets two points beside the plane of alpha and kappa_2. Alphas end 0.03 rad apart.
+# the best, gets two points off the plane of alpha and kappa_2. Alphas end 0.03 rad apart.
 _COARSE = np.array([5, 3, 3, 3])  # points in alpha, kappa_1, kappa_2, kappa_p over all bounds
 _FINE = (5, 3)  # points in alpha and kappa_2 of each finer grid about the best so far
 _FINER_GRIDS = 2
@@ -74,7 +74,7 @@ class Law(NamedTuple):
         slots: (c,) places of u in a stride's controls.
         second_steps: (n, c) other controls than u_s - K (z - z_s) for the second step.
         trusted_price: a cost below which no other second step is tried, nor any other first one.
-        effort: (c,) of (u - u_s)^2 in the first step, beside both.
+        effort: (c,) of (u - u_s)^2 in the first step, added to both.
         highest: a CoM that flies higher than this [m] has left the ground.
         earliest: alpha also stays below asin(y / l0) this long after VLO [s].
         stiffness: k0 [N/m].
@@ -102,11 +102,9 @@ class Law(NamedTuple):
 
 @compiled
 def copy(source: Array, target: Array) -> None:
-    """Copy numbers; a slice would take Numba seconds to compile, for what it says of wrong shapes.
+    """Copy numbers (n,) into the first of ``target`` (m,).
 
-    Args:
-        source: (n,) of them.
-        target: (m,) overwritten, m <= n.
+    A slice would take Numba seconds to compile, for what it says of wrong shapes.
     """
     for i in range(target.shape[0]):
         target[i] = source[i]
@@ -114,14 +112,10 @@ def copy(source: Array, target: Array) -> None:
 
 @compiled
 def bounded(law: Law, z: Array, u: Array) -> None:
-    """Clip controls in place to what is admissible at a VLO state.
+    """Clip ``u`` (c,), alpha [rad] and stiffnesses/k0, to what is admissible at a VLO state z (3,).
 
-    The height a short time after VLO comes from its Taylor series to the second order.
-
-    Args:
-        law: its bounds, and its ``earliest`` count.
-        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        u: (c,) alpha [rad], stiffnesses/k0; overwritten.
+    The height a short time after VLO, the law's ``earliest``, comes from its Taylor series to the
+    second order.
     """
     for i in range(u.shape[0]):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
@@ -135,13 +129,7 @@ def bounded(law: Law, z: Array, u: Array) -> None:
 
 @compiled
 def linear(law: Law, z: Array, u: Array) -> None:
-    """Write the law's controls, within their bounds, into ``u``.
-
-    Args:
-        law: u = u_s - K (z - z_s), and the bounds.
-        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        u: (c,) overwritten with alpha [rad], stiffnesses/k0.
-    """
+    """Write the law's controls at z (3,), within their bounds, into ``u`` (c,)."""
     for i in range(u.shape[0]):
         u[i] = law.control[i]
         for j in range(3):
@@ -153,16 +141,10 @@ def linear(law: Law, z: Array, u: Array) -> None:
 def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -> int:
     """Take one walking step of the template, and add the robot's offset to where it ends.
 
-    Args:
-        law: the template's step and the offset.
-        exact: try it on the exact map; else on the improved closed form.
-        s: overwritten.
-        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        u: (c,) alpha [rad], stiffnesses/k0.
-        result: (RESULTS,) overwritten: the next VLO state first; see :func:`~.one_stride`.
-
-    Returns:
-        The Outcome's value; ``result`` means nothing where that is not SECTION.
+    ``exact`` tries the exact map, else the improved closed form. ``z`` (3,) is the VLO state dx/dt,
+    y, dy/dt [m/s, m, m/s], ``u`` (c,) alpha [rad], stiffnesses/k0; ``s`` and ``result`` (RESULTS,)
+    are overwritten, see :func:`~.one_stride`. Returns the Outcome's value; ``result`` means nothing
+    where that is not SECTION.
     """
     # The template's leg would pull at the ground, which no robot's does.
     if z[1] + max(z[2], 0.0) ** 2 / (2.0 * law.kernel.gravity) > law.highest:
@@ -183,15 +165,9 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -
 def knee_load(law: Law, z: Array, u: Array, result: Array) -> float:
     """Price of the knee load, where the legs are shortest.
 
-    A leg of length l bends a knee half-way up it, which is then sqrt(reach^2 - l^2) / 2 beside it.
-    A robot that is fast may strain its knees: legs that brake as they can slow it down all the
-    same. One that is slow sinks.
-
-    Args:
-        law: its ``knee_load``, ``stiffness`` and ``target`` count.
-        z: (3,) VLO state that the step begins in.
-        u: (c,) alpha [rad], stiffnesses/k0.
-        result: (RESULTS,) of the step.
+    A leg of length l bends a knee half-way up it, which is then sqrt(reach^2 - l^2) / 2 from its
+    line. A robot that is fast may strain its knees: legs that brake as they can slow it down all
+    the same. One that is slow sinks. The arguments are those of :func:`step`, and its result.
     """
     total, l0 = 0.0, law.kernel.rest_length
     if z[0] >= law.target[0]:
@@ -209,14 +185,9 @@ def knee_load(law: Law, z: Array, u: Array, result: Array) -> float:
 
 @compiled
 def cost_to_go(target: Array, cost: Array, z: Array) -> float:
-    """(z - z_s)^T P (z - z_s).
+    """(z - z_s)^T P (z - z_s) with ``target`` z_s (3,) and ``cost`` P (3, 3).
 
     It takes no :class:`Law`, which has 32 parts: a callee would take longer to compile.
-
-    Args:
-        target: (3,) z_s.
-        cost: (3, 3) P.
-        z: (3,) VLO state.
     """
     total = 0.0
     for i in range(3):
@@ -229,16 +200,10 @@ def cost_to_go(target: Array, cost: Array, z: Array) -> float:
 def price(
     law: Law, exact: bool, s: Scratch, z: Array, u: Array, limit: float, first: Array
 ) -> float:
-    """Cost of taking ``u`` at ``z``.
+    """Cost of taking ``u`` at ``z``; arguments as for :func:`step`.
 
-    Args:
-        law: says what a state costs.
-        exact: see :func:`step`.
-        s: overwritten.
-        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        u: (c,) alpha [rad], stiffnesses/k0.
-        limit: a cost known to be too much; the second step is not looked at beyond it.
-        first: (3,) overwritten with the state after one step.
+    ``limit`` is a cost known to be too much: the second step is not looked at beyond it. ``first``
+    (3,) is overwritten with the state after one step.
     """
     result, u2 = np.empty(RESULTS), np.empty(u.shape[0])
     if step(law, exact, s, z, u, result) != 0:
@@ -296,18 +261,9 @@ def _fine(centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
 def search(law: Law, s: Scratch, z: Array, best: Array, first: Array) -> float:
     """Improve ``best`` (c,) in place: a coarse grid over all bounds, then finer ones about it.
 
-    Far from the gait the good steps (hard braking, say, with a stiff leg before the virtual
-    bottom and a soft one after) are not near what the linear law says.
-
-    Args:
-        law: what judges.
-        s: overwritten.
-        z: (3,) VLO state.
-        best: start of the search, and its result.
-        first: (3,) overwritten with the state after the step.
-
-    Returns:
-        The price of ``best``.
+    Far from the gait the good steps (hard braking, say, with a stiff leg before the virtual bottom
+    and a soft one after) are not near the linear law's. Returns the price of ``best``; ``first``
+    (3,) is overwritten with the state after the step.
     """
     controls = best.shape[0]
     u, end, centre = np.empty(controls), np.empty(3), np.empty(controls)
@@ -339,20 +295,11 @@ def search(law: Law, s: Scratch, z: Array, best: Array, first: Array) -> float:
 
 @compiled
 def choose(law: Law, s: Scratch, z: Array, u: Array, first: Array) -> tuple[float, bool]:
-    """The law's controls, or better ones where they cost too much.
+    """The law's controls, or better ones where they cost too much, into ``u`` (c,).
 
-    One function for both: compiled code of the maps is long, and each function that Python
-    calls has one of its own.
-
-    Args:
-        law: says u, and what judges it.
-        s: overwritten.
-        z: (3,) VLO state.
-        u: (c,) overwritten with the controls: alpha [rad], stiffnesses/k0.
-        first: (3,) overwritten with the state after the step.
-
-    Returns:
-        The price of ``u``; whether it is the law's.
+    One function for both: compiled code of the maps is long, and each function that Python calls
+    has one of its own. Returns the price of ``u``, alpha [rad] and stiffnesses/k0, and whether it
+    is the law's; ``first`` (3,) is overwritten with the state after the step.
     """
     linear(law, z, u)
     cost = price(law, _ON_EXACT, s, z, u, np.inf, first)

@@ -29,12 +29,8 @@ def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Ar
     """x + dx with the least |rows dx + residual| between the bounds.
 
     A variable that would leave its bounds is held there, and the others are solved for again.
-
-    Args:
-        rows: (r, f) Jacobian of the residual, its columns independent.
-        residual: (r,) at x.
-        x: (f,) within the bounds.
-        lower, upper: (f,) bounds.
+    ``rows`` (r, f) is the Jacobian of the residual (r,) at x (f,), which is within the bounds; its
+    columns are independent.
     """
     size = x.shape[0]
     there = np.empty(size)
@@ -200,13 +196,7 @@ class StrideEnd(Protocol):
 
 @dataclass(frozen=True)
 class FromSection:
-    """A whole stride, with exact derivatives.
-
-    Attributes:
-        step: the map.
-        z: (n,) where the stride begins.
-        slots: the free controls.
-    """
+    """A whole stride from z (n,), by free slots of its controls, with exact derivatives."""
 
     step: ReturnMap
     z: Array
@@ -230,12 +220,7 @@ class FromSection:
 
 @dataclass(frozen=True)
 class FromHere:
-    """The rest of a stride, with differences: no map begins within one.
-
-    Attributes:
-        ahead: where it ends.
-        slots: the free controls.
-    """
+    """The rest of a stride, by free slots, with differences: no map begins within one."""
 
     ahead: EndOfStride
     slots: Sequence[int]
@@ -263,15 +248,9 @@ def solve_stride(
 ) -> tuple[Array, Array | None]:
     """min |(P(u) - aim) / tolerance|^2 + |(u - base) / change|^2 over bounded u.
 
-    Args:
-        stride: its P.
-        aim: (m,) where the stride should end.
-        prior: the free controls.
-        tolerance: (m,) errors that count as 1.
-
-    Returns:
-        (NUM_SLOTS,) controls; (m,) where the stride ends, None where none of those tried completes
-        it.
+    ``aim`` (m,) is where the stride should end, ``tolerance`` (m,) errors that count as 1. Returns
+    (NUM_SLOTS,) controls, and (m,) where the stride ends, None where none of those tried completes
+    it.
     """
     u = prior.controls.copy()
     wish, errors = np.array([aim, tolerance])
@@ -354,10 +333,8 @@ class _Solution:
 class NearbyStrides:
     """Solver of strides that keeps the last solutions.
 
-    Args:
-        tolerance: (m,) errors at the end that count as 1. The section that a stride begins at is
-            that which it ends at.
-        near: a state that is this many tolerances away is another stride's; 0: every one is.
+    A stride begins at the section that it ends at; ``tolerance`` (m,) are errors that count as 1. A
+    state that is ``near`` tolerances away is another stride's; 0: every one is.
     """
 
     def __init__(self, tolerance: Array, near: float) -> None:
@@ -371,13 +348,7 @@ class NearbyStrides:
         self._known.clear()
 
     def solve(self, stride: FromSection, aim: Array, prior: Prior) -> tuple[Array, Array | None]:
-        """As :func:`~.planners.stride_solver.solve_stride`.
-
-        Args:
-            stride: its P.
-            aim: (m,) where the stride should end.
-            prior: the free controls.
-        """
+        """As :func:`~.planners.stride_solver.solve_stride`."""
         change = map(abs, (aim - stride.z).tolist())
         if not all(map(lt, change, self._steady)):
             return solve_stride(stride, aim, prior, self.tolerance)
@@ -427,14 +398,8 @@ def solve_within_reach(
 ) -> tuple[Array, Array | None]:
     """The stride that comes nearest to the speed aimed at, of a few that aim at less.
 
-    Args:
-        solve: finds a stride.
-        z: (n,) where it begins.
-        aim: (n,) where it should end.
-        least: strides that miss the speed by less than this are left as they are [m/s].
-
-    Returns:
-        As ``solve``.
+    ``z`` (n,) is where it begins, ``aim`` (n,) where it should end; strides that miss the speed by
+    less than ``least`` [m/s] are left as they are. Returns as ``solve``.
     """
     u, end = solve(aim)
     if end is None:

@@ -97,7 +97,7 @@ CONTROL = (
     Part(whole_tick, 9.0),
     Part(catch, 1.3),
 )
-"""What a tick of the controller calls."""
+"""Compiled functions of a tick of the controller."""
 
 WALK = (
     Part(closed_form_map, 4.2),
@@ -106,4 +106,4 @@ WALK = (
     Part(exact_map, 2.8),
     *CONTROL,
 )
-"""What the default planner and the controller call."""
+"""Compiled functions of the default planner and the controller."""

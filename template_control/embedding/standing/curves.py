@@ -77,7 +77,7 @@ def standing_pose(
     )
 
 
-_SAMPLES = 20  # of a curve, beside its start
+_SAMPLES = 20  # of a curve, its start not counted
 _TERMS = 6
 _LIGHTEST = 0.05  # of the weight: legs do not pull
 
@@ -174,16 +174,14 @@ def curves() -> None:
 
 
 STAND = (Part(curves, 0.5),)
-"""What standing, starting and stopping call."""
+"""Compiled functions of standing, starting and stopping."""
 
 
 class Found(NamedTuple):
-    """The best curve found.
+    """The best curve found, its pieces in order.
 
-    Attributes:
-        pieces: in order.
-        excess: by how far the centre of pressure leaves the feet, or a leg its reach [m].
-        cost: excess beyond the slack, and time [m].
+    ``excess`` is by how far the centre of pressure leaves the feet, or a leg its reach; ``cost`` is
+    excess beyond the slack, and time [m].
     """
 
     pieces: tuple[Quintic, ...]
@@ -207,12 +205,9 @@ _PACE = 0.002  # excess that a second more or less counts as [m/s]
 
 @dataclass(frozen=True)
 class BetweenFeet:
-    """Both feet on the ground.
+    """Curves with both feet on the ground, whose ``toes`` are x of the rear and the front one [m].
 
-    Attributes:
-        toes: x of the rear and the front one [m].
-        parameters: the template.
-        options: tuning, for that template.
+    The options are for this template.
     """
 
     toes: tuple[float, float]
@@ -220,7 +215,7 @@ class BetweenFeet:
     options: StandingOptions
 
     def fits(self, found: Found) -> bool:
-        """Whether a curve keeps the centre of pressure between the feet, but for the slack."""
+        """True if a curve keeps the centre of pressure between the feet, but for the slack."""
         return found.excess <= self.options.slack
 
     @cached_property
@@ -269,9 +264,8 @@ class BetweenFeet:
     def loaded(self, start: Array) -> Array:
         """Starts (n, 2, 3) with accelerations that load the front foot at once.
 
-        Args:
-            start: (2, 3) x and y, each position, velocity and acceleration; the first of them. The
-                only one, where a robot that falls has its CoM on the ground: no leg bears it.
+        ``start`` (2, 3) is x and y, each position, velocity and acceleration; the first of them.
+        The only one, where a robot that falls has its CoM on the ground: no leg bears it.
         """
         x, y = start[:, 0]
         if y <= 0.0:
@@ -284,11 +278,10 @@ class BetweenFeet:
         return starts
 
     def best(self, start: Array, ends: Array) -> tuple[Found, int]:
-        """The best quintic to one of several ends, and the end's number.
+        """The best quintic to one of several ends (n, 2, 3), and the end's number.
 
-        Args:
-            start: (2, 3) x and y, each position, velocity and acceleration; or (m, 2, 3) of these.
-            ends: (n, 2, 3) the same.
+        ``start`` (2, 3) is x and y, each position, velocity and acceleration; or (m, 2, 3) of
+        these.
         """
         durations = np.geomspace(*self._durations, _DURATIONS)
         curve = np.empty((2, TERMS))
@@ -301,9 +294,8 @@ class BetweenFeet:
     def to_rest(self, start: Array, lands: bool = False) -> Found:
         """Curve to rest where the centre of pressure allows, then to the place to stand.
 
-        Args:
-            start: (2, 3) x and y, each position, velocity and acceleration.
-            lands: whether the front foot has just landed: it takes up load at once.
+        ``start`` (2, 3) is x and y, each position, velocity and acceleration; a front foot that has
+        just landed (``lands``) takes up load at once.
         """
         margin = min(self.margin, 0.5 * abs(self.spacing))
         low, high = min(self.toes) + margin, max(self.toes) - margin
@@ -317,16 +309,11 @@ class BetweenFeet:
         return self._joined(stop, self._shift(places[i], wanted))
 
     def to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
-        """Curve to one of several states in which the rear foot lifts off.
+        """Curve to one of several states in which the rear foot lifts off, and the end's number.
 
-        Args:
-            start: (2, 3) x and y, each position, velocity and acceleration.
-            ends: (n, 2, 3) the same.
-            lands: whether the front foot has just landed: it takes up load at once. If not, the
-                CoM may first move back, and rest there.
-
-        Returns:
-            What was found, and the number of the end.
+        ``start`` (2, 3) and ``ends`` (n, 2, 3) are x and y, each position, velocity and
+        acceleration. A front foot that has just landed (``lands``) takes up load at once; if none
+        has, the CoM may first move back, and rest there.
         """
         found, number = self.best(self.loaded(start) if lands else start, ends)
         if lands or self.fits(found):
@@ -359,9 +346,7 @@ class BetweenFeet:
 def with_rest(pieces: tuple[Quintic, ...], duration: float) -> tuple[Quintic, ...]:
     """A curve to rest, and some time in which the robot comes to it.
 
-    Args:
-        pieces: of the curve.
-        duration: of the rest [s]; none is added where it is not positive.
+    None is added where the duration [s] is not positive.
     """
     if duration <= 0.0:
         return pieces

@@ -54,24 +54,14 @@ _SPARE = 0.06  # distance of the capture point from either foot at landing, over
 
 
 class GaitsBySpeed(NamedTuple):
-    """Walking gaits by their speed at VLO.
-
-    Attributes:
-        gait: with a speed [m/s].
-        speeds: slowest and fastest [m/s].
-    """
+    """Walking gaits by their speed at VLO, and the slowest and the fastest speed [m/s]."""
 
     gait: Callable[[float], Gait]
     speeds: tuple[float, float]
 
 
 class SingleSupportPass(NamedTuple):
-    """A VLO, and the leg that passes it.
-
-    Attributes:
-        vlo: (3,) dx/dt, y, dy/dt [m/s, m, m/s].
-        stiffness: of the leg [N/m].
-    """
+    """A VLO state (3,), dx/dt, y, dy/dt [m/s, m, m/s], and the stiffness of the leg [N/m]."""
 
     vlo: Array
     stiffness: float
@@ -96,13 +86,7 @@ class Touchdown(NamedTuple):
 
 
 class PassTable:
-    """Passes over a leg by their speed at VLO.
-
-    Args:
-        parameters: the template.
-        options: tuning, for that template.
-        family: the gaits.
-    """
+    """Passes over a leg by their speed at VLO; the options are for this template."""
 
     def __init__(
         self, parameters: SlipParameters, options: StandingOptions, family: GaitsBySpeed
@@ -123,11 +107,7 @@ class PassTable:
         self._speeds = np.linspace(slowest, family.speeds[1], _SPEEDS)
 
     def on_slope(self, slope: float) -> PassTable:
-        """The same passes over a leg on other ground.
-
-        Args:
-            slope: its angle, uphill positive [rad].
-        """
+        """The same passes over a leg on ground of another angle, uphill positive [rad]."""
         ground = replace(self.parameters, slope=slope)
         return PassTable(ground, self.options, self.family)
 
@@ -138,9 +118,7 @@ class PassTable:
     def between(self, wanted: float, present: float) -> list[float]:
         """Speeds at VLO that are tried, the best first [m/s].
 
-        Args:
-            wanted: the first, or the nearest there is [m/s].
-            present: none lies beyond it [m/s].
+        ``wanted`` is the first, or the nearest there is; none lies beyond ``present``.
         """
         low, high = min(wanted, present), max(wanted, present)
         inside = [float(v) for v in self._speeds if low < v < high]
@@ -171,10 +149,6 @@ class PassTable:
         """States (n, 2, 3) on the way to VLO over ``toe`` [m], the last of them first.
 
         The template's dynamics are the same forward and backward.
-
-        Args:
-            over: where they lead to.
-            toe: x of the foot [m].
         """
         speed = float(over.vlo[0])
         if speed not in self._ways:
@@ -206,11 +180,9 @@ class PassTable:
         return float(load / bent)
 
     def touchdowns(self, z: Array, angles: tuple[float, float]) -> list[Touchdown]:
-        """Steps that may be made from a VLO.
+        """Steps that may be made from a VLO state z (3,).
 
-        Args:
-            z: (3,) state at VLO.
-            angles: least and greatest touchdown angle [rad].
+        ``angles`` are the least and greatest touchdown angle [rad].
         """
         k, (least, most) = self._keeping(z), _STIFFNESS
         k0 = self.parameters.leg_stiffness
@@ -244,22 +216,14 @@ class PassTable:
     def arriving(self, node: str, state: Array, u: Array, toes: Array) -> Stride:
         """The template's stride from a node on.
 
-        Args:
-            node: of the automaton.
-            state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s].
-            u: (NUM_SLOTS,) controls.
-            toes: (2,) x of the rear and the front foot [m].
+        ``state`` (4,) is x, y, dx/dt, dy/dt of the CoM [m, m/s], ``u`` (NUM_SLOTS,) are controls,
+        ``toes`` (2,) x of the rear and the front foot [m].
         """
         return self._simulator.run(node, state, u, toes)
 
 
 def width_price(apart: float, parameters: SlipParameters) -> float:
-    """Price of feet that do not close to the distance that is liked best [m].
-
-    Args:
-        apart: distance of the feet [m].
-        parameters: the template.
-    """
+    """Price of feet that stand ``apart`` [m], not at the distance that is liked best [m]."""
     return _NARROW * abs(apart - CLOSING * parameters.rest_length)
 
 
@@ -318,12 +282,7 @@ class StepPass(NamedTuple):
 class LandingTable:
     """Passes over a leg that stays, with the landings after them.
 
-    Args:
-        passes: by their speed at VLO.
-        node: of the automaton, in single stance before a touchdown.
-
-    Attributes:
-        known: passes with their landings, the slowest first.
+    ``node`` is in single stance before a touchdown; ``known`` are the passes, the slowest first.
     """
 
     def __init__(self, passes: PassTable, node: str) -> None:
@@ -337,11 +296,9 @@ class LandingTable:
         return [over for over in found if over is not None]
 
     def carrying(self, start: Array, toe: float) -> float:
-        """Stiffness with which a leg carries the weight where the CoM is [N/m].
+        """Stiffness with which a leg, its foot at x ``toe`` [m], carries the weight [N/m].
 
-        Args:
-            start: (2, 3) x and y of the CoM, each position, velocity and acceleration.
-            toe: x of the leg's foot [m].
+        ``start`` (2, 3) is x and y of the CoM, each position, velocity and acceleration.
         """
         p, (least, most) = self.parameters, _STIFFNESS
         length = float(np.hypot(start[0, 0] - toe, start[1, 0]))
@@ -351,21 +308,14 @@ class LandingTable:
     def best(self, start: Array, stiffness: float, feet: Sequence[float]) -> StepLanding | None:
         """The best landing; None where there is none.
 
-        Args:
-            start: (2, 3) x and y of the CoM, each position, velocity and acceleration.
-            stiffness: of the leg [N/m].
-            feet: x of the foot that stands and of the other one [m].
+        ``start`` (2, 3) is x and y of the CoM, each position, velocity and acceleration; the leg
+        has a stiffness [N/m]; ``feet`` are x of the foot that stands and of the other one [m].
         """
         landings = self._landings(start[:, :2].T.ravel(), stiffness, feet[0])
         return min(landings, key=lambda one: self.hurried(one, feet[1]), default=None)
 
     def hurried(self, landing: StepLanding, foot: float) -> float:
-        """Price of a landing for a foot that has to get there [m].
-
-        Args:
-            landing: of the step.
-            foot: x of the foot now [m].
-        """
+        """Price of a landing for a foot, now at x ``foot`` [m], that has to get there [m]."""
         beyond = abs(landing.toe - foot) - NIMBLE * self._scale.speed * landing.time
         return landing.price + _HURRY * max(beyond, 0.0)
 
@@ -419,8 +369,7 @@ class LandingTable:
     def capture(self, state: Array) -> float:
         """The capture point x + dx/dt sqrt(y / g) [m]; x where the CoM is not above the ground.
 
-        Args:
-            state: (2, 3) x and y of the CoM, each position, velocity and acceleration.
+        ``state`` (2, 3) is x and y of the CoM, each position, velocity and acceleration.
         """
         (x, speed, _), y = state[0], state[1, 0]
         # A robot that falls may have its CoM below where its foot was to stand.

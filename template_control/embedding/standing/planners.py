@@ -217,11 +217,8 @@ class CurvePlanner(Planner):
 class Away(NamedTuple):
     """A curve to a liftoff, and the pass from there.
 
-    Attributes:
-        found: the curve.
-        over: the pass.
-        liftoff: (2, 3) x and y at liftoff, each position, velocity and acceleration.
-        price: of all [m].
+    ``liftoff`` (2, 3) is x and y there, each position, velocity and acceleration; ``price`` is of
+    all [m].
     """
 
     found: Found
@@ -235,7 +232,7 @@ class StepPlanner(Planner):
 
     Args:
         passes: over a leg.
-        stride: which of the automaton's it makes; the leg that lifts off first tells its direction.
+        stride: which of the automaton's it makes; the first leg to lift off gives its direction.
         landings: of another such planner, to share; None: its own.
     """
 
@@ -404,9 +401,7 @@ def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
 def recovery_planners(walk: Planner, options: StandingOptions) -> dict[str, Planner]:
     """Planners of what a slow walk breaks into: both feet carry it on, or it stops and starts.
 
-    Args:
-        walk: the walk's planner.
-        options: tuning, for the reference template.
+    The options are for the reference template.
     """
     p = walk.gait.parameters
     passes = PassTable(p, scaled(options, Scale.of(p)), gaits_by_speed(p))
