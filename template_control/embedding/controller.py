@@ -331,8 +331,6 @@ class EmbeddingController:
             return solution
         return solution._replace(acceleration=self.frame.outward(solution.acceleration))
 
-    # -- modes and plans ----
-
     def _find_first_slope(self) -> None:
         """Both feet stand where a run begins: the line through them is the ground."""
         self._slope_unknown = False

@@ -159,8 +159,6 @@ class StrideSupervisor:
         """True if a curve carries the present stride, at least in part."""
         return self.goal.stride in self._curved_kinds
 
-    # -- decisions ----
-
     def decide(
         self, section: Section, sensed: TemplateState, now: float, estimators: EstimatorState
     ) -> Node:
@@ -306,8 +304,6 @@ class StrideSupervisor:
         """
         if self._knows_slopes and not self._along_curve:
             choose_assist(self._rollout, self._situation(node, sensed))
-
-    # -- the path ----
 
     def follow(
         self, node: Node, sensed: TemplateState, now: float, angle_drop: float = 0.0

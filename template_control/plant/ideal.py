@@ -222,8 +222,6 @@ class IdealPlant:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    # -- dynamics ---------------------------------------------------------------------
-
     def _see(self, q: Array, v: Array) -> None:
         """Let the robot's update be at (q, v); no state is ever changed in place."""
         if q is not self._seen[0] or v is not self._seen[1]:
@@ -318,8 +316,6 @@ class IdealPlant:
         self._impulse += impulse
         self.impacts.append(impulse)
         self._commit(self._q, self._v, np.zeros((2, 2)))
-
-    # -- constraints ------------------------------------------------------------------
 
     def _commit(self, q: Array, v: Array, impulse: Array) -> None:
         """Take over (q, v), projected onto the contacts; the robot's update is at it."""

@@ -47,9 +47,6 @@ def complete(path: Path, robot: ET.Element) -> str:
     return ET.tostring(robot, encoding="unicode")
 
 
-# ---- joints
-
-
 def check_joint_names(path: Path, robot: ET.Element, names: Iterable[str]) -> None:
     """Check that joints are there."""
     joints = {str(joint.get("name")) for joint in robot.findall("joint")}
@@ -151,9 +148,6 @@ def set_ranges(
                 limit.set("upper", f"{upper:.12g}")
 
 
-# ---- feet
-
-
 def spheres(
     path: Path,
     robot: ET.Element,
@@ -181,9 +175,6 @@ def spheres(
                 ET.SubElement(collision, "origin", xyz=vector_text(np.array(offset)))
             geometry = ET.SubElement(collision, "geometry")
             ET.SubElement(geometry, "sphere", radius=f"{radius:g}")
-
-
-# ---- meshes
 
 
 def find_meshes(path: Path, robot: ET.Element) -> None:
@@ -247,9 +238,6 @@ def _log_meshes(path: Path, count: int, name: str) -> None:
         count,
         name,
     )
-
-
-# ---- masses
 
 
 def take_points(path: Path, robot: ET.Element) -> None:
@@ -379,9 +367,6 @@ def _set_inertia(link: ET.Element, inertia: pin.Inertia | None) -> None:
     ET.SubElement(inertial, "mass", value=repr(float(inertia.mass)))
     tensor = inertia.inertia[np.triu_indices(3)].tolist()
     ET.SubElement(inertial, "inertia", dict(zip(MOMENTS, map(repr, tensor), strict=True)))
-
-
-# ---- elements
 
 
 def root_link(robot: ET.Element) -> str:
