@@ -11,8 +11,8 @@ Here stand the names that most users need; each room (``tc.slip``, ``tc.embeddin
 the rest of its own. A name is imported when it is first used, so ``import template_control``
 costs next to nothing. The public names of a room stand in its ``__init__.pyi`` and nowhere else.
 
-What is worth knowing while it works is told to the logger ``template_control``, which is silent
-until ``logging`` is told otherwise: ``logging.basicConfig(level=logging.INFO)``.
+What is worth knowing while it works goes to the logger ``template_control``, which is silent
+until ``logging`` is configured: ``logging.basicConfig(level=logging.INFO)``.
 """
 
 import logging

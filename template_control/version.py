@@ -1,4 +1,4 @@
-"""The version that the installed package's metadata tell: ``pyproject.toml`` is its one source."""
+"""The version in the installed package's metadata: ``pyproject.toml`` is its one source."""
 
 from importlib.metadata import PackageNotFoundError, version
 

@@ -84,7 +84,7 @@ def _same(value: Any, other: Any) -> bool:
 
 
 def is_default(f: Field[Any], value: Any) -> bool:
-    """Whether a field has its default value.
+    """True if a field has its default value.
 
     Args:
         f: of a dataclass.
@@ -126,7 +126,7 @@ def checked(function: Callable[P, T]) -> Callable[P, T]:
 
     def fitting(key: str, value: Any, declared: str | None) -> Any:
         found = hints()
-        if declared not in found:  # self; or one too many, which Python tells
+        if declared not in found:  # self; or one too many, which Python reports
             return value
         return check(f"{called}: {key}", value, found[declared])
 

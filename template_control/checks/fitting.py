@@ -110,7 +110,7 @@ def check(
 
 
 _PLANS: dict[int, tuple[Any, Callable[[Any], Any]]] = {}
-"""How to fit a value to an annotation, by the annotation's identity; to hash one takes long."""
+"""Functions that fit values to annotations, by the annotation's identity: hashing takes long."""
 
 
 def fitter(hint: Any) -> Callable[[Any], Any]:

@@ -130,7 +130,7 @@ class _Lines(logging.Handler):
 
 @contextmanager
 def _failures_told() -> Iterator[None]:
-    """Tell on the terminal, at once, that a run's QP fails."""
+    """Report on the terminal, at once, that a run's QP fails."""
     lines = _Lines(logging.WARNING)
     failures.LOG.addHandler(lines)
     try:

@@ -83,7 +83,7 @@ class EmbeddingController:
         path_clock: the robot's place on that path, and the template there.
         learners: what is learnt from stride to stride.
         contacts: which feet stand.
-        ground: its slope, as the feet tell it.
+        ground: its slope, by the footholds.
         frame: axes that lean with the ground.
         observer: the robot's state in the template's terms.
         references: what the tasks read.
@@ -265,7 +265,7 @@ class EmbeddingController:
             dt: control period [s].
             force: (2, d) the ground's force on each foot, forward first and up last [N], by which
                 a foot in the air shows a wall, and one that slides how slippery the ground is;
-                None: they tell neither. Feet that also swing sideways tell no walls.
+                None: they show neither. Feet that also swing sideways show no walls.
 
         Raises:
             DivergedError: if the state is not finite.

@@ -193,7 +193,7 @@ MODE = np.dtype(
         ("momentum_speed", _I),  # flags of the phase's entry in the table
         ("rolling_contact", _I),
         ("trim_momentum", _I),
-        ("estimate_load", _I),  # and a task tells the feedback
+        ("estimate_load", _I),  # and a task gives the feedback
         ("unloads", _I, (2,)),  # whether each leg has its normal force kept near the template's
     ],
     align=True,

@@ -101,7 +101,7 @@ _SINGLE_STANCE = PhaseControl(
     tasks=(ComTask((0.01, 10.0)), PostureTask(), FootTask(Leg.FRONT)),
     swings=(Leg.FRONT,),
 )
-# A step from a stand may go back, and nearly rest over its foot: directions tell no time.
+# A step from a stand may go back, and nearly rest over its foot: directions give no time.
 _STEPPING = replace(_SINGLE_STANCE, clock=Clock.TIME, follow_curve=True)
 
 PHASES: Phases = {

@@ -28,7 +28,7 @@ class Readings(NamedTuple):
     """Sensor readings of one tick; the position in the world is not measured.
 
     Attributes:
-        joints: (nu,) angles that the encoders tell [rad].
+        joints: (nu,) angles of the encoders [rad].
         pitch_rate: of the trunk, from the gyro, forward positive [rad/s].
         specific_force: (2,) from the accelerometer, forward and up along the trunk: its
             acceleration less gravity, mean since the tick before [m/s^2].

@@ -32,7 +32,7 @@ class Plant(Protocol):
         """Duration of a :meth:`step` [s]."""
 
     def ground_height(self, x: float) -> float:
-        """Height of the ground at ``x`` [m]; to tell a fall, and to stand on at the start."""
+        """Height of the ground at ``x`` [m]; to notice a fall, and to stand on at the start."""
 
     def reset(self, q: Array, v: Array) -> None:
         """Place the robot in a state; only for the start of a run.

@@ -202,7 +202,7 @@ def _rows(
     """
     jacobian, rates = np.empty_like(lowest), np.empty((2, 2))
     for foot in range(2):
-        # From the sphere's lowest point, which the model tells, to the one that touches.
+        # From the sphere's lowest point, which is the model's, to the one that touches.
         x = radius * (1.0 - axes[foot, 1, 1])
         y = radius * axes[foot, 1, 0]
         for axis in range(2):

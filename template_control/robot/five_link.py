@@ -264,7 +264,7 @@ class FloatingBaseFiveLink(Checked):
 
     Attributes:
         planar: the links, limits and ranges of the sagittal plane. Links that are no rods are
-            :class:`SolidLink`; the trunk's moments tell most.
+            :class:`SolidLink`; the trunk's moments count most.
         block: of either hip.
 
     Raises:

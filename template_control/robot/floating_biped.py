@@ -143,7 +143,7 @@ class FloatingBaseBiped(Biped):
 
     @staticmethod
     def _model_of(path: Path, urdf: str) -> pin.Model:
-        build_model(path, urdf)  # which tells what is wrong with it
+        build_model(path, urdf)  # which says what is wrong with it
         return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
 
     def _prepare(self) -> None:
@@ -248,7 +248,7 @@ class FloatingBaseBiped(Biped):
         """
         x, y, z, w = q[3:7].tolist()
         square = x * x + y * y + z * z + w * w
-        if abs(square - 1.0) > _UNIT:  # NaN and infinity are told below
+        if abs(square - 1.0) > _UNIT:  # NaN and infinity are reported below
             q = self._with_unit(q, sqrt(square))
         drift, out = self._compute(q, v), (self.data, self._out)
         if not gather_floating(self._sources, q, v, drift, *out, self._base):

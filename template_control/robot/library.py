@@ -100,7 +100,7 @@ def robot_path(name: str) -> Path:
     if entry.distribution:
         candidates = _files(entry)
     else:
-        # A wheel carries the folder inside the package, a checkout beside it.
+        # A wheel carries the folder inside the package, a checkout next to it.
         candidates = [root / "robots" / entry.file for root in (_PACKAGE, _PACKAGE.parent)]
     for path in candidates:
         if path.is_file():

@@ -102,7 +102,7 @@ class PlanarBiped(Biped):
             walk: see the attribute.
             lossless: whether the joints' damping and friction are left out.
 
-        Meshes are looked for beside the URDF and in its package. One that is only shown may be
+        Meshes are looked for next to the URDF and in its package. One that is only shown may be
         missing: the log says so.
 
         Raises:

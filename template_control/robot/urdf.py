@@ -208,7 +208,7 @@ def _is_loss(text: str) -> bool:
 
 
 def _tell_rotors(path: Path, robot: ET.Element) -> None:
-    """Log the first joint or transmission that tells a rotor's inertia."""
+    """Log the first joint or transmission that has a rotor's inertia."""
     for part in (*robot.findall("joint"), *robot.findall("transmission")):
         for element in part.iter():
             local = element.tag.rpartition("}")[2]

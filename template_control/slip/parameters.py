@@ -55,5 +55,5 @@ class SlipParameters(Checked):
 
     @property
     def speed_unit(self) -> float:
-        """sqrt(g l0), the speed that others are told over [m/s]."""
+        """sqrt(g l0), the unit of other speeds [m/s]."""
         return sqrt(self.gravity * self.rest_length)

@@ -388,7 +388,7 @@ def targeted(
         section: VLO or APEX.
         held: the target's other quantity.
         varied: which of :data:`VARIED` the policy's second argument is.
-        guess: (NUM_SLOTS,) controls to search from, which tell gaits of the same target apart.
+        guess: (NUM_SLOTS,) controls to search from, which distinguish gaits of one target.
     """
 
     def controls(z: Array, value: float) -> Array:

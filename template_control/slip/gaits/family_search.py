@@ -270,7 +270,7 @@ def _on_gaits(speeds: Array, chain: Array) -> Array:
         try:
             found[i] = coordinates(nearest_gait(REFERENCE, speed, chain[i]))
         except GaitError:
-            continue  # the links beside it pull it back onto the surface
+            continue  # its neighbours pull it back onto the surface
     return found
 
 

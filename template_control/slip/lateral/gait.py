@@ -61,9 +61,9 @@ class LateralOptions(Checked):
         state_cost: on y and dy/dt at a section, over those of the periodic gait
             [1/m^2, s^2/m^2]: equal for both where dy/dt is measured by sqrt(g / l0).
         step_cost: on the next foot's distance to the stance foot, over the gait's [1/m^2].
-        widths: least and largest distance aside between two footholds [m]: feet do not cross,
+        widths: least and largest lateral distance between two footholds [m]: feet do not cross,
             and legs open so far only.
-        reach: largest distance aside between CoM and foot at touchdown [m].
+        reach: largest lateral distance between CoM and foot at touchdown [m].
         hold: a foothold is not changed so shortly before touchdown [s]: the foot cannot follow.
         learning: how the robot's own part is learnt.
     """
@@ -214,7 +214,7 @@ def lateral_cycle(
 
     Args:
         lateral: the step map.
-        wish: width, motion aside and turn.
+        wish: width, lateral motion and turn.
         offset: (2, 2) what the robot adds to X' after a step from the left and from the right
             foot; None: nothing.
     """

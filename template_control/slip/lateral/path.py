@@ -15,8 +15,8 @@ where f_i is the leg force of the planar path. By the mirror symmetry of left an
 of x and z is of the second order in y - y_i, and that of y of the third. For a robot whose CoM is
 held on the planar path, and whose forces pass through the CoM, the equation is exact.
 
-The path itself tells c_i, whatever makes its forces: sum_i c_i = (d2z/dt2 + g) / z, and in double
-stance sum_i c_i x_i = sum_i c_i x - d2x/dt2.
+c_i follows from the path itself, whatever makes its forces: sum_i c_i = (d2z/dt2 + g) / z, and in
+double stance sum_i c_i x_i = sum_i c_i x - d2x/dt2.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class LateralPath(NamedTuple):
         touchdown: time of the next touchdown [s], inf if the path has none.
         section: time of the first section after it [s], inf if the path does not come there or
             starts below the ground.
-        beside: index, 0 or 1, of the foothold beside which the next foot lands.
+        beside: index, 0 or 1, of the foothold next to which the next foot lands.
     """
 
     coefficients: Array
@@ -102,7 +102,7 @@ def lateral_path(strides: Sequence[Stride], gravity: float) -> LateralPath:
 def _footholds(
     meta: Array, resets: Sequence[tuple[float, Reset]]
 ) -> tuple[NDArray[np.int64], float, int]:
-    """Foothold of each leg in each segment; time of the first landing, and beside which."""
+    """Foothold of each leg in each segment; time of the first landing, and next to which."""
     legs = np.arange(2)  # the foothold of each role
     landings: list[tuple[float, int]] = []
     footholds = np.tile(legs, (len(meta), 1))

@@ -249,4 +249,4 @@ def sideways() -> None:
 
 
 LATERAL = (Part(sideways, 2.0),)
-"""What a tick of a robot that is free in space calls, for :func:`~template_control.parts.ready`."""
+"""Compiled functions of a floating-base tick, for :func:`~template_control.warm_up.ready`."""

@@ -158,7 +158,7 @@ class SteadyRoute:
 
 @dataclass(frozen=True)
 class SpeedProfile(Checked):
-    """Speeds at times, and straight lines between them; called with a time, it tells the speed.
+    """Speeds at times, and straight lines between them; called with a time, it gives the speed.
 
     Before the first time and after the last the speed is that time's.
 
@@ -194,7 +194,7 @@ class SpeedProfile(Checked):
 
 
 class SpeedCommand:
-    """A speed that may be set at any time; called with a time, it tells the present one.
+    """A speed that may be set at any time; called with a time, it gives the present one.
 
     A route asks at each section. So what is set holds from the next VLO on.
 

@@ -25,7 +25,7 @@ STAND_HEIGHT = 0.97
 """Height at which a robot stands, over l0."""
 
 MOST_STRIDES = 10_000
-"""How many strides a scenario may have."""
+"""Largest number of strides of a scenario."""
 _OF_MOTION = ("speed", "acceleration", "until_speed", "steps")
 _LONGEST = 3600.0  # [s] of a scenario
 _HARDEST = 100.0  # [m/s^2]
@@ -260,7 +260,7 @@ def example_one(
 ) -> Scenario:
     """The paper's Example I (Section V-A): walk, run up to 5 m/s and down again, walk.
 
-    It starts at the VLO speed that is 1.17 m/s on average, as Section V-A tells it (Table IV
+    It starts at the VLO speed that is 1.17 m/s on average, as Section V-A has it (Table IV
     has 1.1 m/s there, which is 1.13 m/s on average); it ends at Table IV's 1.1 m/s.
 
     Args:

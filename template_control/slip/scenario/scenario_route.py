@@ -19,7 +19,7 @@ from template_control.slip.similarity import tuned
 
 @dataclass(frozen=True)
 class PaceOptions(Checked):
-    """When a walk of a scenario that stands changes its speed by a stride of its own.
+    """Speeds at which a walk of a scenario that stands takes a stride of its own for a change.
 
     All are speeds at VLO over sqrt(g l0).
 
@@ -140,7 +140,7 @@ class _Progress:
 class ScenarioRoute:
     """The route of a :class:`~.scenario.Scenario`: its speed profile and its gaits.
 
-    The times of the calls tell how long strides take, how many were made, and when a
+    The times of the calls show how long strides take, how many were made, and when a
     transition has led to the segment that it belongs to.
 
     Args:
@@ -200,7 +200,7 @@ class ScenarioRoute:
         return self._go(section, z, now)[1]
 
     def took(self, duration: float) -> None:
-        """Tell how long the stride under way took [s], before the section it ends at.
+        """Take note of how long the stride under way took [s], before the section it ends at.
 
         This call is optional. Without it the duration is a difference of two times, with its
         rounding.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from template_control.view.replay.viewer import ReplayServer
 
 # meshcat brings ZeroMQ and IPython along: it is imported where a replay begins, so that
-# whoever only walks a robot does not wait for it.
+# nobody who only walks a robot waits for it.
 
 FPS = 30.0
 GIF_FPS, GIF_SECONDS = 20.0, 4.0
