@@ -84,12 +84,7 @@ def _same(value: Any, other: Any) -> bool:
 
 
 def is_default(f: Field[Any], value: Any) -> bool:
-    """True if a field has its default value.
-
-    Args:
-        f: of a dataclass.
-        value: of an instance.
-    """
+    """True if the value of a dataclass field is its default."""
     if f.default_factory is not MISSING:
         return _same(value, f.default_factory())
     return f.default is not MISSING and _same(value, f.default)

@@ -171,14 +171,9 @@ class SlopeFrame:
 class SlopingGround:
     """Learns how steep the ground is, and turns the axes as far as the planner knows slopes.
 
-    Args:
-        robot: the model; every tick updates it, in these axes.
-        length: l0 of the template [m].
-
-    Attributes:
-        frame: the axes.
-        slope: the estimate.
-        raw_state: the robot's configuration and velocity in the world, as they were measured last.
+    Every tick updates the robot's model in these axes, ``frame``; ``length`` is the template's l0
+    [m]. ``slope`` is the estimate, ``raw_state`` the robot's q and v in the world, as measured
+    last.
     """
 
     raw_state: tuple[Array, Array]

@@ -205,16 +205,9 @@ MODE = np.dtype(
 class Mode:
     """Mode of the robot: a node of the automaton with all that the controller looks up for it.
 
-    Attributes:
-        node: the automaton's node.
-        control: the phase's entry in the table.
-        tasks: the rows of the phase's tasks.
-        outgoing_edges: edges to other nodes, in order.
-        stance: legs that carry.
-        swings: legs in the air that have a foothold to go to.
-        swing: shape of their swings; None: the robot's.
-        trimmed: whether the momentum trim acts somewhere in the stride.
-        data: of ``MODE``.
+    ``outgoing_edges`` lead to other nodes, in order. ``stance`` are legs that carry, ``swings``
+    legs in the air that have a foothold to go to, ``swing`` is the shape of their swings (None: the
+    robot's). ``trimmed``: the momentum trim acts somewhere in the stride. ``data`` is of ``MODE``.
     """
 
     node: Node

@@ -137,16 +137,10 @@ def choose_legs(
 ) -> Decision:
     """The decision with the stiffnesses that lead the rest of a stride to the cheapest end.
 
-    Without a price that is the end nearest to the target.
-
-    Args:
-        ahead: where the stride ends from here, by its controls.
-        decision: what holds so far.
-        target: (n,) state that the stride is to end in.
-        free: slots of the stiffnesses that the rest of the stride depends on.
-        nominal: (NUM_SLOTS,) the gait's controls.
-        scale: units of the template.
-        price: of the state where a stride ends, to the planner of the next one; nan: it knows none.
+    Without a price that is the end nearest to the target. ``ahead`` is the end by the controls,
+    ``target`` (n,) the wanted one; ``free`` are slots of the stiffnesses that the rest of the
+    stride depends on, ``nominal`` (NUM_SLOTS,) the gait's controls. ``price`` is an end's to the
+    planner of the next stride; nan: it knows none.
     """
     stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE and nominal[slot] > 0.0]
     base = nominal[stiff]
@@ -201,15 +195,9 @@ def reachable_turn(scale: Scale, time_to_go: float) -> float:
 class Situation(NamedTuple):
     """A robot within a stride, and what holds for it.
 
-    Attributes:
-        node: of the automaton, the robot's.
-        sensed: the robot's state.
-        goal: of the stride.
-        decision: for it so far.
-        whole: nothing of the stride has been used yet: it is in its first node, on springs.
-        to_go: time until the touchdown is due [s].
-        cause: why it is planned again.
-        height_error: of the ground under the foot that has landed over the other one's [m].
+    ``whole``: nothing of the stride has been used yet: it is in its first node, on springs.
+    ``to_go`` is the time until the touchdown is due [s], ``height_error`` that of the ground under
+    the foot that has landed over the other one's [m].
     """
 
     node: Node

@@ -131,18 +131,11 @@ class TemplateState:
 class StateObserver:
     """Observer of the robot's state on the template's ground, that of the foot that landed last.
 
-    Args:
-        robot: the model; every tick updates it.
-        feet: their roles.
-        contact: (2,) whether each foot touches the ground; others write it.
-        acceleration: (2,) wanted of the CoM, which others write [m/s^2].
-        data: (1,) of ``SENSED``; own memory if not given.
-
-    Attributes:
-        now: what was read last.
-        ground: height of the template's ground [m].
-        pre_impact_velocity: (2,) dx/dt and dy/dt of this tick if nothing has hit the robot since
-            the last one.
+    Every tick updates the robot's model. Others write ``contact`` (2,), whether each foot touches
+    the ground, and ``acceleration`` (2,) wanted of the CoM [m/s^2]; ``data`` (1,) are of
+    ``SENSED``, own memory if not given. ``now`` was read last; ``ground`` is the height of the
+    template's ground [m], ``pre_impact_velocity`` (2,) dx/dt and dy/dt of this tick if nothing has
+    hit the robot since the last one.
     """
 
     ground = Number("ground")

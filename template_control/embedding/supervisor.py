@@ -42,17 +42,11 @@ _TOUCHDOWN = int(Event.TOUCHDOWN)
 class StrideSupervisor:
     """Supervisor of a stride: decision at its section, path, and new plans on the way.
 
-    Args:
-        route: which stride comes next, and towards which state.
-        planners: one for each kind of stride of the route.
-        options: when to plan again.
-        automaton: of the strides.
-        curved: nodes in which the planner's curve is followed, not the template's springs.
-        recovery: what a walk that cannot go on breaks into; None: nothing.
+    In ``curved`` nodes the planner's curve is followed, not the template's springs; ``recovery`` is
+    what a walk that cannot go on breaks into, None: nothing.
 
     Attributes:
-        goal: of the present stride.
-        decision: for it, the last one.
+        goal, decision: of the present stride, the last ones.
         log: one report for each stride that has ended.
         path: the template's, from the last plan on.
         event_times: time on the path of the next occurrence of each :class:`Event` [s], else inf.

@@ -287,16 +287,10 @@ class Swings(NamedTuple):
 class Feet:
     """Roles of the two feet; the automaton's resets change them.
 
-    Args:
-        options: shape of the swings.
-        reference: (2, 2, 3) where the swings' references are kept, by foot.
-        data: (1,) of ``FEET``; own memory if not given.
-
-    Attributes:
-        foot_of_leg: the foot that is the rear leg's, and the front leg's.
-        swing: each foot's reference in the air.
-        swing_time: (2,) time since each foot lifted off [s].
-        landed: the foot that landed last; the template's ground is there.
+    ``reference`` (2, 2, 3) keeps the swings' references by foot; ``data`` (1,) are of ``FEET``, own
+    memory if not given. ``foot_of_leg`` are the feet of the rear and the front leg, ``swing`` each
+    foot's reference in the air, ``swing_time`` (2,) is since each foot lifted off [s]. The
+    template's ground is at the foot that ``landed`` last.
     """
 
     def __init__(self, options: SwingOptions, reference: Array, data: Any = None) -> None:

@@ -305,11 +305,9 @@ def gather_inertias(robot: ET.Element) -> None:
 
     Links that are fixed to each other are one rigid body, and engines take the mass of its first
     link for that of the body: PyBullet holds a robot in the air whose root link weighs nothing, and
-    pushes act on the first link's centre of mass. Links keep their names, frames and shapes; where
-    the first one of a body has a mass of its own, the text of the URDF stays as it is.
-
-    Args:
-        robot: the root element of a URDF; changed. The links that gave their inertia have none.
+    pushes act on the first link's centre of mass. Links keep their names, frames and shapes; those
+    that gave their inertia have none. Where the first one of a body has a mass of its own, the text
+    of the URDF stays as it is.
     """
     links = {str(link.get("name")): link for link in robot.findall("link")}
     fixed = defaultdict(list)

@@ -177,15 +177,10 @@ SIDES = (Side.LEFT, Side.RIGHT)
 class LateralPlanner:
     """The lateral half of the walk; all positions are y in the heading frame.
 
-    Args:
-        parameters: the template.
-        options: of the reference template.
-        wish: step width, lateral motion, turn; it may be changed between two steps.
-        data: (1,) of ``LATERAL``, which ticks read and write.
-
-    Attributes:
-        learnt: what the robot adds to the template's sideways motion.
-        cycle: the periodic motion of the wish.
+    ``options`` are of the reference template; ``wish``, step width, lateral motion and turn, may be
+    changed between two steps; ``data`` (1,) are of ``LATERAL``, which ticks read and write.
+    ``learnt`` is what the robot adds to the template's sideways motion, ``cycle`` the wish's
+    periodic motion.
     """
 
     def __init__(

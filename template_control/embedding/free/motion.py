@@ -46,15 +46,9 @@ _SIDE = 1  # y, to the left
 class LateralMotion:
     """Heading, and footholds to the left and right.
 
-    Args:
-        robot: the (nominal) model; every tick updates it.
-        planner: where the feet land to the left or right.
-        feet: their roles.
-        references: of which ``side`` is kept here.
-        reach: a foothold that is wanted further than this beyond its bounds is out of reach [m].
-
-    Attributes:
-        turning: rate of the heading by time [rad/s].
+    ``robot`` is the nominal model, which every tick updates; ``side`` of ``references`` is kept
+    here. A foothold that is wanted further than ``reach`` [m] beyond its bounds is out of reach.
+    ``turning`` is the rate of the heading by time [rad/s].
     """
 
     def __init__(

@@ -129,14 +129,9 @@ class FrictionEstimate:
 
     The force on a foot that slides lies on the friction cone, whatever was asked for. So its mean
     ratio while the foot slides is the coefficient. It is only ever lowered: nothing shows how far a
-    foot that stands is from sliding; and ground that was slippery once may be so again.
-
-    Args:
-        options: what counts as sliding.
-        before: the coefficient before anything is learnt.
-        weight: of the robot [N].
-        scale: units of the template.
-        data: (1,) of ``SLIDES``; own memory if not given.
+    foot that stands is from sliding; and ground that was slippery once may be so again. ``before``
+    is the coefficient before anything is learnt, ``weight`` the robot's [N]; ``data`` (1,) are of
+    ``SLIDES``, own memory if not given.
     """
 
     coefficient = Number("coefficient")

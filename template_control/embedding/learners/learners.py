@@ -24,17 +24,9 @@ Array = NDArray[np.float64]
 class Learners:
     """Learners from stride to stride.
 
-    Args:
-        options: of each, scaled to the template.
-        parameters: the template.
-        robot: the (nominal) model.
-        tick: (1,) of ``TICK``, in which they keep what ticks read and write.
-
-    Attributes:
-        load: how much heavier the robot is than its model.
-        trim: what double stance adds to the template's forces.
-        lean: of the trunk.
-        friction: how slippery the ground is.
+    ``options`` are scaled to the template, ``robot`` is the nominal model, and ``tick`` (1,) is of
+    ``TICK``, in which they keep what ticks read and write. ``load`` is how much heavier the robot
+    is than its model, ``trim`` what double stance adds to the template's forces.
     """
 
     def __init__(

@@ -58,16 +58,10 @@ def playback(
 ) -> Playback:
     """Choose the frames of a replay.
 
-    Args:
-        record: the run.
-        fps: frames per second of the replay, 1 to 120.
-        speed: seconds of the run per second of the replay, 0.01 to 100.
-        start, end: part of the run to show [s]; None for its beginning and end. Negative values
-            count from the run's end.
-
-    Raises:
-        ParameterError: if a number is out of its range.
-        RecordError: if the run cannot be shown.
+    ``fps`` [1/s] is from 1 to 120, ``speed``, in seconds of the run per second of the replay, from
+    0.01 to 100. ``start`` and ``end`` are of the part to show [s], negative from the run's end;
+    None for its beginning and end. A ParameterError if a number is out of its range, a RecordError
+    if the run cannot be shown.
     """
     check("speed", speed, Annotated[float, SPEEDS])
     check("fps", fps, Annotated[float, FRAME_RATES])
