@@ -1,4 +1,4 @@
-"""How long the command line and the library take to start, as processes of their own.
+"""Time that the command line and the library take to start, as processes of their own.
 
     python benchmarks/start_up.py [--repeats 10] [--against CHECKOUT] [--json]
     python benchmarks/start_up.py --first-walk --repeats 2 [--against CHECKOUT] [--json]
@@ -45,7 +45,7 @@ LIBRARY = {
 
 
 class Taken(NamedTuple):
-    """What a line took.
+    """Time that a line took.
 
     Attributes:
         wall: [s].

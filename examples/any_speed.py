@@ -88,7 +88,7 @@ def keep(name: str, count: int, starts: int) -> tc.Record:
 
 
 def row(record: tc.Record, gait: WalkingGait, speed: float, seed: int | None) -> str:
-    """What a run came to: how far the last steps end off the gait, mean and deviation."""
+    """Result of a run: distance of the last steps' ends from the gait, mean and deviation."""
     error = record.section_state[1:][-_LAST:] - gait.vlo
     units = (1.0, 1e3, 1.0)
     settled = [

@@ -1,4 +1,4 @@
-"""How sure is it: a scenario with everything a little wrong at once, in either engine.
+"""Robustness of a scenario with everything a little wrong at once, in either engine.
 
     python examples/how_sure.py [--scenario examples/zero_five_zero.toml] [--robot runner]
         [--plant pybullet] [--trials 20] [--results how_sure.jsonl]

@@ -1,4 +1,4 @@
-"""What pushes, unseen steps of the ground and another mass do to a robot: counts, a line a row.
+"""Effect of pushes, unseen steps of the ground and another mass: counts, a line a row.
 
     python examples/push_tables.py [--row "run, five-link" ...] [--trial 7 ...]
         [--results push_tables.jsonl] [--processes 1]

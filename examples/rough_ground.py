@@ -1,7 +1,7 @@
-"""How a walk takes ground that nobody told of: steps at random places, random treads, slopes.
+"""Walks on ground that the controller does not know: random steps, random treads, slopes.
 
 ``python examples/rough_ground.py`` prints the table of docs/lab/ground.md, row by row; ``--what``,
-``--trials`` and ``--robot`` choose a part of it. Every draw is seeded: a trial's number tells its
+``--trials`` and ``--robot`` choose a part of it. Every draw is seeded: a trial's number gives its
 ground.
 """
 

@@ -92,7 +92,7 @@ def pushes(robot: PlanarBiped) -> Iterator[tuple[str, tc.Record]]:
 
 
 def told(record: tc.Record) -> tuple[bool, str]:
-    """Whether a run ended in a stand, and what is worth knowing of it."""
+    """True if a run ended in a stand, and a line about the run."""
     kinds = record.kinds_of_stride
     way = " ".join(kind for kind, _ in groupby(kinds))
     last = record.time > record.time[-1] - 1.0

@@ -94,7 +94,7 @@ def default_plant() -> PlantOptions:
 
 
 def check_world(world: World) -> None:
-    """Check that an object is options or a :class:`Plant`; a ParameterError says what it lacks."""
+    """Check that an object is options or a :class:`Plant` with a positive time step."""
     if isinstance(world, PlantOptions | IdealOptions):
         return
     lacking = [name for name in _MEMBERS if not hasattr(world, name)]
