@@ -37,8 +37,8 @@ def _sections(record: Record) -> list[Section]:
 
 
 def _where(record: Record) -> str:
-    """The sections of the run in words, such as "VLO"."""
-    return " and ".join(record.sections)
+    """The run's section, such as "VLO", or that it has several."""
+    return record.sections[0] if len(record.sections) == 1 else "the sections"
 
 
 def _energies_at(record: Record, sections: list[Section], states: Array) -> Array:
@@ -64,7 +64,7 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
     upright, forward = figure.subplots(1, 2)
     samples = np.arange(len(record.time))
     toe = record.foot[samples, record.rear, 0]
-    target, where = record.section_target[-1], _where(record)
+    target, last = record.section_target[-1], _sections(record)[-1].name
     rows = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
     panels: tuple[tuple[Axes, int, Array, tuple[float, float]], ...] = (
         (upright, 1, np.zeros(len(toe)), (target[1], target[2])),
@@ -84,7 +84,7 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
         across = record.com[rows, axis] - origin[rows]
         axes.plot(
             across, record.com_velocity[rows, axis], "o", color=RIGHT, markersize=3, zorder=4,
-            label=f"robot at {where}",
+            label=f"robot at {_where(record)}",
         )  # fmt: skip
         seen = record.section_state[:, 1 if axis else 0], record.section_state[:, 2]
         planned = seen if axis else (np.zeros(len(rows)), seen[0])
@@ -92,9 +92,9 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
             continue  # only at VLO it is known how far ahead of the foot the CoM is
         axes.plot(
             *planned, "o", color=RIGHT, fillstyle="none", markersize=4, zorder=4,
-            label=f"{where} state of the planner",
+            label="state used by the planner",
         )  # fmt: skip
-        axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=f"{where} of the gait")
+        axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=f"{last} of the gait")
     upright.set(xlabel="y [m]", ylabel="dy/dt [m/s]")
     forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
     for axes in (upright, forward):
@@ -185,7 +185,7 @@ def energies(record: Record, look: Look = _LOOK) -> Figure:
     )  # fmt: skip
     lower.plot(time, template["total"][w], color=TEMPLATE, label="template with its springs")
     target = _energies_at(record, _sections(record)[-1:], record.section_target[-1:])[0]
-    label = f"gait at {_where(record)}"
+    label = f"gait at {_sections(record)[-1].name}"
     lower.axhline(target, color=LEFT, linewidth=1.2, linestyle=":", label=label)
     lower.set(xlabel="time [s]", ylabel="sum [J]")
     for axes in panels:
