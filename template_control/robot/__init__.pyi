@@ -12,6 +12,9 @@ from .library import load_floating_robot as load_floating_robot
 from .library import load_robot as load_robot
 from .library import robot_path as robot_path
 from .planar_biped import PlanarBiped as PlanarBiped
+from .robot import FixedBaseRobot as FixedBaseRobot
+from .robot import FrameTerms as FrameTerms
+from .robot import Robot as Robot
 from .spec import RobotSpec as RobotSpec
 from .start import FloatingBasePose as FloatingBasePose
 from .start import floating_state_in as floating_state_in

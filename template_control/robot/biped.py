@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Self
@@ -11,50 +11,35 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.errors import DivergedError
 from template_control.robot.legs import HINGES, foot_frame, leg_joints, middle, straight_legs
 from template_control.robot.requirements import add_feet, check_size
-from template_control.robot.terms import ROBOT_DATA, UP, Jacobians, sources
+from template_control.robot.robot import WORLD_ALIGNED, Robot
+from template_control.robot.terms import UP, sources
 from template_control.robot.urdf import with_masses
 from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
 _BENT = np.array([-0.4, 0.8])  # of hip and knee [rad]
-_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-
-
 _SAGITTAL = {2: 1, 3: UP}  # by directions: from forward to up
 
 
-class Biped(ABC):
+class Biped(Robot):
     """A biped with point feet, and its kinematics and dynamics at the last :meth:`update`.
 
     Sagittal quantities have two entries, x forward and y up: of a planar robot in the world, of a
     free one in its heading frame.
 
+    Attributes are those of :class:`~.robot.Robot`, and these.
+
     Attributes (constant):
-        base_dof: unactuated degrees of freedom, the first ones.
-        base_joints: Pinocchio's joints that they belong to.
-        directions: rows of a contact: 2 in the plane, 3 in space. The last one is up.
-        name: the URDF's robot name.
         path: the URDF file.
         urdf: its text, as Pinocchio and PyBullet load it.
         model: the Pinocchio model.
-        nq, nv: numbers of a configuration and of a velocity.
-        mass: total mass [kg].
-        gravity: gravitational acceleration [m/s^2].
         feet: names of the two foot frames, left then right.
         foot_radius: radius of the foot spheres [m].
         walk: touchdown angle [rad] and speed at VLO over sqrt(g l0) of its default gait, or
             None where none is better than the library's.
-        joint_names: actuated joints, in the order of the last entries of q and v.
-        torque_limit: (nu,) URDF ``effort`` [N m].
-        velocity_limit: (nu,) URDF ``velocity`` [rad/s].
-        joint_range: (nu, 2) URDF ``lower`` and ``upper`` [rad].
-        joint_damping: (nu,) URDF ``damping``: viscous [N m s/rad].
-        joint_friction: (nu,) URDF ``friction``: dry, at most this much [N m]. Plants have it; no
-            term of the model does.
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
         leg_length: from hip to the foot sphere's centre with a straight knee [m].
         joint_sign: (nu,) 1 of a hip or knee that turns about +y, -1 about -y; of joints above the
@@ -63,8 +48,6 @@ class Biped(ABC):
         trunk_com: height of the trunk's own CoM above the hips [m].
 
     Attributes (written by :meth:`update`; views that the next call overwrites):
-        mass_matrix: (nv, nv) M(q).
-        nonlinear_effects: (nv,) C(q, v) v + g(q), and the joints' damping [N, N m].
         com, com_velocity: (2,) [m, m/s].
         com_jacobian: (2, nv) maps v to the CoM's velocity.
         com_bias: (2,) dJ/dt v of this Jacobian [m/s^2].
@@ -76,45 +59,21 @@ class Biped(ABC):
         foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
         foot_bias: (2, 2) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
         contact_velocity, contact_jacobian, contact_bias: of each foot in all ``directions``.
-        joint_angle, joint_velocity: (nu,) of the actuated joints [rad, rad/s].
         hips: (2,) the point the legs hang from [m].
         hip_speed: its forward velocity [m/s].
         pitch, pitch_rate: of the trunk in the sagittal plane [rad, rad/s].
-        fastest: the largest share of its limit that a joint's speed has.
-        soonest_stop: the shortest time in which a joint would come to its stop at its speed [s]; 0
-            of one that is there, inf where none moves.
-        data, jacobians: all of these for compiled code, which reads the same memory: (1,) of
-            ``ROBOT_DATA``, and :class:`~.terms.Jacobians`.
-        arrays: the latter as a plain tuple, which a compiled function takes in half the time.
     """
 
-    base_dof: int
-    base_joints: int
-    directions: int
-    name: str
     path: Path
     urdf: str
-    model: pin.Model
-    nq: int
-    nv: int
-    mass: float
-    gravity: float
     feet: tuple[str, str]
     foot_radius: float
     walk: tuple[float, float] | None
-    joint_names: tuple[str, ...]
-    torque_limit: Array
-    velocity_limit: Array
-    joint_range: Array
-    joint_damping: Array
-    joint_friction: Array
     legs: tuple[tuple[int, ...], ...]
     leg_length: float
     joint_sign: Array
     leg_mass: float
     trunk_com: float
-    mass_matrix: Array
-    nonlinear_effects: Array
     com: Array
     com_velocity: Array
     com_jacobian: Array
@@ -129,14 +88,10 @@ class Biped(ABC):
     contact_velocity: Array
     contact_jacobian: Array
     contact_bias: Array
-    joint_angle: Array
-    joint_velocity: Array
     hips: Array
     hip_speed = Number("hip_speed")
     pitch = Number("attitude", 1)
     pitch_rate = Number("turning", 1)
-    fastest = Number("fastest")
-    soonest_stop = Number("soonest_stop")
 
     def __init__(
         self,
@@ -147,20 +102,10 @@ class Biped(ABC):
         foot_radius: float,
         walk: tuple[float, float] | None = None,
     ) -> None:
-        self.path, self.urdf, self.model, self.name = path, urdf, model, model.name
-        self.feet, self.foot_radius, self.walk = feet, foot_radius, walk
-        self.nq, self.nv = model.nq, model.nv
-        self.mass = float(pin.computeTotalMass(model))
-        self.gravity = float(-model.gravity.linear[2])
+        super().__init__(model)
         first = 1 + self.base_joints
-        self.joint_names = tuple(model.names)[first:]
-        self.torque_limit = np.array(model.effortLimit[self.base_dof :])
-        self.velocity_limit = np.array(model.velocityLimit[self.base_dof :])
-        nu = len(self.joint_names)
-        stops = (model.lowerPositionLimit, model.upperPositionLimit)
-        self.joint_range = np.column_stack(stops)[-nu:]
-        self.joint_damping = np.array(model.damping[self.base_dof :])
-        self.joint_friction = np.array(model.upperDryFrictionLimit[self.base_dof :])
+        self.path, self.urdf = path, urdf
+        self.feet, self.foot_radius, self.walk = feet, foot_radius, walk
         self._foot_ids = tuple(foot_frame(model, foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
@@ -171,22 +116,16 @@ class Biped(ABC):
         self.leg_mass = max(
             float(sum(model.inertias[j].mass for j in leg)) for leg in self._leg_joints
         )
-        self._data = data = model.createData()
+        data = self._data
         self._joint_places = [data.oMi[j].translation for j in range(first, model.njoints)]
-        self.data = np.zeros(1, ROBOT_DATA)
-        for name in ("mass", "gravity", "foot_radius", "leg_length"):
-            self.data[name] = getattr(self, name)
-        self.jacobians = Jacobians.zeros(data, self.directions, self.base_dof)
-        self.arrays = tuple(self.jacobians)
-        limits = (self.velocity_limit, *self.joint_range.T, self.joint_damping)
-        self._sources = sources(model, data, self._foot_ids, np.vstack(limits))
+        self.data["foot_radius"], self.data["leg_length"] = foot_radius, self.leg_length
+        self._sources = sources(model, data, self._foot_ids, self._joint_limits)
         self._look()
         self._prepare()
 
     def _look(self) -> None:
         """Take the views that Python reads; Pinocchio keeps its arrays in place."""
         j, now, step = self.jacobians, self.data, _SAGITTAL[self.directions]
-        self.mass_matrix, self.nonlinear_effects = j.mass_matrix, j.nonlinear_effects
         self.com, self.com_velocity, self.com_bias = (
             now[name][0, ::UP] for name in ("com", "com_velocity", "com_bias")
         )
@@ -200,12 +139,7 @@ class Biped(ABC):
         self.contact_velocity = now["foot_velocity"][0, :, ::every]
         self.contact_bias = now["foot_bias"][0, :, ::every]
         self.contact_jacobian = j.contact
-        self.joint_angle, self.joint_velocity = j.joints
         self.hips = now["hips"][0, ::UP]
-
-    def __repr__(self) -> str:
-        joints = ", ".join(self.joint_names)
-        return f"<{type(self).__name__} {self.name}: {self.mass:.4g} kg, joints {joints}>"
 
     def changed(
         self, gravity: float | None = None, masses: Mapping[str, float] | None = None
@@ -250,26 +184,9 @@ class Biped(ABC):
         pin.updateFramePlacement(model, data, left)
         pin.updateFramePlacement(model, data, right)
         return (
-            pin.getFrameClassicalAcceleration(model, data, left, _WORLD_ALIGNED).vector,
-            pin.getFrameClassicalAcceleration(model, data, right, _WORLD_ALIGNED).vector,
+            pin.getFrameClassicalAcceleration(model, data, left, WORLD_ALIGNED).vector,
+            pin.getFrameClassicalAcceleration(model, data, right, WORLD_ALIGNED).vector,
         )
-
-    def _diverged(self, q: Array, v: Array) -> DivergedError:
-        return DivergedError(
-            f"the state of {self.name} is not finite: q = {q.tolist()}, v = {v.tolist()}"
-        )
-
-    @abstractmethod
-    def update(self, q: Array, v: Array) -> None:
-        """Compute everything the controller needs at (q, v), each quantity once.
-
-        Args:
-            q: (nq,) configuration.
-            v: (nv,) velocity.
-
-        Raises:
-            DivergedError: if a value is NaN or infinite.
-        """
 
     def neutral(self) -> Array:
         """(nq,) upright, with straight vertical legs."""

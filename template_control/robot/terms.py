@@ -131,7 +131,7 @@ def joint_reserve(q: Array, speeds: Array, limits: Array) -> tuple[float, float]
 
 
 @compiled
-def _gather_joints(
+def gather_joints(
     q: Array, v: Array, limits: Array, state: Any, effects: Array, joints: Array
 ) -> bool:
     """Write the joints' state and reserve, and add their damping; whether all is finite."""
@@ -167,7 +167,7 @@ def gather_planar(
     com_jacobian, centroidal, jacobian, carries, limits = views[7:]
     effects, jcom, jspin, contact, joints = out
     s = data[0]
-    finite = _gather_joints(q, v, limits, s, effects, joints)
+    finite = gather_joints(q, v, limits, s, effects, joints)
     s.com[0], s.com[UP] = centre[0], centre[2]
     s.com_velocity[0], s.com_velocity[UP] = speed[0], speed[2]
     s.com_bias[0], s.com_bias[UP] = pull[0], pull[2]
@@ -240,7 +240,7 @@ def gather_floating(
     effects, jcom, jspin, contact, jturning, joints = out
     frame, trunk = base
     rotation, st, nv = trunk[0], data[0], v.shape[0]
-    finite = _gather_joints(q, v, limits, st, effects, joints)
+    finite = gather_joints(q, v, limits, st, effects, joints)
     c, s, r = frame[2], frame[3], st.foot_radius
     x, y = centre[0] - frame[0], centre[1] - frame[1]
     st.com[0], st.com[1], st.com[2] = c * x + s * y, c * y - s * x, centre[2]

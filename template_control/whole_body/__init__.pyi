@@ -3,6 +3,8 @@ from .solver import Solution as Solution
 from .solver import Stance as Stance
 from .solver import WholeBodyQp as WholeBodyQp
 from .stack import TaskStack as TaskStack
+from .target_tasks import FrameTask as FrameTask
+from .target_tasks import JointTask as JointTask
 from .task import References as References
 from .task import Rows as Rows
 from .task import Task as Task

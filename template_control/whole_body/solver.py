@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
-from template_control.robot.biped import Biped
+from template_control.robot.robot import Robot
 from template_control.slip.similarity import RATE, TIME, tuned
 from template_control.structured import Number
 from template_control.whole_body.problem import (
@@ -136,9 +136,13 @@ class Stance(NamedTuple):
         cap: (c,) largest normal force of each foot [N] (inf: none).
     """
 
-    feet: tuple[int, ...]
-    force: Array
-    cap: Array
+    feet: tuple[int, ...] = ()
+    force: Array = np.zeros(0)
+    cap: Array = np.zeros(0)
+
+
+AIRBORNE = Stance()
+"""Of a robot none of whose feet stands, or that has none."""
 
 
 class Solution(NamedTuple):
@@ -161,7 +165,7 @@ class Solution(NamedTuple):
     solve_seconds: float
 
 
-def bound_joints(robot: Biped, options: QpOptions, bounds: Array, slack: float) -> None:
+def bound_joints(robot: Robot, options: QpOptions, bounds: Array, slack: float) -> None:
     """Write bounds of the joints' accelerations, near their limits of speed and before their stops.
 
     A leg that has pushed off trails behind hips that run on, and its knee straightens. One that
@@ -192,7 +196,7 @@ class Workspace:
     (2, bounded) [rad/s^2]. ``work`` holds the numbers of the matrices, in one array.
     """
 
-    def __init__(self, robot: Biped, feet: int, bounded: int = 0) -> None:
+    def __init__(self, robot: Robot, feet: int, bounded: int = 0) -> None:
         nv, nu, directions = robot.nv, len(robot.torque_limit), robot.directions
         rows = nu + rows_per_foot(directions) * feet + bounded
         self._identity = np.eye(nu)
@@ -264,7 +268,7 @@ class WholeBodyQp:
     friction = Number("friction")
 
     @checked
-    def __init__(self, robot: Biped, options: QpOptions | None = None) -> None:
+    def __init__(self, robot: Robot, options: QpOptions | None = None) -> None:
         o = options or QpOptions()
         self.robot = robot
         self.data = np.zeros(1, QP_DATA)
@@ -294,12 +298,12 @@ class WholeBodyQp:
         self._torque_limit = limit
         self._take_load(self._load)
 
-    def solve(self, tasks: TaskStack, stance: Stance, load: float = 1.0) -> Solution:
+    def solve(self, tasks: TaskStack, stance: Stance = AIRBORNE, load: float = 1.0) -> Solution:
         """Solve one tick.
 
         Args:
             tasks: rows, desired accelerations and weights.
-            stance: the feet on the ground.
+            stance: the feet on the ground; none of a robot with a fixed base.
             load: ratio of the real to the modelled inertia; the torques are scaled by it
                 and stay within their limits.
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.fitting import blame, name_of
 from template_control.errors import ParameterError
-from template_control.robot.biped import Biped
+from template_control.robot.robot import Robot
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT, References, Rows, Task
 from template_control.whole_body.tasks import TASK, CompiledTask, ComTask, write_rows
 
@@ -50,28 +50,35 @@ class TaskStack:
         self.program = np.concatenate(program)
         self.follows_com = bool((self.program["kind"] == ComTask.kind).any())
 
-    def check(self, robot: Biped) -> None:
+    def check(self, robot: Robot) -> None:
         """Check that a robot has what the tasks speak of.
 
         Raises:
-            ParameterError: if the robot is held in its plane, and a task is one in space.
+            ParameterError: if it is no biped, or held in its plane and a task is one in space.
         """
         for task, _ in self._parts:
             if isinstance(task, CompiledTask):
                 task.check(robot)
 
-    def write(self, robot: Biped, references: References) -> None:
+    def write(self, robot: Robot, references: References | None = None) -> None:
         """Let every task fill its rows of the table.
 
         Args:
             robot: the model, updated to this tick.
-            references: references and measurements of this tick.
+            references: references and measurements of this tick; None where all tasks have
+                targets of their own.
+
+        Raises:
+            ParameterError: if a task has not what it needs.
         """
         self.check(robot)
-        write_rows(self.program, robot.data, robot.arrays, references.data, self.table)
+        if len(self.program):
+            if references is None:
+                raise ParameterError("a task of these follows References, and none are given")
+            write_rows(self.program, robot.data, robot.arrays, references.data, self.table)
         self.write_others(robot, references)
 
-    def write_others(self, robot: Biped, references: References) -> None:
+    def write_others(self, robot: Robot, references: References | None) -> None:
         """As :meth:`write`, of the tasks that compiled code does not write."""
         for task, rows in self.others:
             try:

@@ -8,12 +8,11 @@ feedforward and the PD feedback.
 from __future__ import annotations
 
 import re
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.robot.biped import Biped
 from template_control.structured import Number
 
 Array = NDArray[np.float64]
@@ -102,12 +101,13 @@ class Task(Protocol):
     def weights(self) -> tuple[float, ...]:
         """One weight a row."""
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
+    def write(self, robot: Any, references: Any, rows: Rows) -> None:
         """Fill the task's rows.
 
         Args:
-            robot: the model, updated to this tick.
-            references: references and measurements of this tick.
+            robot: the model, updated to this tick: a :class:`~template_control.robot.robot.Robot`,
+                or of the kind that the task is for.
+            references: :class:`References`, of a controller's tick.
             rows: views of the task's own rows, overwritten; entries that it never writes are 0.
         """
 

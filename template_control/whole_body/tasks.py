@@ -19,6 +19,7 @@ from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
+from template_control.robot.robot import Robot
 from template_control.robot.terms import UP
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.similarity import (
@@ -85,19 +86,24 @@ class CompiledTask(Checked):
         found["gains"][0, : len(self.numbers)] = self.numbers
         return found
 
-    def check(self, robot: Biped) -> None:
+    def check(self, robot: Robot) -> None:
         """Check that a robot has what the task speaks of.
 
         Raises:
-            ParameterError: if the robot is held in its plane, and the task is one in space.
+            ParameterError: if it is no biped, or held in its plane and the task is one in space.
         """
+        if not isinstance(robot, Biped):
+            raise ParameterError(
+                f"{robot.name} is no biped, and a {type(self).__name__} asks for one: take a"
+                " FrameTask or a JointTask"
+            )
         if self.in_space and robot.directions <= UP:
             raise ParameterError(
                 f"robot {robot.name} is held in its plane, and a {type(self).__name__} asks for a"
                 " free one: take load_floating_robot, or tasks of the plane"
             )
 
-    def write(self, robot: Biped, references: References, rows: Rows) -> None:
+    def write(self, robot: Robot, references: References, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""
         self.check(robot)
         write_rows(self.compiled(0), robot.data, robot.arrays, references.data, rows.table)
