@@ -16,7 +16,7 @@ from places import TESTS
 from sweep_work import alive, hold, square, wait_until
 
 import template_control as tc
-from template_control.cli import report as kept
+from template_control.cli import plots
 from template_control.cli.main import main
 from template_control.run.record import Record, RunInterrupted
 from template_control.sweep import executor
@@ -60,10 +60,10 @@ def test_ctrl_c_ends_a_loop_of_runs(robot, default_gait):
 
 
 def test_ctrl_c_while_figures_are_drawn_keeps_the_run_and_its_table(tmp_path, capfd, monkeypatch):
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(kept.view, "save_figures", interrupted)
+    monkeypatch.setattr(plots.view, "save_figures", interrupted)
     assert main(["walk", "--steps", "1", "--output", str(tmp_path)]) == 130
     told = capfd.readouterr()
     assert "mean speed" in told.out
