@@ -164,6 +164,7 @@ def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capf
     # One level of two, and one trial of two: the test of the files runs all.
     monkeypatch.setattr(severity_sweep, "_QUICK_LEVELS", 1)
     monkeypatch.setattr(severity_sweep, "_QUICK_TRIALS", 1)
+    monkeypatch.delenv("COLUMNS", raising=False)  # pytest's workers have one: titles would wrap
     monkeypatch.chdir(tmp_path)
     assert main(shlex.split(line)[1:]) == 0
     assert (tmp_path / "runs" / "robustness" / "five-link" / "robustness.png").is_file()
