@@ -91,10 +91,13 @@ class JointTask:
             angle: (nu,) [rad].
             velocity: (nu,) of the target [rad/s]; None: it rests.
         """
-        rest, count = np.zeros(len(angle)), len(self.weights)
-        self._target = np.stack([angle, rest if velocity is None else velocity])
-        if len(angle) != count:
-            raise ParameterError(f"the JointTask's target has {len(angle)} numbers: give {count}")
+        count, moving = len(self.weights), np.zeros(len(angle)) if velocity is None else velocity
+        for name, numbers in (("target", angle), ("target's velocity", moving)):
+            if len(numbers) != count:
+                raise ParameterError(
+                    f"the JointTask's {name} has {len(numbers)} numbers: give {count}"
+                )
+        self._target = np.stack([angle, moving])
 
     def write(self, robot: Robot, references: Any, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`."""

@@ -125,6 +125,8 @@ def test_wrong_names_and_sizes_are_refused():
         FrameTask(HAND).set_target((0.0, 1.0))
     with pytest.raises(ParameterError, match="the JointTask's target has 5 numbers: give 6"):
         task.set_target(np.zeros(5))
+    with pytest.raises(ParameterError, match="the JointTask's target's velocity has 1 numbers"):
+        task.set_target(np.zeros(6), np.zeros(1))
     with pytest.raises(DivergedError, match="not finite"):
         robot.update(np.full(6, np.nan), np.zeros(6))
     with pytest.raises(RobotError, match="several degrees of freedom"):
