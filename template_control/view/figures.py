@@ -40,6 +40,7 @@ from template_control.view.style import (
     mark_peaks,
     save_figure,
     shade,
+    upward,
 )
 
 Array = NDArray[np.float64]
@@ -80,19 +81,18 @@ def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
     axes.plot(*record.com[rows].T, "o", color=COM, markersize=3.5, label="robot's CoM")
     low, high = axes.get_xlim()
     axes.plot(*np.transpose(record.ground.line(low, high)), color="0.3", linewidth=0.8)
-    axes.set(xlabel="x [m]", ylabel="y [m]", xlim=(low, high))
+    axes.set(xlabel="x [m]", ylabel=f"{upward(record)} [m]", xlim=(low, high))
     axes.set_aspect("equal")
     title = f"{as_text(record.robot_name)}, {time[0]:.2f} to {time[-1]:.2f} s"
     return finish(figure, [axes], title, look)
 
 
 def com_tracking(record: Record, look: Look = _LOOK) -> Figure:
-    """CoM x and y against the template (Fig. 13a)."""
+    """The CoM ahead and upward against the template (Fig. 13a)."""
     w = look.rows(record, WINDOW)
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
-    for axes, axis in zip(panels, "xy", strict=True):
-        column = "xy".index(axis)
+    for column, (axes, axis) in enumerate(zip(panels, ("x", upward(record)), strict=True)):
         axes.plot(record.time[w], record.com[w, column], color=COM, label="robot")
         axes.plot(
             record.time[w], record.template_com[w, column], "--", color=TEMPLATE, linewidth=1.0,
@@ -242,9 +242,12 @@ def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
 def from_above(record: FloatingRecord, look: Look = _LOOK) -> Figure:
     """The CoM's path from above with the footholds."""
     w = look.rows(record)
-    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
-    axes = figure.subplots()
     path, time = record.space_com[w], record.time[w]
+    forward, side = np.ptp(path[:, :2], axis=0) + 0.6 * record.template.rest_length
+    # As high as a figure 9 inches wide needs for equal scales, and for its axes and legend.
+    height = float(np.clip(8.2 * side / forward + 1.1, 2.0, 8.0))
+    figure = Figure(figsize=(9.0, height), layout="constrained")
+    axes = figure.subplots()
     axes.plot(path[:, 0], path[:, 1], color=COM, linewidth=0.8, label="CoM")
     for foot, (name, color) in enumerate(zip(_FEET, SIDES, strict=True)):
         places, times = footholds(record, foot)

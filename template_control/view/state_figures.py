@@ -22,7 +22,9 @@ from template_control.view.style import (
     Look,
     as_text,
     finish,
+    in_words,
     shade,
+    upward,
 )
 
 Array = NDArray[np.float64]
@@ -38,7 +40,7 @@ def _sections(record: Record) -> list[Section]:
 
 def _where(record: Record) -> str:
     """The run's section, such as "VLO", or that it has several."""
-    return record.sections[0] if len(record.sections) == 1 else "the sections"
+    return in_words(record.sections[0]) if len(record.sections) == 1 else "the sections"
 
 
 def _energies_at(record: Record, sections: list[Section], states: Array) -> Array:
@@ -55,7 +57,7 @@ def _broken(values: Array, rear: NDArray[np.int64]) -> Array:
 
 
 def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
-    """y against dy/dt, and x from the rear stance foot against dx/dt, with every section.
+    """Height against its rate, and x from the rear stance foot against dx/dt, with every section.
 
     The whole run is pale, what the look shows is strong. The planner's state has its dx/dt from the
     angular momentum about the stance foot.
@@ -64,7 +66,7 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
     upright, forward = figure.subplots(1, 2)
     samples = np.arange(len(record.time))
     toe = record.foot[samples, record.rear, 0]
-    target, last = record.section_target[-1], _sections(record)[-1].name
+    target, last = record.section_target[-1], in_words(_sections(record)[-1].name)
     rows = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
     panels: tuple[tuple[Axes, int, Array, tuple[float, float]], ...] = (
         (upright, 1, np.zeros(len(toe)), (target[1], target[2])),
@@ -75,12 +77,12 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
             (record.com, record.com_velocity, COM, "-", "robot"),
             (record.template_com, record.template_velocity, TEMPLATE, "--", "template"),
         ):
-            across, up = position[:, axis] - origin, velocity[:, axis]
+            across, rate = position[:, axis] - origin, velocity[:, axis]
             for w, strength in (
                 (Look().rows(record), {"linewidth": 0.6, "alpha": 0.15}),
                 (look.rows(record, WINDOW), {"linewidth": 1.2, "linestyle": style, "label": name}),
             ):
-                axes.plot(_broken(across[w], record.rear[w]), up[w], color=color, **strength)
+                axes.plot(_broken(across[w], record.rear[w]), rate[w], color=color, **strength)
         across = record.com[rows, axis] - origin[rows]
         axes.plot(
             across, record.com_velocity[rows, axis], "o", color=RIGHT, markersize=3, zorder=4,
@@ -95,7 +97,8 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
             label="state used by the planner",
         )  # fmt: skip
         axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=f"{last} of the gait")
-    upright.set(xlabel="y [m]", ylabel="dy/dt [m/s]")
+    up = upward(record)
+    upright.set(xlabel=f"{up} [m]", ylabel=f"d{up}/dt [m/s]")
     forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
     for axes in (upright, forward):
         axes.locator_params(axis="x", nbins=6)
@@ -104,13 +107,15 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
 
 
 def tracking_errors(record: Record, look: Look = _LOOK) -> Figure:
-    """CoM errors in x and y, template less robot, over the run."""
+    """CoM errors ahead and upward, template less robot, over the run."""
     w = look.rows(record)
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
     error = 1e3 * record.com_error
-    for axes, axis, color in zip(panels, "xy", (LEFT, RIGHT), strict=True):
-        values = error[:, "xy".index(axis)]
+    for column, (axes, axis, color) in enumerate(
+        zip(panels, ("x", upward(record)), (LEFT, RIGHT), strict=True)
+    ):
+        values = error[:, column]
         axes.axhline(0.0, color="0.6", linewidth=0.8)
         axes.plot(record.time[w], values[w], color=color, linewidth=0.8)
         rms = np.sqrt(np.mean(values[w.start : w.stop] ** 2))
@@ -185,7 +190,7 @@ def energies(record: Record, look: Look = _LOOK) -> Figure:
     )  # fmt: skip
     lower.plot(time, template["total"][w], color=TEMPLATE, label="template with its springs")
     target = _energies_at(record, _sections(record)[-1:], record.section_target[-1:])[0]
-    label = f"gait at {_sections(record)[-1].name}"
+    label = f"gait at {in_words(_sections(record)[-1].name)}"
     lower.axhline(target, color=LEFT, linewidth=1.2, linestyle=":", label=label)
     lower.set(xlabel="time [s]", ylabel="sum [J]")
     for axes in panels:
@@ -203,7 +208,7 @@ def section_states(record: Record, look: Look = _LOOK) -> Figure:
     # What a stride was to end in is the target of the section where it began.
     target = np.vstack((record.section_target[:1], record.section_target[:-1]))
     sections = _sections(record)
-    steps, p = np.arange(len(state)), record.template
+    steps, p, up = np.arange(len(state)), record.template, upward(record)
     common: dict[str, Any] = {"linewidth": 0.9, "markersize": 3.5}
     energy = (
         _energies_at(record, sections, state),
@@ -212,8 +217,8 @@ def section_states(record: Record, look: Look = _LOOK) -> Figure:
     )
     shown = [
         ((state[:, 0], expected[:, 0], target[:, 0]), 0.002 * p.speed_unit, "dx/dt [m/s]"),
-        ((state[:, 1], expected[:, 1], target[:, 1]), 0.001 * p.rest_length, "y [m]"),
-        ((state[:, 2], expected[:, 2], target[:, 2]), 0.002 * p.speed_unit, "dy/dt [m/s]"),
+        ((state[:, 1], expected[:, 1], target[:, 1]), 0.001 * p.rest_length, f"{up} [m]"),
+        ((state[:, 2], expected[:, 2], target[:, 2]), 0.002 * p.speed_unit, f"d{up}/dt [m/s]"),
         (energy, 0.001 * float(energy[2][0]), "energy [J]"),
     ]
     if all(section.dimension < PADDED for section in sections):

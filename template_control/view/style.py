@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.errors import ParameterError
-from template_control.run.record import Record
-from template_control.slip.automaton.vocabulary import Phase, StrideKind
+from template_control.run.record import FloatingRecord, Record
+from template_control.slip.automaton.vocabulary import Event, Phase, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import atomic_path
 
@@ -123,6 +123,16 @@ def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:
         middle = last
     begin = min(max(middle - 0.5 * seconds, float(time[0])), max(last - seconds, float(time[0])))
     return begin, min(begin + seconds, last)
+
+
+def upward(record: Record) -> str:
+    """Name of the upward axis: y in the plane, z of a floating base, whose y is to the left."""
+    return "z" if isinstance(record, FloatingRecord) else "y"
+
+
+def in_words(section: str) -> str:
+    """A section's name in a figure: ``"VLO"`` or ``"apex"``."""
+    return section if section == Event.VLO.name else section.lower()
 
 
 def as_text(name: str) -> str:
