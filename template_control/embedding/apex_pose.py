@@ -6,8 +6,10 @@ velocities that do not fit the gait cost a start far more torque than the gait i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +18,9 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Pair
 from template_control.embedding.swing import SwingFoot, SwingOptions
 from template_control.errors import ParameterError
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.biped import Biped
 from template_control.robot.start import Pose, state_in
+from template_control.robot.terms import UP
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Event, Reset
@@ -52,7 +55,9 @@ class ApexStart(Checked):
 
 
 @checked
-def apex_pose(robot: PlanarBiped, start: ApexStart) -> Pose:
+def apex_pose(
+    robot: Biped, start: ApexStart, place: Callable[[Any, Pose], object] = state_in
+) -> Pose:
     """The pose at an apex, with both feet where the references of their swings are.
 
     A foot that stood in one stride swings through the next and lands in the one after that. So
@@ -62,6 +67,7 @@ def apex_pose(robot: PlanarBiped, start: ApexStart) -> Pose:
     Args:
         robot: the model; its last update is overwritten.
         start: what is wanted, scaled to the robot.
+        place: brings the robot into a pose of its sagittal plane.
 
     Raises:
         RobotError: if the legs do not reach the pose.
@@ -101,8 +107,9 @@ def apex_pose(robot: PlanarBiped, start: ApexStart) -> Pose:
     )
     # Fast references run ahead of what the legs reach. Where the feet are hardly moves the hips.
     near = _within(pose, pose.com, _NEAR * gait.parameters.rest_length)
-    q, _ = state_in(robot, replace(pose, feet=near))
-    return replace(pose, feet=_within(pose, q[:2], _REACH * robot.leg_length))
+    place(robot, replace(pose, feet=near))
+    hips = robot.data["hips"][0, [0, UP]]
+    return replace(pose, feet=_within(pose, hips, _REACH * robot.leg_length))
 
 
 def _within(pose: Pose, centre: Array, reach: float) -> Array:

@@ -242,6 +242,9 @@ class EmbeddingController:
             self.feet.landed = self.feet.foot_of_leg[self.mode.stance[-1]]
         self.observer.begin(bool(node.stance))
         self.ground.begin(self.feet.landed)
+        if not node.stance:
+            # The liftoff before has made the foot that stood the front leg's.
+            self.feet.landed = self.feet.foot_of_leg[Leg.FRONT]
         self.contacts.begin()
         self._read()
         self._decide(section)
@@ -398,7 +401,8 @@ class EmbeddingController:
         Where the table says ``use_pre_impact_velocity``, the path goes on with the speed before it.
         """
         if self.lateral is not None:
-            self.lateral.touch_down(self.time - self.supervisor.begun_at)
+            lasted = self.time - self.supervisor.begun_at
+            self.lateral.touch_down(self.feet.foot_of_leg[leg], lasted)
         leans = self._update_slope(self.feet.foot_of_leg[leg])
         higher, s = self.observer.land(leg), self.observer.now
         if leans:
@@ -430,7 +434,8 @@ class EmbeddingController:
         supervisor = self.supervisor
         if supervisor.deciding:
             nominal = supervisor.decision.nominal
-            if lateral is not None and lateral.end_stride(self.lateral_state(), nominal):
+            ended = self.lateral_state(), nominal, not self.mode.stance
+            if lateral is not None and lateral.end_stride(*ended):
                 self.robot.update(*self.ground.raw_state)
                 self._read()
             learners.end_stride(section, s.state, nominal)

@@ -74,14 +74,14 @@ Phases = Mapping[Phase | str, PhaseControl]
 
 # A running leg folds high and comes down late: a foot that sinks all the way touches early, while
 # the CoM still rises, and straightens the knee into its stop.
-_RUNNING_SWING = SwingOptions(
+RUNNING_SWING = SwingOptions(
     clearance=0.15, rise=0.4, descent=0.14, landing_speed=0.6, leg_share=0.975
 )
 # Ground forces are several times the weight: the trunk is turned by angular momentum.
 _RUNNING_STANCE = PhaseControl(
     tasks=(ComTask((0.01, 10.0)), MomentumTask(130.0, 20.0, 0.26), FootTask(Leg.FRONT)),
     swings=(Leg.FRONT,),
-    swing=_RUNNING_SWING,
+    swing=RUNNING_SWING,
 )
 
 # A stride that is made once has nothing to be trimmed by, and a planner with push-off leaves the
@@ -112,7 +112,7 @@ PHASES: Phases = {
         clock=Clock.TIME,
         momentum_speed=False,
         estimate_load=False,
-        swing=_RUNNING_SWING,
+        swing=RUNNING_SWING,
     ),
     "SS_sc^r": replace(_RUNNING_STANCE, replan_at_touchdown=True),
     "SS_sd^r": _RUNNING_STANCE,

@@ -104,6 +104,10 @@ def sense(
         feel_friction(tick, data, qp, force, dt)
     for foot in range(2):
         t.feet.swing_time[foot] += dt
+    for leg in range(t.mode.stances):
+        foot = t.feet.roles[leg]
+        for k in range(2):
+            t.lateral.stood[foot, k] = r.foot_position[foot, k]
     if not read_state(t.sensed, t.feet, r, t.mode):
         return DIVERGED
     if fired_edge(tick) >= 0:
@@ -250,18 +254,29 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
 
 @compiled
 def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: float) -> None:
-    """As :func:`move_swings`, to the left and right."""
+    """As :func:`move_swings`, to the left and right.
+
+    Of two feet in the air the one that is due first goes to the next foothold, the other one to
+    the one after it.
+    """
     f, mode, path, lateral = t.feet, t.mode, t.path, t.lateral
+    if not mode.swings:
+        return
     com, feet = np.empty(2), np.empty(2)
     com[0], com[1] = r.com[_SIDE], r.com_velocity[_SIDE]
     if mode.momentum_speed:
         com[1] = r.com_velocity[_SIDE] - r.momentum[0] / (r.mass * t.sensed.state[1])
+    first = np.inf
+    for i in range(mode.swings):
+        first = min(first, path.landing_time[f.roles[mode.swing_leg[i]]])
+    for k in range(2):
+        feet[k] = lateral.stood[lateral.feet[k], _SIDE]
+    foothold = lateral_foothold(lateral, arrays, path.time, com, feet)
     for i in range(mode.swings):
         foot = f.roles[mode.swing_leg[i]]
-        for k in range(2):
-            feet[k] = r.foot_position[lateral.feet[k], _SIDE]
-        due = path.landing_time[foot] - path.time
-        target, side = lateral_foothold(lateral, arrays, path.time, com, feet), want.side[foot]
+        due, side = path.landing_time[foot] - path.time, want.side[foot]
+        later = path.landing_time[foot] > first
+        target = foothold + lateral.second_step if later else foothold
         # Without a touchdown on the path there is no time in which to get there.
         if not f.horizon[foot] < due < np.inf or not np.isfinite(target):
             side[1] = side[2] = 0.0

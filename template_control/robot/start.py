@@ -67,7 +67,12 @@ class FloatingBasePose(Checked):
         feet: (2, 3) lowest points of rear and front foot [m].
         feet_velocity: (2, 3) [m/s].
         rear: the foot that is the rear leg's.
-        pitch: of the trunk, at rest [rad].
+        pitch: of the trunk [rad].
+        swung: time since rear and front foot left the ground [s]; None: they are in the middle of
+            their swings, if they swing.
+        in_flight: whether the robot has no angular momentum about the CoM, so that the trunk
+            turns against the legs, and ``com_velocity`` is the CoM's alone. Else the trunk is at
+            rest.
     """
 
     com: Triple
@@ -76,6 +81,8 @@ class FloatingBasePose(Checked):
     feet_velocity: Annotated[Array, Shape((2, 3))]
     rear: Annotated[int, Range(0, 1)] = 0
     pitch: float = 0.0
+    swung: tuple[NotNegative, NotNegative] | None = None
+    in_flight: bool = False
 
 
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
@@ -153,8 +160,11 @@ def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple
     robot.update(q, np.zeros(robot.nv))
     rows, feet = _rows(robot), [pose.rear, 1 - pose.rear]
     weight = robot.mass * pose.com[2]
-    rows[0] += robot.space.momentum_jacobian[1] / weight
-    rows[1] -= robot.space.momentum_jacobian[0] / weight
+    if pose.in_flight:
+        rows[3:6] = robot.space.momentum_jacobian
+    else:
+        rows[0] += robot.space.momentum_jacobian[1] / weight
+        rows[1] -= robot.space.momentum_jacobian[0] / weight
     wanted = np.zeros(len(rows))
     wanted[:3] = pose.com_velocity
     for foot, velocity in zip(feet, pose.feet_velocity, strict=True):

@@ -7,11 +7,11 @@ from contextlib import AbstractContextManager, nullcontext
 from math import atan2, cos, degrees, sin
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.free.lateral import SIDES
+from template_control.embedding.free.lateral import SIDES, LateralPlanner
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.ground import LEVEL, STEEPEST
 from template_control.embedding.options import EmbeddingOptions
@@ -192,17 +192,19 @@ class FloatingBackend(RobotBackend):
         return EmbeddingController(self.robot, planners, options, route, automaton)
 
     def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
-        """See :meth:`RobotBackend.start`: at VLO, in the sideways motion of the gait.
+        """See :meth:`RobotBackend.start`: at VLO or an apex, in the sideways motion of the gait.
 
         A ParameterError if the run begins elsewhere, or the options have a planar pose.
         """
         route, motion = controller.supervisor.route, controller.lateral
-        if o.pose is not None or route.section != VLO or motion is None:
+        if o.pose is not None or route.section not in (VLO, APEX) or motion is None:
             raise ParameterError(
-                f"{self.robot.name} walks free: its run begins at VLO, without a pose"
+                f"{self.robot.name} has a floating base: its run begins at VLO or an apex, without"
+                " a pose"
             )
         z = route.start if o.start is None else np.array(o.start)
-        planner, node = controller.supervisor.begin(VLO)
+        first = controller.supervisor.begin(route.section)
+        planner = first[0]
         lateral, course = motion.planner, o.course
         lateral.wish = LateralWish(
             course.step_width or lateral.wish.width,
@@ -210,8 +212,13 @@ class FloatingBackend(RobotBackend):
         )
         motion.turning = course.rate
         lateral.reset(planner.gait)
-        away, drift = lateral.cycle.states[SIDES[_REAR].row]
         width = lateral.wish.width
+        if route.section == APEX:
+            pose = self._apex_pose(controller, lateral, z[: APEX.dimension], first)
+            q, v = floating_state_in(self.robot, pose)
+            controller.start(pose.rear, pose.swung, first=first)
+            return q, v
+        away, drift = lateral.cycle.states[SIDES[_REAR].row]
         # Mid-swing: the other foot passes the stance foot at twice the CoM's speed.
         pose = FloatingBasePose(
             com=np.array([0.0, 0.5 * width + away, z[1]]),
@@ -224,8 +231,47 @@ class FloatingBackend(RobotBackend):
             pitch=controller.first_pitch(),
         )
         q, v = floating_state_in(self.robot, pose)
-        controller.start(_REAR, first=(planner, node))
+        controller.start(_REAR, first=first)
         return q, v
+
+    def _apex_pose(
+        self,
+        controller: EmbeddingController,
+        lateral: LateralPlanner,
+        z: Array,
+        first: tuple[Planner, Node],
+    ) -> FloatingBasePose:
+        """The pose at an apex ``z`` (2,): the planar one, in the gait's lateral motion.
+
+        The front leg's foot has stood last, and the rear leg's is about to land.
+        """
+        (planner, node), o = first, controller.options
+        stood = SIDES[1 - _REAR]
+        away, drift = lateral.cycle.states[stood.row]
+        foothold = 0.5 * stood * lateral.wish.width
+        y = [foothold + lateral.cycle.steps[stood.row], foothold]
+
+        def lifted(pose: Pose) -> FloatingBasePose:
+            def in_space(points: Array, y: ArrayLike) -> Array:
+                return np.insert(points, 1, y, axis=-1)
+
+            return FloatingBasePose(
+                com=in_space(pose.com, foothold + away),
+                com_velocity=in_space(pose.com_velocity, drift),
+                feet=in_space(pose.feet, y),
+                feet_velocity=in_space(pose.feet_velocity, 0.0),
+                rear=_REAR,
+                pitch=pose.pitch,
+                swung=pose.swung,
+                in_flight=True,
+            )
+
+        swing = phase_control(o.phases, node).swing or controller.swings.other
+        automaton = controller.supervisor.automaton
+        start = ApexStart(z, planner.gait, swing, controller.first_pitch(), automaton)
+        return lifted(
+            apex_pose(self.robot, start, lambda r, pose: floating_state_in(r, lifted(pose)))
+        )
 
     def plant(self, world: World) -> AbstractContextManager[Plant]:
         """See :meth:`RobotBackend.plant`; a ParameterError for a world without free robots."""

@@ -175,12 +175,14 @@ class Experiment(Checked):
         return replace(self, motion=motion, planner=planner, controller=self.tuning)
 
     def _default_planner(self, motion: GaitSpec | Scenario | Gait | None) -> PlannerSpec:
+        runs = motion.name == "run" if isinstance(motion, GaitSpec) else None
+        if runs or isinstance(motion, RunningGait):
+            return RunningOptions()
         if self.free:
             return FREE_PLANNER
         if isinstance(motion, Scenario):
             return AheadOptions() if motion.only_walks else LqrOptions()
-        runs = motion.name == "run" if isinstance(motion, GaitSpec) else None
-        return RunningOptions() if runs or isinstance(motion, RunningGait) else LqrOptions()
+        return LqrOptions()
 
     def with_(self, keys: Mapping[str, Any]) -> Experiment:
         """The same experiment with some keys set, named as in its TOML file.

@@ -29,6 +29,7 @@ REFERENCES = np.dtype(
         ("com_now", _F, (4,)),
         ("com_push", _F),
         ("pitch", _F),
+        ("lean", _F, (3,)),
         ("feet", _I, (2,)),
         ("foot", _F, (2, 2, 3)),
         ("side", _F, (2, 3)),
@@ -50,6 +51,8 @@ class References:
             the phase senses: with the angular momentum about the CoM, or without.
         com_push: horizontal acceleration added to the feedforward [m/s^2].
         pitch: wanted angle of the trunk [rad].
+        lean: (3,) wanted roll and yaw of a floating-base robot's trunk at 0 and 2, in the heading
+            frame [rad].
         feet: the foot that is the rear leg's, and the front leg's.
         foot: (2, 2, 3) of each foot: x and y, each wanted position, velocity, acceleration, in
             the world [m, m/s, m/s^2].
@@ -67,6 +70,7 @@ class References:
         now = {name: self.data[name][0] for name in REFERENCES.names or ()}
         self.com: Array = now["com"]
         self.com_now: Array = now["com_now"]
+        self.lean: Array = now["lean"]
         self.feet: NDArray[np.int64] = now["feet"]
         self.foot: Array = now["foot"]
         self.side: Array = now["side"]

@@ -43,13 +43,13 @@ TASK = np.dtype(
         ("first", _I),  # row of the stack
         ("leg", _I),  # role of the task's foot
         ("gains", _F, (4,)),  # kp and kd, twice where the task has two pairs
-        ("weight", _F),  # of the first row
+        ("weight", _F, (3,)),  # of the first rows
     ],
     align=True,
 )
 """A task as compiled code reads it."""
 
-_COM, _FOOT, _MOMENTUM, _POSTURE, _ORIENTATION, _SIDE_FOOT, _SPARE = range(7)
+_COM, _FOOT, _MOMENTUM, _POSTURE, _ORIENTATION, _SPIN, _SIDE_FOOT, _SPARE = range(8)
 
 
 class CompiledTask(Checked):
@@ -82,7 +82,8 @@ class CompiledTask(Checked):
         """
         found = np.zeros(1, TASK)
         found["kind"], found["first"] = self.kind, first
-        found["leg"], found["weight"] = getattr(self, "leg", 0), self.weights[0]
+        found["leg"], weights = getattr(self, "leg", 0), self.weights
+        found["weight"][0, : len(weights)] = weights
         found["gains"][0, : len(self.numbers)] = self.numbers
         return found
 
@@ -246,7 +247,7 @@ def momentum_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: A
     rows[0, nv + BIAS] = r.momentum_bias[1]
     turning = inertia * task.gains[1] * (want.pitch - r.attitude[1])
     rows[0, nv + DESIRED] = task.gains[0] * (turning - r.momentum[1])
-    rows[0, nv + WEIGHT] = task.weight / (inertia * inertia)
+    rows[0, nv + WEIGHT] = task.weight[0] / (inertia * inertia)
 
 
 @dataclass(frozen=True)
@@ -319,6 +320,57 @@ def orientation_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows
     rows[0, nv + DESIRED] = -kp * r.attitude[0] - kd * r.turning[0]
     rows[1, nv + DESIRED] = kp * (want.pitch - r.attitude[1]) - kd * r.turning[1]
     rows[2, nv + DESIRED] = -yaw_p * r.attitude[2] - yaw_d * r.turning[2]
+
+
+@dataclass(frozen=True)
+class SpinTask(CompiledTask):
+    """Three rows: the rate of the angular momentum L = A v about the CoM, in the heading frame.
+
+        A_i a + dA_i/dt v = k (m h^2 w_i (ref_i - angle_i) - L_i)
+
+    A :class:`MomentumTask` about all three axes: ref is (roll, pitch, yaw) as wanted, the angles
+    are those of an :class:`OrientationTask`. In a run a point foot's force of several times the
+    weight turns the trunk about every axis.
+
+    Attributes:
+        weight: of the rows about x, y and z, each over m h^2 [s^4/rad^2]. A moment about the
+            vertical comes from the foot's lateral force times its distance ahead, and costs a
+            moment about x: so the yaw's weight is the largest.
+        bandwidth: k [1/s].
+        turning: w, angular momentum over m h^2 for each radian of error [1/s].
+    """
+
+    weight: tuple[NotNegative, NotNegative, NotNegative] = tuned(
+        (130.0, 130.0, 400.0), PER_RATE_TO_THE_FOURTH
+    )
+    bandwidth: NotNegative = tuned(20.0, RATE)
+    turning: tuple[NotNegative, NotNegative, NotNegative] = tuned((0.26, 0.26, 0.1), RATE)
+
+    kind = _SPIN
+    in_space = True
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """See :attr:`CompiledTask.numbers`."""
+        return self.bandwidth, *self.turning
+
+
+@compiled
+def spin_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of a :class:`SpinTask`.
+
+    Arguments as for :func:`write_rows`, one of each.
+    """
+    momentum, height = arrays[3], want.com_now[1]
+    nv, inertia = momentum.shape[1], r.mass * (height * height)
+    for axis in range(momentum.shape[0]):
+        for k in range(nv):
+            rows[axis, k] = momentum[axis, k]
+        rows[axis, nv + BIAS] = r.momentum_bias[axis]
+        wanted = want.pitch if axis == 1 else want.lean[axis]
+        turning = inertia * task.gains[1 + axis] * (wanted - r.attitude[axis])
+        rows[axis, nv + DESIRED] = task.gains[0] * (turning - r.momentum[axis])
+        rows[axis, nv + WEIGHT] = task.weight[axis] / (inertia * inertia)
 
 
 @dataclass(frozen=True)
@@ -415,6 +467,8 @@ def write_rows(
             posture_rows(task, r, want, rows)
         elif task.kind == _ORIENTATION:
             orientation_rows(task, r, arrays, want, rows)
+        elif task.kind == _SPIN:
+            spin_rows(task, r, arrays, want, rows)
         elif task.kind == _SIDE_FOOT:
             side_foot_rows(task, r, arrays, want, rows)
         else:

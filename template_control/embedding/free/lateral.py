@@ -106,6 +106,7 @@ LATERAL = np.dtype(
         ("section", _F),
         ("beside", _I),
         ("feet", _I, (2,)),  # that were rear and front at its start
+        ("stood", _F, (2, 2)),  # x and y where each foot stands, or stood last [m]
         # -- what the foothold is for: see LateralAim --
         ("state", _F, (2,)),
         ("step", _F),
@@ -115,6 +116,7 @@ LATERAL = np.dtype(
         ("steps", _F, (2,)),
         ("reach", _F),
         ("stretch", _F),
+        ("second_step", _F),  # from that foothold to the one after it, to the left [m]
         # -- the foothold: see Placement --
         ("hold", _F),  # time before touchdown from which on it is kept [s]
         ("placed", _I),  # whether there is one
@@ -179,8 +181,8 @@ class LateralPlanner:
 
     ``options`` are of the reference template; ``wish``, step width, lateral motion and turn, may be
     changed between two steps; ``data`` (1,) are of ``LATERAL``, which ticks read and write.
-    ``learnt`` is what the robot adds to the template's sideways motion, ``cycle`` the wish's
-    periodic motion.
+    ``lessons`` is what the robot adds to the template's sideways motion, by kind of stride,
+    ``cycle`` the wish's periodic motion.
     """
 
     def __init__(
@@ -190,7 +192,7 @@ class LateralPlanner:
         self._unscaled = options
         self.options = scaled(options, Scale.of(parameters))
         self._gravity = parameters.gravity
-        self.learnt = LateralLearnt()
+        self.lessons: dict[str, LateralLearnt] = {}
         self.cycle: LateralCycle
         self._gait: Gait | None = None
         self._lateral: LateralGait
@@ -202,6 +204,15 @@ class LateralPlanner:
         data["hold"] = self.options.hold
 
     @property
+    def learnt(self) -> LateralLearnt:
+        """What has been learnt of the present gait's strides."""
+        return self.lessons.get(self._kind, LateralLearnt())
+
+    @property
+    def _kind(self) -> str:
+        return "" if self._gait is None else self._gait.stride
+
+    @property
     def placed(self) -> Placement | None:
         """The foothold that was chosen for the foot in the air; None before the first."""
         now = self.data[0]
@@ -211,7 +222,8 @@ class LateralPlanner:
 
     def reset(self, gait: Gait) -> None:
         """Begin anew with a gait; nothing is learnt yet."""
-        self.learnt, self._planar = LateralLearnt(), None
+        self._planar = None
+        self.lessons.clear()
         self.data["placed"] = 0
         self._landed, self._due = None, np.inf
         self.walk(gait)
@@ -231,23 +243,31 @@ class LateralPlanner:
         """
         if self._landed is not None:
             surprise = com - (foot, 0.0) - self._landed.state(foot)
-            self.learnt = self.learnt.after_step(stance.other, surprise, self.options.learning)
+            learnt = self.learnt.after_step(stance.other, surprise, self.options.learning)
+            self.lessons[self._kind] = learnt
 
     def expect(self, due: float) -> None:
-        """Take note, at a section, of the time until the template's touchdown is due [s]."""
+        """Take note, at a section, of the time until the template's touchdown is due [s].
+
+        It is inf where no stance begins there.
+        """
         self._due = due
 
     def touch_down(self, lasted: float) -> None:
         """Learn the duration of single stance from a touchdown so long after the section [s]."""
         if np.isfinite(self._due) and self._due > 0.0:
             options = self.options.learning
-            self.learnt = self.learnt.after_stance(lasted, self._due, options)
+            self.lessons[self._kind] = self.learnt.after_stance(lasted, self._due, options)
         self._landed, self._due = self.placed, np.inf
         self.data["placed"] = 0
 
     def aim(self, stance: Side) -> None:
-        """Choose the target of a foot that swings, next to the foot on the side ``stance``."""
+        """Aim at the next foothold, next to the foot on the side ``stance``, and the one after it.
+
+        That foot stands, or stood last.
+        """
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
+        self.data["second_step"] = self.cycle.steps[stance.other.row]
         for name, value in self._aim._asdict().items():
             self.data[name] = value
 

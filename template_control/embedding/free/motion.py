@@ -28,7 +28,7 @@ from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.hybrid import Node
-from template_control.slip.automaton.vocabulary import Event, Leg
+from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.lateral.placing import LATERAL
@@ -61,6 +61,7 @@ class LateralMotion:
     ) -> None:
         self.robot, self.planner = robot, planner
         self._feet, self._references, self._reach = feet, references, reach
+        self._stood: Array = planner.data["stood"][0]
         self.turning: Callable[[float], float] = lambda time: 0.0
 
     @classmethod
@@ -86,6 +87,8 @@ class LateralMotion:
     def begin(self, gait: Gait) -> None:
         """Begin a run with the gait of its first stride; nothing is learnt yet."""
         self.planner.reset(gait)
+        for foot in range(2):
+            self._stands(foot)
 
     def state(self, height: float, momentum_speed: bool) -> Array:
         """(2,) y of the CoM, and dy/dt with the angular momentum if the forward speed has it.
@@ -102,17 +105,34 @@ class LateralMotion:
         """y of a foot [m]."""
         return float(self.robot.space.foot[foot, _SIDE])
 
-    def end_stride(self, com: Array, nominal: bool) -> bool:
+    def _stands(self, foot: int) -> None:
+        """A foot stands where it is now."""
+        self._stood[foot] = self.robot.space.foot[foot, :2]
+
+    def end_stride(self, com: Array, nominal: bool, in_flight: bool) -> bool:
         """Learn from the stride that has just ended, and turn the heading frame.
 
+<<<<<<< HEAD
         ``com`` (2,) is :meth:`state` where it ended; ``nominal`` says whether it went near the
         gait. True if the frame has turned: the robot has to be read again.
+=======
+        Args:
+            com: (2,) :meth:`state` where it ended.
+            nominal: whether it went near the gait.
+            in_flight: whether no foot stands there.
+
+        Returns:
+            Whether the frame has turned: the robot has to be read again.
+>>>>>>> c01dd7d (Run untethered: angular momentum about three axes, footholds remembered through flight, a start at the apex)
         """
-        planner, stance = self.planner, self._feet.foot_of_leg[Leg.REAR]
+        planner, stance = self.planner, self._feet.landed
+        about = self._stood[stance].copy()
         if nominal:
-            planner.end_step(SIDES[stance], self.side(stance), com)
+            planner.end_step(SIDES[stance], about[_SIDE], com)
         if planner.wish.turn:
-            self._turn(planner.wish.turn, self.robot.space.foot[stance, :2].copy())
+            if in_flight:
+                about[0] = self.robot.space.com[0]
+            self._turn(planner.wish.turn, about)
         return bool(planner.wish.turn)
 
     def _turn(self, angle: float, about: Array) -> None:
@@ -126,6 +146,8 @@ class LateralMotion:
             ahead[:], side[:] = c * ahead + s * side, c * side - s * ahead
             ahead[0] += about[0]
             side[0] += about[1]
+        away = self._stood - about
+        self._stood[:] = away @ [[c, -s], [s, c]] + about
 
     def begin_stride(
         self,
@@ -145,7 +167,7 @@ class LateralMotion:
         planner, gait = self.planner, supervisor.planner.gait
         planner.wish = replace(planner.wish, turn=self.turning(time) * gait.step_duration)
         planner.walk(gait)
-        planner.aim(SIDES[self._feet.foot_of_leg[Leg.REAR]])
+        planner.aim(SIDES[self._feet.landed])
         z, target = section.of(sensed.state), supervisor.goal.target
 
         def decide(least: float) -> Decision:
@@ -159,22 +181,36 @@ class LateralMotion:
 
         def look(decision: Decision) -> LateralForecast:
             follow(decision)
-            feet = np.array([self.side(foot) for foot in supervisor.feet])
+            feet = self._stood[list(supervisor.feet), _SIDE]
             return planner.forecast(supervisor.path, com, feet)
 
+        if not node.stance:
+            planner.expect(inf)
+            return node
         node = follow(early_touchdown(supervisor.decision, decide, look, self._reach))
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node
 
+<<<<<<< HEAD
     def touch_down(self, lasted: float) -> None:
         """A foot has landed, ``lasted`` [s] after the section."""
+=======
+    def touch_down(self, foot: int, lasted: float) -> None:
+        """A foot has landed.
+
+        Args:
+            foot: its index.
+            lasted: time since the section [s].
+        """
+>>>>>>> c01dd7d (Run untethered: angular momentum about three axes, footholds remembered through flight, a start at the apex)
         self.planner.touch_down(lasted)
+        self._stands(foot)
+        self.planner.aim(SIDES[foot])
 
     def lift(self, foot: int) -> None:
         """A foot begins its swing."""
         speed = float(self.robot.contact_velocity[foot, _SIDE])
         self._references.side[foot] = self.side(foot), speed, 0.0
-        self.planner.aim(SIDES[1 - foot])
 
     def arrays(self, supervisor: StrideSupervisor) -> tuple[Any, ...]:
         """Arrays of the supervisor's path that :func:`.lateral_foothold` reads."""

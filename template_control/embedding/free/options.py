@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from template_control.checks.ranges import Positive, Share
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.phases import Clock, PhaseControl, Phases
+from template_control.embedding.phases import RUNNING_SWING, Clock, PhaseControl, Phases
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.swing import SwingOptions
 from template_control.estimation.filters import NoiseFilterOptions
@@ -21,6 +21,7 @@ from template_control.whole_body.tasks import (
     OrientationTask,
     SideFootTask,
     SpareJointTask,
+    SpinTask,
 )
 
 # Two point feet bear no torque about the line between them: with the height and the trunk held
@@ -29,6 +30,19 @@ from template_control.whole_body.tasks import (
 _DOUBLE = PhaseControl(
     tasks=(ComTask((30.0, 30.0)), OrientationTask((4.0, 4.0, 0.4)), SpareJointTask()),
     unload_legs=(Leg.REAR,),
+)
+
+_RUNNING_STANCE = PhaseControl(
+    # As in the plane, about all three axes.
+    tasks=(
+        ComTask((0.01, 10.0)),
+        SpinTask(),
+        FootTask(),
+        SideFootTask(),
+        SpareJointTask(),
+    ),
+    swings=(Leg.FRONT,),
+    swing=RUNNING_SWING,
 )
 
 FREE_PHASES: Phases = {
@@ -45,7 +59,10 @@ FREE_PHASES: Phases = {
         clock=Clock.TIME,
         momentum_speed=False,
         estimate_load=False,
+        swing=RUNNING_SWING,
     ),
+    "SS_sc^r": replace(_RUNNING_STANCE, replan_at_touchdown=True),
+    "SS_sd^r": _RUNNING_STANCE,
     Phase.SS: PhaseControl(
         # As in the plane; and the CoM's y is left to the place of the feet.
         tasks=(
@@ -62,7 +79,7 @@ FREE_PHASES: Phases = {
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,
 }
-"""Walking. Nodes of other gaits find the entry of their phase."""
+"""Walking and running. Nodes of other gaits find the entry of their phase."""
 
 
 @dataclass(frozen=True)
