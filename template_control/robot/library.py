@@ -74,7 +74,13 @@ _ENTRIES = {
     ),
     "five-link-3d": _Entry(
         "five_link_3d.urdf",
-        "five-link with hip ab- and adduction, limits of Unitree's H1",
+        "five-link with hip ab- and adduction",
+        sagittal_joints=("left_hip", "left_knee", "right_hip", "right_knee"),
+        free=True,
+    ),
+    "runner-3d": _Entry(
+        "runner_3d.urdf",
+        "runner with hip ab- and adduction",
         sagittal_joints=("left_hip", "left_knee", "right_hip", "right_knee"),
         free=True,
     ),
