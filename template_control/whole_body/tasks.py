@@ -343,8 +343,8 @@ class SpinTask(CompiledTask):
     weight: tuple[NotNegative, NotNegative, NotNegative] = tuned(
         (130.0, 130.0, 400.0), PER_RATE_TO_THE_FOURTH
     )
-    bandwidth: NotNegative = tuned(20.0, RATE)
-    turning: tuple[NotNegative, NotNegative, NotNegative] = tuned((0.26, 0.26, 0.1), RATE)
+    bandwidth: NotNegative = tuned(40.0, RATE)
+    turning: tuple[NotNegative, NotNegative, NotNegative] = tuned((0.26, 0.26, 0.3), RATE)
 
     kind = _SPIN
     in_space = True

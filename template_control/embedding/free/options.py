@@ -78,6 +78,12 @@ FREE_PHASES: Phases = {
     # A planner with push-off leaves the trim nothing to do.
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,
+    "DS_sc^wr": replace(_DOUBLE, replan_at_touchdown=True),
+    "DS_sd^wr": _DOUBLE,
+    "SS_sc^wr": replace(_RUNNING_STANCE, replan_at_touchdown=True),
+    "SS_sd^wr": _RUNNING_STANCE,
+    "SS_sc^rw": replace(_RUNNING_STANCE, replan_at_touchdown=True),
+    "SS_sd^rw": _RUNNING_STANCE,
 }
 """Walking and running. Nodes of other gaits find the entry of their phase."""
 
