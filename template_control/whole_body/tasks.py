@@ -35,6 +35,10 @@ Array = NDArray[np.float64]
 
 _PITCH = 2  # place of a planar robot's pitch in q
 _SIDE = 1  # y of a floating-base robot's feet, to the left
+_YAW = 2
+# An error of the yaw counts as this much at most in a run [rad]: more momentum about the vertical
+# than it asks for is more than ab- and adduction have, and roll is lost with it.
+_MOST_YAW = 0.15
 _F, _I = np.float64, np.int64
 
 TASK = np.dtype(
@@ -368,7 +372,10 @@ def spin_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array
             rows[axis, k] = momentum[axis, k]
         rows[axis, nv + BIAS] = r.momentum_bias[axis]
         wanted = want.pitch if axis == 1 else want.lean[axis]
-        turning = inertia * task.gains[1 + axis] * (wanted - r.attitude[axis])
+        error = wanted - r.attitude[axis]
+        if axis == _YAW:
+            error = min(max(error, -_MOST_YAW), _MOST_YAW)
+        turning = inertia * task.gains[1 + axis] * error
         rows[axis, nv + DESIRED] = task.gains[0] * (turning - r.momentum[axis])
         rows[axis, nv + WEIGHT] = task.weight[axis] / (inertia * inertia)
 
