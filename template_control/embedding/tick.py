@@ -185,6 +185,7 @@ def advance(
     move_swings(t, r, want, dt)
     if lateral is not None:
         _swing_sideways(t, r, want, lateral, dt)
+        _turn(t, want, dt)
     for k in range(4):
         want.com_now[k] = s.state[k]
     want.com_now[0] -= s.toes[0]
@@ -282,6 +283,20 @@ def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: floa
             side[1] = side[2] = 0.0
         else:
             quintic_step(side, target, 0.0, max(due - f.early[foot], f.horizon[foot]), dt)
+
+
+@compiled
+def _turn(t: Any, want: Any, dt: float) -> None:
+    """Write the trunk's roll and yaw, and its momentum about the vertical, in a run's turn.
+
+    The heading frame turns at the apex; between two apexes the trunk turns as much.
+    """
+    lateral = t.lateral
+    most = lateral.bank_rate * dt
+    want.lean[0] += min(max(lateral.bank - want.lean[0], -most), most)
+    done = min((t.time - lateral.begun) / lateral.duration, 1.0)
+    want.lean[2] = lateral.turn * (done - 0.5)
+    want.spin = lateral.spin
 
 
 @compiled

@@ -338,6 +338,10 @@ class FloatingBaseBiped(Biped):
         roll, pitch, yaw = self.data[0]["attitude"].tolist()
         return roll, pitch, yaw
 
+    def yaw_inertia(self) -> float:
+        """Moment of inertia about the vertical through the CoM, at the last update [kg m^2]."""
+        return float(self._data.Ig.inertia[2, 2])
+
     def tilt(self, q: Array) -> float:
         """See :meth:`~template_control.robot.biped.Biped.tilt`."""
         return float(np.arccos(np.clip(self.rotation[2, 2], -1.0, 1.0)))

@@ -208,7 +208,8 @@ class FloatingBackend(RobotBackend):
         lateral, course = motion.planner, o.course
         lateral.wish = LateralWish(
             course.step_width or lateral.wish.width,
-            turn=course.rate(0.0) * planner.gait.step_duration,
+            # A run leans into its turns by and by.
+            turn=course.rate(0.0) * planner.gait.step_duration if route.section == VLO else 0.0,
         )
         motion.turning = course.rate
         lateral.reset(planner.gait)

@@ -30,6 +30,7 @@ REFERENCES = np.dtype(
         ("com_push", _F),
         ("pitch", _F),
         ("lean", _F, (3,)),
+        ("spin", _F),
         ("feet", _I, (2,)),
         ("foot", _F, (2, 2, 3)),
         ("side", _F, (2, 3)),
@@ -53,6 +54,7 @@ class References:
         pitch: wanted angle of the trunk [rad].
         lean: (3,) wanted roll and yaw of a floating-base robot's trunk at 0 and 2, in the heading
             frame [rad].
+        spin: wanted angular momentum about the vertical [N m s].
         feet: the foot that is the rear leg's, and the front leg's.
         foot: (2, 2, 3) of each foot: x and y, each wanted position, velocity, acceleration, in
             the world [m, m/s, m/s^2].

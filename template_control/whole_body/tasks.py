@@ -284,7 +284,7 @@ def posture_rows(task: Any, r: Any, want: Any, rows: Array) -> None:
 class OrientationTask(CompiledTask):
     """Three rows: the trunk's angular acceleration about the heading frame's x, y and z.
 
-        w' = kp (-roll, pitch_ref - pitch, -yaw) - kd w
+        w' = kp (roll_ref - roll, pitch_ref - pitch, yaw_ref - yaw) - kd w
 
     Roll and pitch are how far the trunk's upward axis leans, about the heading frame's axes; yaw is
     the direction of its forward axis (:meth:`.FloatingBaseBiped.roll_pitch_yaw`). In the trunk's
@@ -321,19 +321,19 @@ def orientation_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows
     for axis in range(turning.shape[0]):
         for k in range(nv):
             rows[axis, k] = turning[axis, k]
-    rows[0, nv + DESIRED] = -kp * r.attitude[0] - kd * r.turning[0]
+    rows[0, nv + DESIRED] = kp * (want.lean[0] - r.attitude[0]) - kd * r.turning[0]
     rows[1, nv + DESIRED] = kp * (want.pitch - r.attitude[1]) - kd * r.turning[1]
-    rows[2, nv + DESIRED] = -yaw_p * r.attitude[2] - yaw_d * r.turning[2]
+    rows[2, nv + DESIRED] = yaw_p * (want.lean[2] - r.attitude[2]) - yaw_d * r.turning[2]
 
 
 @dataclass(frozen=True)
 class SpinTask(CompiledTask):
     """Three rows: the rate of the angular momentum L = A v about the CoM, in the heading frame.
 
-        A_i a + dA_i/dt v = k (m h^2 w_i (ref_i - angle_i) - L_i)
+        A_i a + dA_i/dt v = k (m h^2 w_i (ref_i - angle_i) + L_ref,i - L_i)
 
     A :class:`MomentumTask` about all three axes: ref is (roll, pitch, yaw) as wanted, the angles
-    are those of an :class:`OrientationTask`. In a run a point foot's force of several times the
+    are those of an :class:`OrientationTask`; L_ref, about the vertical, turns with the heading. In a run a point foot's force of several times the
     weight turns the trunk about every axis.
 
     Attributes:
@@ -376,6 +376,8 @@ def spin_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array
         if axis == _YAW:
             error = min(max(error, -_MOST_YAW), _MOST_YAW)
         turning = inertia * task.gains[1 + axis] * error
+        if axis == _YAW:
+            turning += want.spin
         rows[axis, nv + DESIRED] = task.gains[0] * (turning - r.momentum[axis])
         rows[axis, nv + WEIGHT] = task.weight[axis] / (inertia * inertia)
 

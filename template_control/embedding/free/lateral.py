@@ -107,6 +107,13 @@ LATERAL = np.dtype(
         ("beside", _I),
         ("feet", _I, (2,)),  # that were rear and front at its start
         ("stood", _F, (2, 2)),  # x and y where each foot stands, or stood last [m]
+        # -- the turn of a run's stride --
+        ("turn", _F),  # of the heading in it [rad]
+        ("begun", _F),  # when it began [s]
+        ("duration", _F),  # of it [s]
+        ("bank", _F),  # roll that the turn's curve asks for [rad]
+        ("bank_rate", _F),  # at which the roll goes there [rad/s]
+        ("spin", _F),  # angular momentum about the vertical [N m s]
         # -- what the foothold is for: see LateralAim --
         ("state", _F, (2,)),
         ("step", _F),
@@ -201,7 +208,7 @@ class LateralPlanner:
         self._path: LateralPath
         self._landed: Placement | None = None
         self._due = np.inf
-        data["hold"] = self.options.hold
+        data["hold"], data["duration"] = self.options.hold, 1.0
 
     @property
     def learnt(self) -> LateralLearnt:

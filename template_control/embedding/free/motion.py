@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, inf, sin
+from math import atan2, cos, inf, sin
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,8 @@ from template_control.whole_body.task import References
 Array = NDArray[np.float64]
 
 _SIDE = 1  # y, to the left
+TURN_RAMP = 0.15  # change of a run's turning rate [rad/s^2, of the reference template]
+BANK_RATE = 0.2  # of the roll into a turn's curve [rad/s, of the reference template]
 
 
 class LateralMotion:
@@ -48,7 +50,8 @@ class LateralMotion:
 
     ``robot`` is the nominal model, which every tick updates; ``side`` of ``references`` is kept
     here. A foothold that is wanted further than ``reach`` [m] beyond its bounds is out of reach.
-    ``turning`` is the rate of the heading by time [rad/s].
+    ``turning`` is the rate of the heading by time [rad/s]; a run changes its own by ``ramp``
+    [rad/s^2].
     """
 
     def __init__(
@@ -58,10 +61,13 @@ class LateralMotion:
         feet: Feet,
         references: References,
         reach: float,
+        ramp: float,
     ) -> None:
         self.robot, self.planner = robot, planner
         self._feet, self._references, self._reach = feet, references, reach
         self._stood: Array = planner.data["stood"][0]
+        self._rate = 0.0  # of the heading [rad/s]
+        self._ramp = ramp
         self.turning: Callable[[float], float] = lambda time: 0.0
 
     @classmethod
@@ -82,10 +88,13 @@ class LateralMotion:
         scale = Scale.of(parameters)
         wish = LateralWish(scaled(options, scale).step_width)
         planner = LateralPlanner(parameters, options.lateral, wish, data)
-        return cls(robot, planner, feet, references, BEYOND * scale.length)
+        data["bank_rate"] = BANK_RATE / scale.time
+        reach, ramp = BEYOND * scale.length, TURN_RAMP / scale.time**2
+        return cls(robot, planner, feet, references, reach, ramp)
 
     def begin(self, gait: Gait) -> None:
         """Begin a run with the gait of its first stride; nothing is learnt yet."""
+        self._rate = 0.0
         self.planner.reset(gait)
         for foot in range(2):
             self._stands(foot)
@@ -112,18 +121,9 @@ class LateralMotion:
     def end_stride(self, com: Array, nominal: bool, in_flight: bool) -> bool:
         """Learn from the stride that has just ended, and turn the heading frame.
 
-<<<<<<< HEAD
         ``com`` (2,) is :meth:`state` where it ended; ``nominal`` says whether it went near the
-        gait. True if the frame has turned: the robot has to be read again.
-=======
-        Args:
-            com: (2,) :meth:`state` where it ended.
-            nominal: whether it went near the gait.
-            in_flight: whether no foot stands there.
-
-        Returns:
-            Whether the frame has turned: the robot has to be read again.
->>>>>>> c01dd7d (Run untethered: angular momentum about three axes, footholds remembered through flight, a start at the apex)
+        gait, ``in_flight`` that no foot stands there. True if the frame has turned: the robot has
+        to be read again.
         """
         planner, stance = self.planner, self._feet.landed
         about = self._stood[stance].copy()
@@ -165,7 +165,12 @@ class LateralMotion:
         robot is in then.
         """
         planner, gait = self.planner, supervisor.planner.gait
-        planner.wish = replace(planner.wish, turn=self.turning(time) * gait.step_duration)
+        rate, duration = self.turning(time), gait.step_duration
+        if not node.stance:
+            most = self._ramp * duration
+            rate = min(max(rate, self._rate - most), self._rate + most)
+        self._rate = rate
+        planner.wish = replace(planner.wish, turn=rate * duration)
         planner.walk(gait)
         planner.aim(SIDES[self._feet.landed])
         z, target = section.of(sensed.state), supervisor.goal.target
@@ -186,23 +191,27 @@ class LateralMotion:
 
         if not node.stance:
             planner.expect(inf)
+            self._turn_in_run(sensed, gait.step_duration, time)
             return node
+        for name in ("turn", "bank", "spin"):
+            planner.data[name] = 0.0  # a walk's feet turn it
         node = follow(early_touchdown(supervisor.decision, decide, look, self._reach))
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node
 
-<<<<<<< HEAD
-    def touch_down(self, lasted: float) -> None:
-        """A foot has landed, ``lasted`` [s] after the section."""
-=======
-    def touch_down(self, foot: int, lasted: float) -> None:
-        """A foot has landed.
+    def _turn_in_run(self, sensed: TemplateState, duration: float, time: float) -> None:
+        """Turn and bank in the stride of a run that begins."""
+        data, turn = self.planner.data, self.planner.wish.turn
+        rate = turn / duration
+        data["turn"], data["begun"], data["duration"] = turn, time, duration
+        data["bank"] = -atan2(sensed.state[2] * rate, self.robot.gravity)
+        data["spin"] = self.robot.yaw_inertia() * rate
 
-        Args:
-            foot: its index.
-            lasted: time since the section [s].
-        """
->>>>>>> c01dd7d (Run untethered: angular momentum about three axes, footholds remembered through flight, a start at the apex)
+    def touch_down(self, foot: int, lasted: float) -> None:
+        """A foot has landed, ``lasted`` [s] after the section."""
+        self.planner.touch_down(lasted)
+        self._stands(foot)
+        self.planner.aim(SIDES[foot])
         self.planner.touch_down(lasted)
         self._stands(foot)
         self.planner.aim(SIDES[foot])
