@@ -38,7 +38,7 @@ _SIDE = 1  # y of a floating-base robot's feet, to the left
 _YAW = 2
 # An error of the yaw counts as this much at most in a run [rad]: more momentum about the vertical
 # than it asks for is more than ab- and adduction have, and roll is lost with it.
-_MOST_YAW = 0.15
+_MOST_YAW = 0.2
 _F, _I = np.float64, np.int64
 
 TASK = np.dtype(
@@ -333,8 +333,8 @@ class SpinTask(CompiledTask):
         A_i a + dA_i/dt v = k (m h^2 w_i (ref_i - angle_i) + L_ref,i - L_i)
 
     A :class:`MomentumTask` about all three axes: ref is (roll, pitch, yaw) as wanted, the angles
-    are those of an :class:`OrientationTask`; L_ref, about the vertical, turns with the heading. In a run a point foot's force of several times the
-    weight turns the trunk about every axis.
+    are those of an :class:`OrientationTask`; L_ref, about the vertical, turns with the heading. In
+    a run a point foot's force of several times the weight turns the trunk about every axis.
 
     Attributes:
         weight: of the rows about x, y and z, each over m h^2 [s^4/rad^2]. A moment about the
@@ -347,8 +347,8 @@ class SpinTask(CompiledTask):
     weight: tuple[NotNegative, NotNegative, NotNegative] = tuned(
         (130.0, 130.0, 400.0), PER_RATE_TO_THE_FOURTH
     )
-    bandwidth: NotNegative = tuned(40.0, RATE)
-    turning: tuple[NotNegative, NotNegative, NotNegative] = tuned((0.26, 0.26, 0.3), RATE)
+    bandwidth: NotNegative = tuned(60.0, RATE)
+    turning: tuple[NotNegative, NotNegative, NotNegative] = tuned((0.26, 0.26, 0.2), RATE)
 
     kind = _SPIN
     in_space = True
