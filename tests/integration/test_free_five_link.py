@@ -69,10 +69,10 @@ def table():
         trunk=solid(0.65, 61.6, 0.3461, box(61.6, 0.25, 0.45, 0.65)),
         thigh=solid(0.45, 4.8, 0.225, rod(4.8, 0.05, 0.45)),
         shank=solid(0.45, 2.4, 0.225, rod(2.4, 0.035, 0.45)),
-        torque_limit=(200.0, 300.0),
-        velocity_limit=14.0,
+        torque_limit=(350.0, 350.0),
+        velocity_limit=20.0,
         hip_range=(-2.0, 1.5),
-        knee_range=(0.0, 2.05),
+        knee_range=(0.0, 2.5),
     )
     return FloatingBaseFiveLink(
         planar, HipBlock(2.0, 0.06, torque_limit=200.0, velocity_limit=23.0)

@@ -19,6 +19,7 @@ from template_control.whole_body.tasks import (
     FootTask,
     OrientationTask,
     SideFootTask,
+    SpinTask,
 )
 
 FRICTION = 0.6
@@ -132,7 +133,9 @@ def test_rows_match_finite_differences(bolt):
     """T a + dT/dt v is the rate of what the task speaks of, along a motion with acceleration a."""
     rng, h = np.random.default_rng(3), 1e-6
     bolt.face(0.4, np.array([0.1, 0.2]))
-    tasks = (OrientationTask(), SideFootTask(Leg.REAR))
+    tasks = (OrientationTask(), SideFootTask(Leg.REAR), SpinTask())
+    references = References()
+    references.com_now[1] = 0.3  # m, the height that weighs the momentum
     for _ in range(5):
         q = pin.integrate(bolt.model, bolt.neutral(), rng.uniform(-0.5, 0.5, bolt.nv))
         v, a = rng.uniform(-1.0, 1.0, bolt.nv), rng.uniform(-5.0, 5.0, bolt.nv)
@@ -140,12 +143,13 @@ def test_rows_match_finite_differences(bolt):
         def measured(step, q=q, v=v, a=a):
             at = pin.integrate(bolt.model, q, step * v + 0.5 * step * abs(step) * a)
             bolt.update(at, v + step * a)
-            return np.array([*bolt.space.turning, bolt.contact_velocity[0, 1]])
+            s = bolt.space
+            return np.array([*s.turning, bolt.contact_velocity[0, 1], *s.momentum])
 
         rate = (measured(h) - measured(-h)) / (2.0 * h)
         bolt.update(q, v)
         stack = TaskStack(tasks, bolt.nv)
-        stack.write(bolt, References())
+        stack.write(bolt, references)
         rows = stack.table[:, : bolt.nv] @ a + stack.table[:, bolt.nv]
         np.testing.assert_allclose(rows, rate, atol=1e-5)
     bolt.face(0.0, np.zeros(2))
