@@ -434,10 +434,11 @@ class EmbeddingController:
         supervisor = self.supervisor
         if supervisor.deciding:
             nominal = supervisor.decision.nominal
-            ended = self.lateral_state(), nominal, not self.mode.stance
-            if lateral is not None and lateral.end_stride(*ended):
-                self.robot.update(*self.ground.raw_state)
-                self._read()
+            if lateral is not None:
+                flies = not self.mode.stance
+                if lateral.end_stride(self.lateral_state(), nominal, flies):
+                    self.robot.update(*self.ground.raw_state)
+                    self._read()
             learners.end_stride(section, s.state, nominal)
         self._enter(supervisor.decide(section, s, self.time, learners.state).name)
         learners.begin_stride(supervisor, self.mode.trimmed)

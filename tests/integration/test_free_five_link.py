@@ -151,7 +151,7 @@ ABDUCTION = '<axis xyz="1 0 0"/><limit lower="-0.43" upper="0.43" effort="200" v
     ("old", "new", "told"),
     [
         ('effort="200" velocity="23"', 'effort="200" velocity="0"', "'left_abduction' has velo"),
-        ('effort="300"', 'effort="nan"', "limit has effort 'nan'"),
+        ('effort="350"', 'effort="nan"', "limit has effort 'nan'"),
         (ABDUCTION, ABDUCTION.replace("1 0 0", "0 0 0"), "axis is 0 0 0"),
         ('<link name="left_foot">', '<link name="toe">', "no child link 'left_foot'"),
         ('joint name="right_hip"', 'joint name="left_hip"', "two joints 'left_hip'"),
@@ -199,9 +199,9 @@ MISTAKES = {
     "is JointModel… and must be revolute with limits": edited(
         HIP, HIP.replace("revolute", "continuous")
     ),
-    "has effort … give its limit": edited('effort="300"', 'effort="0"'),
+    "has effort … give its limit": edited('effort="350"', 'effort="0"'),
     "has lower … and upper … give a range that it can turn in": edited(
-        'lower="0" upper="2.05"', 'lower="2.05" upper="0"'
+        'lower="0" upper="2.5"', 'lower="2.5" upper="0"'
     ),
     "ranges are given: give one for each joint of a leg": lambda _: limited(((-1.0, 1.0),)),
     "hang on the same leg: name one of each": lambda _: FloatingBaseBiped.from_urdf(
