@@ -212,9 +212,6 @@ class LateralMotion:
         self.planner.touch_down(lasted)
         self._stands(foot)
         self.planner.aim(SIDES[foot])
-        self.planner.touch_down(lasted)
-        self._stands(foot)
-        self.planner.aim(SIDES[foot])
 
     def lift(self, foot: int) -> None:
         """A foot begins its swing."""
