@@ -29,7 +29,6 @@ from template_control.embedding.planners.look_ahead import (
     Plan,
     PlanProblem,
     PlanTarget,
-    Workspace,
     look_ahead,
 )
 from template_control.embedding.planners.lqr import LqrPlanner
@@ -38,10 +37,10 @@ from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.maps.return_map import new_workspace
 from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route
@@ -119,7 +118,7 @@ class AheadPlanner(Planner):
         self.parameters = parameters
         self.table: GaitTable = gait_table(parameters)
         self._problem = plan_problem(parameters, self.table)
-        self._work = Workspace(new_scratch(), new_scratch(complex))
+        self._work = new_workspace()
         self._plan = Plan(
             np.empty((o.steps + 1, PADDED)), np.empty((o.steps, CONTROLS)), np.empty(WIDTH)
         )
@@ -231,7 +230,7 @@ def plan_ahead() -> None:
     known = plan_problem(SlipParameters(), GaitTable(np.ones(1), row))._replace(rounds=1)
     plan = Plan(np.empty((2, PADDED)), np.empty((1, CONTROLS)), np.empty(WIDTH))
     aim = PlanTarget(1.0, np.zeros(PADDED), ANY_ANGLE)
-    work = Workspace(new_scratch(), new_scratch(complex))
+    work = new_workspace()
     look_ahead(known, work, np.ones(PADDED), aim, plan)
 
 

@@ -34,11 +34,11 @@ from template_control.embedding.planners.lqr import ANGLE_RANGE, STIFFNESS_RANGE
 from template_control.embedding.planners.step_search import TOP_MARGIN
 from template_control.embedding.planners.stride_solver import bounded_step
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
     RESULTS,
     Derivatives,
+    MapWorkspace,
     one_stride,
     section_jacobian,
 )
@@ -101,18 +101,6 @@ class Plan(NamedTuple):
     states: Array
     controls: Array
     row: Array
-
-
-class Workspace(NamedTuple):
-    """Scratch of the maps.
-
-    Attributes:
-        real: of plans.
-        complex: of their derivatives.
-    """
-
-    real: Scratch
-    complex: Scratch
 
 
 STATES = 3
@@ -196,7 +184,7 @@ def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Arr
 
 
 @compiled
-def slopes(p: PlanProblem, work: Workspace, plan: Plan, factor: Array, rows: Array) -> None:
+def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: Array) -> None:
     """Derivatives of :func:`residuals` by all controls.
 
     Args:
@@ -220,12 +208,10 @@ def slopes(p: PlanProblem, work: Workspace, plan: Plan, factor: Array, rows: Arr
         if i == 0:
             # The present state is what it is.
             found = Derivatives(result, by_control)
-            section_jacobian(
-                p.kernel, None, plan.states[i], u, p.columns[STATES:], work.complex, found
-            )
+            section_jacobian(p.kernel, None, plan.states[i], u, p.columns[STATES:], work, found)
         else:
             found = Derivatives(result, by_both)
-            section_jacobian(p.kernel, None, plan.states[i], u, p.columns, work.complex, found)
+            section_jacobian(p.kernel, None, plan.states[i], u, p.columns, work, found)
         skip = 0 if i == 0 else STATES
         for a in range(STATES):
             for c in range(CONTROLS * i):
@@ -255,11 +241,11 @@ def slopes(p: PlanProblem, work: Workspace, plan: Plan, factor: Array, rows: Arr
 
 
 @compiled
-def _step(p: PlanProblem, work: Workspace, aim: PlanTarget, plan: Plan, i: int) -> bool:
+def _step(p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan, i: int) -> bool:
     """Write the state after step ``i``; False where the template does not complete it."""
     u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
     slots_of(plan, i, u)
-    if one_stride(p.kernel, None, plan.states[i], u, work.real, result) != 0:
+    if one_stride(p.kernel, None, plan.states[i], u, work.scratch, result) != 0:
         return False
     for j in range(STATES):
         plan.states[i + 1, j] = result[j] + aim.offset[j]
@@ -267,7 +253,7 @@ def _step(p: PlanProblem, work: Workspace, aim: PlanTarget, plan: Plan, i: int) 
 
 
 @compiled
-def _roll(p: PlanProblem, work: Workspace, aim: PlanTarget, plan: Plan) -> bool:
+def _roll(p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan) -> bool:
     """Write the plan's states; False where the template does not complete a step."""
     done = True
     for i in range(plan.controls.shape[0]):
@@ -295,7 +281,7 @@ def _bounds(
 
 @compiled
 def _guess(
-    p: PlanProblem, work: Workspace, aim: PlanTarget, plan: Plan, target: Array, feedback: float
+    p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan, target: Array, feedback: float
 ) -> bool:
     """A plan to begin with: ``feedback`` of the LQR's on top of the aimed gait's controls.
 
@@ -319,7 +305,7 @@ def _guess(
 
 
 @compiled
-def look_ahead(p: PlanProblem, work: Workspace, z: Array, aim: PlanTarget, plan: Plan) -> float:
+def look_ahead(p: PlanProblem, work: MapWorkspace, z: Array, aim: PlanTarget, plan: Plan) -> float:
     """Plan N steps from a VLO.
 
     Args:

@@ -13,9 +13,17 @@ from numpy.typing import NDArray
 
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot, StrideKind
-from template_control.slip.dynamics.kernel import Scratch, new_scratch
+from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel, Model, model_of, stride_kernel
-from template_control.slip.maps.return_map import RESULTS, closed_form, one_stride
+from template_control.slip.maps.return_map import (
+    RESULTS,
+    Derivatives,
+    MapWorkspace,
+    closed_form,
+    new_workspace,
+    one_stride,
+    section_jacobian,
+)
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -23,7 +31,6 @@ IntArray = NDArray[np.int64]
 
 _K_SC = int(Slot.K_SC)
 _K_SD = int(Slot.K_SD)
-_STEP = 1e-20  # of a complex step
 _SECTION = int(Outcome.SECTION)
 
 
@@ -108,15 +115,64 @@ def modified_step(
     controls[_K_SD] = controls[_K_SC]
     outcome = one_stride(kernel, kind, z, controls, scratch, result)
     rear, front = result[4], result[5]
-    if not np.isfinite(rear.real):
+    if not np.isfinite(rear):
         return outcome
     wanted = energy_stiffness(z, aim.target, front, rear, controls[_K_SC], model_of(kernel))
-    if wanted.real < stiffness_range[0]:
-        wanted = stiffness_range[0] + 0.0 * wanted
-    elif wanted.real > stiffness_range[1]:
-        wanted = stiffness_range[1] + 0.0 * wanted
-    controls[_K_SD] = wanted
+    controls[_K_SD] = min(max(wanted, stiffness_range[0]), stiffness_range[1])
     return one_stride(kernel, kind, z, controls, scratch, result)
+
+
+@compiled
+def modified_jacobian(
+    kernel: Kernel,
+    kind: int | None,
+    z: Array,
+    aim: Aim,
+    controls: Array,
+    columns: IntArray,
+    work: MapWorkspace,
+    found: Derivatives,
+) -> int:
+    """:func:`modified_step` with its derivatives by touchdown angle and kappa_1.
+
+    With kappa_2 of (38), whose own derivative comes from the legs' lengths at the bottom,
+
+        dkappa_2 = ((kappa_1 - kappa_2) dmu_3 + (mu_3 - mu_2) dkappa_1) / (mu_3 - mu_1).
+
+    Args:
+        columns: (c,) what to differentiate by: 3 + slot.
+        work: overwritten.
+        found: overwritten.
+        The rest as in :func:`modified_step`.
+    """
+    outcome = modified_step(kernel, kind, z, aim, controls, work.scratch, found.result)
+    kappa_1, kappa_2 = controls[_K_SC], controls[_K_SD]
+    size = columns.shape[0]
+    slopes = np.zeros(size)
+    low, high = aim.stiffness_range
+    if outcome == _SECTION and low < kappa_2 < high:
+        section_jacobian(kernel, kind, z, controls, columns, work, found)
+        rest_length, result = model_of(kernel).rest_length, found.result
+        mu_1 = (rest_length - aim.target[1]) ** 2
+        mu_2 = (rest_length - z[1]) ** 2
+        mu_3 = (rest_length - result[5]) ** 2 + (rest_length - result[4]) ** 2
+        for c in range(size):
+            for leg in range(4, 6):
+                shorter = -2.0 * (rest_length - result[leg]) * found.jacobian[leg, c]
+                slopes[c] += (kappa_1 - kappa_2) * shorter
+            if columns[c] == 3 + _K_SC:
+                slopes[c] += mu_3 - mu_2
+            slopes[c] /= mu_3 - mu_1
+    every = np.empty(size + 1, columns.dtype)
+    every[:size], every[size] = columns, 3 + _K_SD
+    both = Derivatives(found.result, np.empty((RESULTS, size + 1)))
+    outcome = section_jacobian(kernel, kind, z, controls, every, work, both)
+    for c in range(size):
+        for i in range(RESULTS):
+            found.jacobian[i, c] = both.jacobian[i, c] + both.jacobian[i, size] * slopes[c]
+            if outcome != _SECTION:
+                found.jacobian[i, c] = np.nan
+    return outcome
 
 
 @compiled
@@ -198,7 +254,7 @@ class ModifiedMap:
         self.target = np.zeros(3)
         self._range = np.array(stiffness_range)
         self._kernel = stride_kernel(parameters, StrideKind.WALK), closed_form(kind)
-        self._scratch, self._complex_scratch = new_scratch(), new_scratch(complex)
+        self._work = new_workspace()
 
     @property
     def _aim(self) -> Aim:
@@ -207,25 +263,22 @@ class ModifiedMap:
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
         """See :meth:`~.step_solver.Step.evaluate`."""
         result = np.empty(RESULTS)
-        outcome = modified_step(*self._kernel, z, self._aim, u, self._scratch, result)
+        outcome = modified_step(*self._kernel, z, self._aim, u, self._work.scratch, result)
         return result, Outcome(outcome)
 
     def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
         """See :meth:`~.step_solver.Step.evaluate_many`."""
-        found: tuple[Array, IntArray] = modified_many(*self._kernel, z, self._aim, u, self._scratch)
+        found: tuple[Array, IntArray] = modified_many(
+            *self._kernel, z, self._aim, u, self._work.scratch
+        )
         return found
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
         """See :meth:`~.step_solver.Step.derivatives`; kappa_2 varies along with u."""
-        jacobian = np.empty((RESULTS, len(columns)))
-        result, outcome = self.evaluate(z, u)
-        if outcome is not Outcome.SECTION:
-            return result, np.full_like(jacobian, np.nan), outcome
-        zc = np.array(z, dtype=complex)
-        for c, column in enumerate(columns):
-            uc = u.astype(complex)
-            uc[column - 3] += 1j * _STEP
-            step = np.empty(RESULTS, dtype=complex)
-            modified_step(*self._kernel, zc, self._aim, uc, self._complex_scratch, step)
-            jacobian[:, c] = step.imag / _STEP
-        return result, jacobian, outcome
+        controls = np.array(u)
+        found = Derivatives(np.empty(RESULTS), np.empty((RESULTS, len(columns))))
+        outcome = modified_jacobian(
+            *self._kernel, np.array(z), self._aim, controls, columns, self._work, found
+        )
+        u[_K_SD] = controls[_K_SD]
+        return *found, Outcome(outcome)

@@ -34,12 +34,9 @@ _NEWTON = 6
 def polar(x: float, y: float) -> tuple[float, float]:
     """Radius [m] and angle from forward horizontal [rad] of a point above the ground.
 
-    ``x`` and the positive ``y`` are its place from the pivot [m]; a complex step goes through both.
+    ``x`` and the positive ``y`` are its place from the pivot [m].
     """
-    angle = np.arctan2(y.real, x.real)
-    # The first-order term carries a complex step; it is zero for real numbers.
-    angle = angle + (y * x.real - x * y.real) / (x.real**2 + y.real**2)
-    return np.sqrt(x * x + y * y), angle
+    return np.sqrt(x * x + y * y), np.arctan2(y, x)
 
 
 @inner
@@ -141,7 +138,7 @@ def _spring(
     x: float, y: float, pivot: float, toes: Array, stiffness: Array, rest_length: float
 ) -> tuple[float, float]:
     """Of the loaded legs at (x, y): radial force times r, and torque about the pivot [N m]."""
-    fx = fy = 0.0 * x
+    fx = fy = 0.0
     for leg in range(2):
         if stiffness[leg] == 0.0:
             continue
@@ -183,7 +180,7 @@ def corrected(
     along = backward(model, stiffness)
     w2 = a[5] * a[5]
     # Radial defects and torques at 0, t/2 and t.
-    pull_0 = pull_1 = pull_2 = torque_0 = torque_1 = torque_2 = 0.0 * a[0]
+    pull_0 = pull_1 = pull_2 = torque_0 = torque_1 = torque_2 = 0.0
     angle = a[4] + a[7] * a[2]
     radius = a[1] + a[3]
     speed = a[5] * a[2]
@@ -252,14 +249,14 @@ _NODE_TIME = 1e-10  # [s], of the first path's event where it only places the co
 @inner
 def _follow(path: Path, edge: int, t: float, watch: Watch) -> float:
     """Time of the same event on a corrected path, from its time on the first; -1 if none."""
-    event, guess = watch.events[edge], t.real
+    event, guess = watch.events[edge], t
     t = root(STANCE, path, event, guess, (0.5 * guess, 1.5 * guess), _EVENT_TIME, watch)
-    if t.real >= 0.0:
+    if t >= 0.0:
         return t
     watch.values[0, event], watch.armed[0] = 0.0, False
     alone = Watch(watch.events[edge : edge + 1], *watch[1:])
     fired, t = first_event(STANCE, path, 3.0 * guess, 0.1 * guess, _EVENT_TIME, alone)
-    return t if fired >= 0 else 0.0 * t - 1.0
+    return t if fired >= 0 else -1.0
 
 
 @inner
@@ -298,14 +295,14 @@ def _stance(
     mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
     pull = (gravity, backward(model, stiffness))
     toes, out = watch.toes, watch.out
-    torsion = 0.0 * state[0]
+    torsion = 0.0
     if stiffness[0] == 0.0 or stiffness[1] == 0.0:
         leg = 0 if stiffness[1] == 0.0 else 1
-        pivot, k, length = toes[leg], stiffness[leg], rest_length + 0.0 * state[0]
+        pivot, k, length = toes[leg], stiffness[leg], rest_length
     else:
         pivot = 0.5 * (toes[0] + toes[1])
         mean = 0.5 * (stiffness[0] + stiffness[1])
-        if stiffness[0].real != stiffness[1].real:
+        if stiffness[0] != stiffness[1]:
             # The AT-SLIP stands for two equal legs; for others only the correction is right.
             map_kind = _IMPROVED
         k, length, torsion = axial_torsional(toes[1] - toes[0], mean, mass, gravity, rest_length)
@@ -317,11 +314,11 @@ def _stance(
     start = Launch(pivot, r, theta, radial)
     harmonic(a, start, momentum, w2, length, gravity)
     path = Path(a, a)
-    horizon, accuracy = model.max_time + 0.0 * r, _EVENT_TIME
+    horizon, accuracy = model.max_time, _EVENT_TIME
     if map_kind == _IMPROVED:
         horizon, accuracy = _PIECE / a[5], _NODE_TIME
     substep = _SUBSTEP * np.sqrt(rest_length / gravity)
-    edge, t = first_event(STANCE, path, horizon.real, substep, accuracy, watch)
+    edge, t = first_event(STANCE, path, horizon, substep, accuracy, watch)
     if map_kind != _IMPROVED and edge < 0:
         return _NO_EVENT
     if edge >= 0 and t == 0.0:
@@ -338,7 +335,7 @@ def _stance(
         end = momentum
     if map_kind != _GEYER and edge >= 0:
         t = _follow(path, edge, t, watch)
-        if t.real < 0.0:
+        if t < 0.0:
             return _NO_EVENT
     before = 0.5 * (state[2] ** 2 + state[3] ** 2) + _potential(state, toes, stiffness, model)
     _end_velocity(a, end, t, state, out)
@@ -346,7 +343,7 @@ def _stance(
         # Energy is conserved within a phase, so the end speed is known.
         squared = 2.0 * (before - _potential(state, toes, stiffness, model))
         ratio = squared / (state[2] ** 2 + state[3] ** 2)
-        if ratio.real > 0.0:
+        if ratio > 0.0:
             scale = np.sqrt(ratio)
             state[2] *= scale
             state[3] *= scale
@@ -388,7 +385,7 @@ def closed_form_stride(
                 a[i] = state[i]
             a[4], a[5] = model.gravity, model.along
             pull = model.gravity + abs(model.along)
-            speed = abs(state[2].real) + abs(state[3].real) + pull * model.max_time
+            speed = abs(state[2]) + abs(state[3]) + pull * model.max_time
             all_bends(state, toes, rest_length, (speed, pull, 0.0), model.max_time, bends)
             path = Path(a, a)
             substep = _SUBSTEP * np.sqrt(rest_length / model.gravity)
@@ -399,7 +396,7 @@ def closed_form_stride(
         else:
             bends[:] = 0.0  # such a path's guards are looked at where substeps end
             edge = _stance(map_kind, model, state, stiffness, a, watch)
-        if edge == _NO_EVENT or not np.isfinite(state[0].real + state[2].real):
+        if edge == _NO_EVENT or not np.isfinite(state[0] + state[2]):
             return _TIMEOUT
         if edge == _GOES_ON:
             event = -1

@@ -1,7 +1,5 @@
 """Guards along paths of the CoM, as compiled functions, and their rates of change.
 
-Real or complex arithmetic alike: derivatives of strides come from complex steps.
-
 Three kinds of path: ``SERIES`` (the exact kernel's Taylor polynomials), ``STANCE`` (the closed form
 (11) about a pivot) and ``FLIGHT`` (10). Compiled code gives the kind as one of these
 constants, an argument of its own, and Numba compiles that kind alone.
@@ -41,7 +39,7 @@ class Path(NamedTuple):
 
 def _series(kind: int, path: Path, t: float, out: Array) -> None:
     a, b = path
-    x = y = u = v = ax = ay = 0.0 * a[0]
+    x = y = u = v = ax = ay = 0.0
     for n in range(a.shape[0] - 1, -1, -1):
         ax = ax * t + u
         ay = ay * t + v
@@ -75,7 +73,7 @@ def _flight(kind: int, path: Path, t: float, out: Array) -> None:
     a = path.a
     out[0], out[1] = a[0] + (a[2] - 0.5 * a[5] * t) * t, a[1] + (a[3] - 0.5 * a[4] * t) * t
     out[2], out[3] = a[2] - a[5] * t, a[3] - a[4] * t
-    out[4], out[5] = -a[5] + 0.0 * t, -a[4] + 0.0 * t
+    out[4], out[5] = -a[5], -a[4]
 
 
 _BY_KIND = (_series, _stance, _flight)
@@ -150,14 +148,14 @@ def guard(
 def all_guards(
     state: Array, toes: Array, rest_length: float, touchdown_height: float, values: Array
 ) -> None:
-    """Write the real parts of all guards at once into ``values`` (NUM_EVENTS,), by Event.
+    """Write all guards at once into ``values`` (NUM_EVENTS,), by Event.
 
     There is no branch in it, which makes it faster than :func:`guard` for a few of them. The rest
     as for :func:`guard`.
     """
-    x, y, u, v = state[0].real, state[1].real, state[2].real, state[3].real
-    rear, front = x - toes[0].real, x - toes[1].real
-    values[_TOUCHDOWN] = touchdown_height.real - y
+    x, y, u, v = state[0], state[1], state[2], state[3]
+    rear, front = x - toes[0], x - toes[1]
+    values[_TOUCHDOWN] = touchdown_height - y
     values[_REAR_LIFTOFF] = np.sqrt(rear * rear + y * y) - rest_length
     values[_FRONT_LIFTOFF] = np.sqrt(front * front + y * y) - rest_length
     values[_APEX] = -v
@@ -193,8 +191,8 @@ def all_bends(
         bends: (NUM_EVENTS,) overwritten, by Event.
     """
     speed, acceleration, jerk = steepest
-    x, y = state[0].real, abs(state[1].real) + speed * step
-    rear, front = abs(x - toes[0].real), abs(x - toes[1].real)
+    x, y = state[0], abs(state[1]) + speed * step
+    rear, front = abs(x - toes[0]), abs(x - toes[1])
     turn = 3.0 * speed * acceleration
     bends[_TOUCHDOWN] = bends[_VLO] = bends[_PASSED_FRONT_FOOT] = bends[_FALL] = acceleration
     bends[_APEX] = bends[_BACKWARD] = jerk
@@ -228,3 +226,42 @@ def guard_rate(event: int, path: Array, toes: Array) -> float:
     if event == _REST:
         return -2.0 * (u * path[4] + v * path[5])
     return u
+
+
+@inner
+def guard_gradient(event: int, state: Array, toes: Array, gradient: Array) -> None:
+    """Derivatives of a guard by x, y, dx/dt, dy/dt, both toes' x and the touchdown height.
+
+    Args:
+        event: value of the Event.
+        state: (4 or more,) x, y, dx/dt, dy/dt [m, m/s].
+        toes: (2,) x of rear and front toe [m].
+        gradient: (7,) overwritten.
+    """
+    x, y, u, v = state[0], state[1], state[2], state[3]
+    for i in range(7):
+        gradient[i] = 0.0
+    if event == _TOUCHDOWN:
+        gradient[1], gradient[6] = -1.0, 1.0
+    elif event in (_REAR_LIFTOFF, _FRONT_LIFTOFF):
+        leg = 0 if event == _REAR_LIFTOFF else 1
+        d = x - toes[leg]
+        length = np.sqrt(d * d + y * y)
+        gradient[0], gradient[1], gradient[4 + leg] = d / length, y / length, -d / length
+    elif event == _APEX:
+        gradient[3] = -1.0
+    elif event in (_BOTTOM, _VIRTUAL_BOTTOM):
+        front = 0.5 if event == _VIRTUAL_BOTTOM else 0.0
+        gradient[0], gradient[1], gradient[3] = u, v, y
+        gradient[2] = x - (1.0 - front) * toes[0] - front * toes[1]
+        gradient[4], gradient[5] = -(1.0 - front) * u, -front * u
+    elif event == _VLO:
+        gradient[0], gradient[4] = 1.0, -1.0
+    elif event == _PASSED_FRONT_FOOT:
+        gradient[0], gradient[5] = 1.0, -1.0
+    elif event == _FALL:
+        gradient[1] = -1.0
+    elif event == _REST:
+        gradient[2], gradient[3] = -2.0 * u, -2.0 * v
+    else:
+        gradient[2] = -1.0

@@ -69,21 +69,21 @@ class Scratch(NamedTuple):
     armed: NDArray[np.bool_]
 
 
-def new_scratch(dtype: type[float] | type[complex] = float) -> Scratch:
-    """Fresh arrays for one thread; complex ones for complex steps."""
+def new_scratch() -> Scratch:
+    """Fresh arrays for one thread."""
     return Scratch(
-        cx=np.zeros((MAX_SEGMENTS, ORDER + 1), dtype),
-        cy=np.zeros((MAX_SEGMENTS, ORDER + 1), dtype),
+        cx=np.zeros((MAX_SEGMENTS, ORDER + 1)),
+        cy=np.zeros((MAX_SEGMENTS, ORDER + 1)),
         meta=np.zeros((MAX_SEGMENTS, 7)),
         events=np.zeros((MAX_EVENTS, 8)),
-        work=np.zeros((2, 4, ORDER + 1), dtype),
-        path=np.zeros(COEFFICIENTS, dtype),
-        out=np.zeros(6, dtype),
-        probe=np.zeros(6, dtype),
-        state=np.zeros(4, dtype),
-        toes=np.zeros(2, dtype),
-        bottom=np.zeros(2, dtype),
-        stiffness=np.zeros(2, dtype),
+        work=np.zeros((2, 4, ORDER + 1)),
+        path=np.zeros(COEFFICIENTS),
+        out=np.zeros(6),
+        probe=np.zeros(6),
+        state=np.zeros(4),
+        toes=np.zeros(2),
+        bottom=np.zeros(2),
+        stiffness=np.zeros(2),
         values=np.zeros((2, NUM_EVENTS)),
         bends=np.zeros(NUM_EVENTS),
         armed=np.zeros(MAX_EDGES, dtype=np.bool_),
@@ -139,8 +139,6 @@ def run_stride(
         record: keep every segment and event; otherwise only the last is kept.
         scratch: overwritten.
 
-    ``state``, ``toes``, ``controls`` and ``scratch`` are all real or all complex.
-
     Returns:
         Outcome, last node (the one entered, where the section was reached), number of segments,
         number of events, duration [s].
@@ -177,11 +175,11 @@ def run_stride(
             sample(SERIES, path, step, out)
         for i in range(4):
             state[i] = out[i]
-        meta[row, 0], meta[row, 1], meta[row, 2] = time, step.real, node
+        meta[row, 0], meta[row, 1], meta[row, 2] = time, step, node
         for leg in range(2):
-            meta[row, 3 + leg], meta[row, 5 + leg] = toes[leg].real, stiffness[leg].real
+            meta[row, 3 + leg], meta[row, 5 + leg] = toes[leg], stiffness[leg]
         segments += 1
-        time += step.real
+        time += step
         if fired < 0:
             continue
 
@@ -191,7 +189,7 @@ def run_stride(
         events[row, 0], events[row, 1] = time, event
         events[row, 2], events[row, 3] = node, target
         for i in range(4):
-            events[row, 4 + i] = state[i].real
+            events[row, 4 + i] = state[i]
         event_count += 1
         note_bottom(event, state, toes, scratch.bottom)
         apply_reset(tables.reset[fired], state, toes, rest_length, alpha)
@@ -215,7 +213,7 @@ def record_stride(
     controls: Array,
     scratch: tuple[Any, ...],
 ) -> tuple[int, int, int, int, float]:
-    """:func:`run_stride` for Python, with every segment and event; all arguments are real.
+    """:func:`run_stride` for Python, with every segment and event.
 
     ``kernel`` is from :func:`plain`, and the arrays of :class:`Scratch` are in a plain tuple too: a
     compiled function is called with named tuples in twice the time.

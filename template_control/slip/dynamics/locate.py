@@ -52,7 +52,7 @@ class Watch(NamedTuple):
         armed: (MAX_EDGES,) which may fire; from :func:`arm`.
         bends: (NUM_EVENTS,) bounds of the guards' second derivatives, from
             :func:`~.guards.all_bends`. With zeros guards are only looked at where substeps end.
-        out, probe: (6,) samples of the path, overwritten; complex for complex steps.
+        out, probe: (6,) samples of the path, overwritten.
     """
 
     events: IntArray
@@ -104,34 +104,31 @@ def root(
 ) -> float:
     """Time within ``bracket`` at which the guard rises through 0, -1 if it does not.
 
-    Newton's method, then the inverse cubic through the last two points, kept bracketed. In complex
-    arithmetic the imaginary part carries the event time's derivative, which two more steps make
-    exact. The search begins at ``start``; times and ``tolerance`` are in [s]; ``watch.out`` is
+    Newton's method, then the inverse cubic through the last two points, kept bracketed.
+    The search begins at ``start``; times and ``tolerance`` are in [s]; ``watch.out`` is
     overwritten.
     """
     toes, rest_length, out = watch.toes, watch.rest_length, watch.out
     lo, hi = bracket
-    out[0] = 0.0
-    t = start + out[0]  # of the path's type
+    t = start
     t_last = g_last = rate_last = t
     step_last = np.inf
-    polish = 2 if np.iscomplexobj(out) else 0
     for _ in range(_ITERATIONS):
         sample(kind, path, t, out)
         g = guard(event, out, toes, rest_length, watch.touchdown_height)
         rate = guard_rate(event, out, toes)
-        if g.real >= 0.0:
-            hi = min(hi, t.real)
+        if g >= 0.0:
+            hi = min(hi, t)
         else:
-            lo = max(lo, t.real)
+            lo = max(lo, t)
         following = t - g / rate
         grazes = False
         if _CLOSE < step_last < np.inf:
-            slowest = min(rate.real, rate_last.real)
-            grazes = abs(rate.real - rate_last.real) > _GRAZING * slowest * step_last
+            slowest = min(rate, rate_last)
+            grazes = abs(rate - rate_last) > _GRAZING * slowest * step_last
             if not grazes:
                 following = _inverse_hermite(t_last, g_last, rate_last, t, g, rate)
-        if rate.real > 0.0 and lo <= following.real <= hi:
+        if rate > 0.0 and lo <= following <= hi:
             step = abs(following - t)
             done = step <= _CLOSE or (
                 not grazes and _CURVATURE * (step * step_last) ** 2 <= tolerance
@@ -139,16 +136,13 @@ def root(
             t_last, g_last, rate_last, step_last = t, g, rate, step
             t = following
             if done:
-                if polish == 0:
-                    return t
-                polish -= 1
-                step_last = 0.0
+                return t
         else:
             if hi - lo <= _BRACKET_DONE:
-                return t if abs(g) <= _ZERO * rest_length else 0.0 * t - 1.0
-            t = 0.5 * (lo + hi) + 0.0 * t
+                return t if abs(g) <= _ZERO * rest_length else -1.0
+            t = 0.5 * (lo + hi)
             step_last = np.inf
-    return 0.0 * t - 1.0
+    return -1.0
 
 
 @inner
@@ -190,12 +184,11 @@ def _first_rise(
     (t_lo, t_end), armed = span, watch.armed[edge]
     g_lo, g_end = watch.values[0, event], watch.values[1, event]
     bend = watch.bends[event]
-    probe[0] = 0.0
-    begin, found = t_lo + probe[0], np.inf + probe[0]  # of the path's type
+    begin, found = t_lo, np.inf
     if armed and g_lo >= 0.0:
         # The phase begins at zero, or in a forbidden region.
         sample(kind, path, t_lo, probe)
-        rate = guard_rate(event, probe, toes).real
+        rate = guard_rate(event, probe, toes)
         falls = rate < 0.0 and rate * rate > 2.0 * _ROUNDING * bend
         if g_lo > _ARMING or not (falls or (rate <= 0.0 and g_end < 0.0)):
             return begin
@@ -205,10 +198,10 @@ def _first_rise(
     for _ in range(_LOOKS):
         if t_lo >= t_end:
             break
-        if armed and g_hi >= 0.0 and t_hi != found.real:
+        if armed and g_hi >= 0.0 and t_hi != found:
             start = t_lo - g_lo * (t_hi - t_lo) / (g_hi - g_lo)
             found = root(kind, path, event, start, (t_lo, t_hi), tolerance, watch)
-            t_hi = t_end = found.real
+            t_hi = t_end = found
             g_hi = g_end = 0.0
             continue
         width = t_hi - t_lo
@@ -227,7 +220,7 @@ def _first_rise(
             g_hi = g_end
         else:
             sample(kind, path, t_hi, probe)
-            g_hi = guard(event, probe, toes, rest_length, height).real
+            g_hi = guard(event, probe, toes, rest_length, height)
     watch.armed[edge] = armed
     return found
 
@@ -243,8 +236,7 @@ def first_event(
     ``watch`` has to be prepared by :func:`arm` at the phase's start; it is updated.
     """
     events, values, bends, out = watch.events, watch.values, watch.bends, watch.out
-    out[0] = 0.0
-    fired, fired_at = -1, horizon + out[0]
+    fired, fired_at = -1, horizon
     t_lo = 0.0
     # The bounds of a series' guards often clear all of it, or a half, at once.
     reach = horizon if kind == SERIES else substep
@@ -265,7 +257,7 @@ def first_event(
             for i in range(events.shape[0]):
                 if _comes_near(values, events[i], half * bends[events[i]]):
                     t = _first_rise(kind, path, i, (t_lo, t_hi), tolerance, watch)
-                    if t.real < np.inf and (fired < 0 or t.real < fired_at.real):
+                    if t < np.inf and (fired < 0 or t < fired_at):
                         fired, fired_at = i, t
         for i in range(NUM_EVENTS):
             values[0, i] = values[1, i]

@@ -125,7 +125,7 @@ def expand(
     along = backward(model, stiffness)
     cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
     for n in range(ORDER - 1):
-        ax = ay = 0.0 * cx[0]
+        ax = ay = 0.0
         if n == 0:
             ax, ay = ax - along, ay - gravity
         for leg in range(2):
@@ -133,7 +133,7 @@ def expand(
                 continue
             d, s, q, w = work[leg, 0], work[leg, 1], work[leg, 2], work[leg, 3]
             d[n] = cx[n] - (toes[leg] if n == 0 else 0.0)
-            total = 0.0 * cx[0]
+            total = 0.0
             for j in range((n + 1) // 2):
                 total += d[j] * d[n - j] + cy[j] * cy[n - j]
             total *= 2.0
@@ -144,7 +144,7 @@ def expand(
                 q[0] = 1.0 / np.sqrt(total)
                 w[0] = stiffness[leg] / mass * (rest_length * q[0] - 1.0)
             else:
-                total = 0.0 * cx[0]
+                total = 0.0
                 for j in range(n):
                     total += (-0.5 * (n - j) - j) * s[n - j] * q[j]
                 q[n] = total / (n * s[0])
@@ -173,10 +173,10 @@ def steepest(cx: Array, cy: Array, step: float) -> tuple[float, float, float]:
     acceleration = jerk = 0.0
     squared = step * step
     for n in range(ORDER, 2, -2):  # by twos, for a shorter chain of products
-        even = n * (n - 1) * step * (abs(cx[n].real) + abs(cy[n].real))
-        odd = (n - 1) * (n - 2) * (abs(cx[n - 1].real) + abs(cy[n - 1].real))
+        even = n * (n - 1) * step * (abs(cx[n]) + abs(cy[n]))
+        odd = (n - 1) * (n - 2) * (abs(cx[n - 1]) + abs(cy[n - 1]))
         acceleration = acceleration * squared + (even + odd)
         jerk = jerk * squared + ((n - 2) * even + (n - 3) * odd)
-    acceleration = acceleration * step + 2.0 * (abs(cx[2].real) + abs(cy[2].real))
-    speed = abs(cx[1].real) + abs(cy[1].real) + acceleration * step
+    acceleration = acceleration * step + 2.0 * (abs(cx[2]) + abs(cy[2]))
+    speed = abs(cx[1]) + abs(cy[1]) + acceleration * step
     return speed, acceleration, jerk

@@ -30,7 +30,6 @@ from template_control.embedding.planners.look_ahead import (
     BOUNDS,
     Plan,
     PlanTarget,
-    Workspace,
     aimed,
     look_ahead,
     residuals,
@@ -41,9 +40,8 @@ from template_control.embedding.planners.step_search import TOP_MARGIN
 from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import Outcome
-from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
-from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.return_map import ReturnMap, new_workspace
 from template_control.slip.scenario.route import SpeedProfile, SpeedRoute
 
 P = tc.SlipParameters()
@@ -72,7 +70,7 @@ def plan_from(z, speed, steps=3, **changes):
     """A plan's cost, the plan, and what it was made with."""
     known = plan_problem(P, table())._replace(**changes)
     plan = Plan(np.empty((steps + 1, 3)), np.empty((steps, CONTROLS)), np.empty(WIDTH))
-    work = Workspace(new_scratch(), new_scratch(complex))
+    work = new_workspace()
     aim = PlanTarget(speed, np.zeros(3), ANY_ANGLE)
     return look_ahead(known, work, z, aim, plan), plan, (known, work, aim)
 

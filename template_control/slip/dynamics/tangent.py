@@ -1,0 +1,313 @@
+"""Tangents of a stride: its exact derivatives, carried along the Taylor series of its path.
+
+Within a phase the variational equation
+
+    d2(dp)/dt2 = G(t) (dp - dtoe) + F(t) dkappa / m
+
+has a solution by the path's own recurrences: G = kappa/m ((l0/r - 1) 1 - l0 d d'/r^3) and
+F = (l0/r - 1) d are series of a leg's vector d = p - toe. At an event the guard's differential
+gives the time's, dt = -dg / (dg/dt), and the state moves along its path by dt: together the
+saltation matrix. Resets move toes, and with them their tangents.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.compiled import inner
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Reset, Slot
+from template_control.slip.dynamics.guards import SERIES, Path, guard_gradient, sample
+from template_control.slip.dynamics.kernel import Scratch
+from template_control.slip.dynamics.model import ORDER, Kernel, Model, model_of
+
+Array = NDArray[np.float64]
+
+# Numba freezes module-level integers into the compiled code.
+_PLACE_REAR = int(Reset.PLACE_REAR)
+_PLACE_FRONT = int(Reset.PLACE_FRONT)
+_SHIFT = int(Reset.SHIFT)
+_SWAP = int(Reset.SWAP)
+_BOTTOM = int(Event.BOTTOM)
+_VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
+_ALPHA = 3 + int(Slot.TOUCHDOWN_ANGLE)
+
+COLUMNS = 3 + NUM_SLOTS
+"""What a stride is differentiated by: dx/dt, y, dy/dt at its start, then the controls by Slot."""
+
+_INPUTS = 8  # of a phase: x, y, dx/dt, dy/dt, rear and front toe, rear and front stiffness
+_TOE, _KAPPA = 4, 6
+
+
+class Tangents(NamedTuple):
+    """Arrays that tangents are written to; one set a thread, reused from call to call.
+
+    Attributes:
+        state: (4, COLUMNS) derivatives of x, y, dx/dt, dy/dt.
+        toes: (2, COLUMNS) of the x of rear and front toe.
+        bottom: (2, COLUMNS) of the lengths of rear and front leg at the (virtual) bottom.
+        flow: (4, _INPUTS) of a phase's final state by what it begins with.
+        leg: (6, ORDER - 1) series of a leg: r^2, r^-3, 1/r, d_x/r^3, d_x^2/r^3, d_x d_y/r^3.
+        force: (2, 3, ORDER - 1) series of G of each leg: xx, xy, yy.
+        pull: (2, 2, ORDER - 1) series of F / m of each leg: x, y.
+        series: (2, ORDER + 1, _INPUTS) of dx and dy by input.
+        guard: (7,) gradient of a guard, see :func:`~.guards.guard_gradient`.
+        carried: (4,) a column of ``state`` in the making.
+    """
+
+    state: Array
+    toes: Array
+    bottom: Array
+    flow: Array
+    leg: Array
+    force: Array
+    pull: Array
+    series: Array
+    guard: Array
+    carried: Array
+
+
+def new_tangents() -> Tangents:
+    """Fresh arrays for one thread."""
+    return Tangents(
+        state=np.zeros((4, COLUMNS)),
+        toes=np.zeros((2, COLUMNS)),
+        bottom=np.zeros((2, COLUMNS)),
+        flow=np.zeros((4, _INPUTS)),
+        leg=np.zeros((6, ORDER - 1)),
+        force=np.zeros((2, 3, ORDER - 1)),
+        pull=np.zeros((2, 2, ORDER - 1)),
+        series=np.zeros((2, ORDER + 1, _INPUTS)),
+        guard=np.zeros(7),
+        carried=np.zeros(4),
+    )
+
+
+@inner
+def _product(a: Array, b: Array, n: int) -> float:
+    """Coefficient ``n`` of the product of two series."""
+    total = 0.0
+    for j in range(n + 1):
+        total += a[j] * b[n - j]
+    return total
+
+
+@inner
+def _leg_series(
+    leg: int,
+    toe: float,
+    stiffness: float,
+    model: Model,
+    cx: Array,
+    cy: Array,
+    tangents: Tangents,
+) -> None:
+    """Write a leg's G and F / m as series along a path ``cx``, ``cy``."""
+    squared, cube, inverse, tilt, xx, xy = tangents.leg
+    force, pull = tangents.force[leg], tangents.pull[leg]
+    rest_length, share = model.rest_length, stiffness / model.mass
+    start = cx[0]
+    cx[0] = start - toe  # the series of d_x, until the end of this function
+    for n in range(ORDER - 1):
+        squared[n] = _product(cx, cx, n) + _product(cy, cy, n)
+        if n == 0:
+            cube[0] = squared[0] ** -1.5
+        else:
+            total = 0.0
+            for j in range(n):
+                total += (-1.5 * (n - j) - j) * squared[n - j] * cube[j]
+            cube[n] = total / (n * squared[0])
+        inverse[n] = _product(cube, squared, n)
+        tilt[n] = _product(cube, cx, n)
+        xx[n] = _product(tilt, cx, n)
+        xy[n] = _product(tilt, cy, n)
+        stretch = rest_length * inverse[n] - (1.0 if n == 0 else 0.0)
+        force[0, n] = share * (stretch - rest_length * xx[n])
+        force[1, n] = -share * rest_length * xy[n]
+        force[2, n] = share * (stretch - rest_length * (inverse[n] - xx[n]))
+    for n in range(ORDER - 1):
+        pull[0, n] = (rest_length * _product(inverse, cx, n) - cx[n]) / model.mass
+        pull[1, n] = (rest_length * _product(inverse, cy, n) - cy[n]) / model.mass
+    cx[0] = start
+
+
+@inner
+def _flight(step: float, flow: Array) -> None:
+    """Write the derivatives of a flight's end by its beginning."""
+    flow[:] = 0.0
+    for i in range(4):
+        flow[i, i] = 1.0
+    flow[0, 2] = flow[1, 3] = step
+
+
+@inner
+def _stance(rear: bool, front: bool, step: float, tangents: Tangents) -> None:
+    """Write the derivatives of a phase's end by its beginning into ``tangents.flow``.
+
+    Args:
+        rear, front: which legs are on the ground; :func:`_leg_series` has written their series.
+        step: duration of the phase [s].
+        tangents: overwritten.
+    """
+    force, pull, flow = tangents.force, tangents.pull, tangents.flow
+    dx, dy = tangents.series
+    dx[:] = 0.0
+    dy[:] = 0.0
+    dx[0, 0] = dy[0, 1] = dx[1, 2] = dy[1, 3] = 1.0
+    for n in range(ORDER - 1):
+        scale = 1.0 / ((n + 1) * (n + 2))
+        for j in range(n + 1):
+            xx = xy = yy = 0.0
+            if rear:
+                xx, xy, yy = force[0, 0, j], force[0, 1, j], force[0, 2, j]
+            if front:
+                xx, xy, yy = xx + force[1, 0, j], xy + force[1, 1, j], yy + force[1, 2, j]
+            xx, xy, yy = scale * xx, scale * xy, scale * yy
+            for c in range(_INPUTS):
+                dx[n + 2, c] += xx * dx[n - j, c] + xy * dy[n - j, c]
+                dy[n + 2, c] += xy * dx[n - j, c] + yy * dy[n - j, c]
+        if rear:
+            dx[n + 2, _KAPPA] += scale * pull[0, 0, n]
+            dy[n + 2, _KAPPA] += scale * pull[0, 1, n]
+        if front:
+            dx[n + 2, _TOE + 1] -= scale * force[1, 0, n]
+            dy[n + 2, _TOE + 1] -= scale * force[1, 1, n]
+            dx[n + 2, _KAPPA + 1] += scale * pull[1, 0, n]
+            dy[n + 2, _KAPPA + 1] += scale * pull[1, 1, n]
+    flow[:] = 0.0
+    for n in range(ORDER, -1, -1):
+        for c in range(_INPUTS):
+            flow[2, c] = flow[2, c] * step + flow[0, c]
+            flow[3, c] = flow[3, c] * step + flow[1, c]
+            flow[0, c] = flow[0, c] * step + dx[n, c]
+            flow[1, c] = flow[1, c] * step + dy[n, c]
+    # The ground looks the same everywhere: CoM and toes moved alike move the path alike.
+    for i in range(4):
+        moved = (1.0 if i == 0 else 0.0) - flow[i, 0]
+        if rear:
+            flow[i, _TOE] = moved - flow[i, _TOE + 1]
+        else:
+            flow[i, _TOE + 1] = moved
+
+
+@inner
+def _carry(rear: int, front: int, tangents: Tangents) -> None:
+    """Apply a phase's flow to the tangents; ``rear`` and ``front`` are the legs' slots or -1."""
+    state, toes, flow, carried = tangents.state, tangents.toes, tangents.flow, tangents.carried
+    for c in range(COLUMNS):
+        for i in range(4):
+            total = flow[i, _TOE] * toes[0, c] + flow[i, _TOE + 1] * toes[1, c]
+            for j in range(4):
+                total += flow[i, j] * state[j, c]
+            if c == 3 + rear:
+                total += flow[i, _KAPPA]
+            if c == 3 + front:
+                total += flow[i, _KAPPA + 1]
+            carried[i] = total
+        for i in range(4):
+            state[i, c] = carried[i]
+
+
+@inner
+def _fire(
+    event: int, at: Array, alpha: float, toes: Array, rest_length: float, tangents: Tangents
+) -> None:
+    """Move the tangents' state from the event's time to where the guard is zero.
+
+    Args:
+        event: value of the Event.
+        at: (6,) x, y and their first and second derivatives at the event.
+        alpha: touchdown angle [rad].
+        toes: (2,) x of rear and front toe [m].
+        rest_length: l0 [m].
+        tangents: ``state`` and, at a bottom, ``bottom`` are overwritten.
+    """
+    g, state, moved = tangents.guard, tangents.state, tangents.toes
+    guard_gradient(event, at, toes, g)
+    rate = g[0] * at[2] + g[1] * at[3] + g[2] * at[4] + g[3] * at[5]
+    for c in range(COLUMNS):
+        change = g[4] * moved[0, c] + g[5] * moved[1, c]
+        for i in range(4):
+            change += g[i] * state[i, c]
+        if c == _ALPHA:
+            change += g[6] * rest_length * np.cos(alpha)
+        time = -change / rate
+        for i in range(4):
+            state[i, c] += at[2 + i] * time
+    if event in (_BOTTOM, _VIRTUAL_BOTTOM):
+        for leg in range(2):
+            d, y = at[0] - toes[leg], at[1]
+            length = np.sqrt(d * d + y * y)
+            for c in range(COLUMNS):
+                along = d * (state[0, c] - moved[leg, c]) + y * state[1, c]
+                tangents.bottom[leg, c] = along / length
+
+
+@inner
+def _reset(reset: int, alpha: float, rest_length: float, tangents: Tangents) -> None:
+    """Move the toes' tangents as :func:`~.kernel.apply_reset` moves the toes."""
+    state, toes = tangents.state, tangents.toes
+    for c in range(COLUMNS):
+        placed = state[0, c] - (rest_length * np.sin(alpha) if c == _ALPHA else 0.0)
+        if reset == _PLACE_REAR:
+            toes[0, c] = placed
+        elif reset == _PLACE_FRONT:
+            toes[1, c] = placed
+        elif reset in (_SHIFT, _SWAP):
+            rear = toes[0, c]
+            toes[0, c] = toes[1, c]
+            if reset == _SWAP:
+                toes[1, c] = rear
+
+
+@inner
+def stride_tangents(
+    kernel: Kernel,
+    controls: Array,
+    segments: int,
+    events: int,
+    scratch: Scratch,
+    tangents: Tangents,
+) -> None:
+    """Derivatives of a stride that :func:`~.kernel.run_stride` has recorded.
+
+    Args:
+        kernel: that the stride ran with.
+        controls: (NUM_SLOTS,) u of the stride.
+        segments, events: numbers of recorded ones.
+        scratch: with the stride's path and events.
+        tangents: ``state``, ``toes`` and ``bottom`` are overwritten with the derivatives at the
+            stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the controls.
+    """
+    tables, model = kernel.tables, model_of(kernel)
+    alpha, rest_length = controls[0], model.rest_length
+    tangents.state[:] = 0.0
+    tangents.toes[:] = 0.0
+    tangents.bottom[:] = np.nan
+    tangents.state[2, 0] = tangents.state[1, 1] = tangents.state[3, 2] = 1.0
+    fired = 0
+    for i in range(segments):
+        cx, cy, meta = scratch.cx[i], scratch.cy[i], scratch.meta[i]
+        step, node = meta[1], int(meta[2])
+        rear, front = tables.rear[node], tables.front[node]
+        if rear >= 0:
+            _leg_series(0, meta[3], meta[5], model, cx, cy, tangents)
+        if front >= 0:
+            _leg_series(1, meta[4], meta[6], model, cx, cy, tangents)
+        if rear >= 0 or front >= 0:
+            _stance(rear >= 0, front >= 0, step, tangents)
+        else:
+            _flight(step, tangents.flow)
+        _carry(rear, front, tangents)
+        at = scratch.events[fired]
+        if fired == events or at[0] != meta[0] + step or at[2] != node:
+            continue  # the series ends here, and the phase goes on
+        event = int(at[1])
+        sample(SERIES, Path(cx, cy), step, scratch.out)
+        _fire(event, scratch.out, alpha, meta[3:5], rest_length, tangents)
+        for edge in range(tables.first_edge[node], tables.first_edge[node + 1]):
+            if tables.event[edge] == event:
+                _reset(tables.reset[edge], alpha, rest_length, tangents)
+        fired += 1
