@@ -59,6 +59,57 @@ def test_derivatives_agree_with_central_differences(stride, kind):
             )
 
 
+def extrapolated(at, x, h):
+    """Derivative by central differences of three widths, extrapolated to none (order h^6)."""
+    wide, middle, narrow = ((at(x + w) - at(x - w)) / (2.0 * w) for w in (h, h / 2.0, h / 4.0))
+    first, second = (4.0 * middle - wide) / 3.0, (4.0 * narrow - middle) / 3.0
+    return (16.0 * second - first) / 15.0
+
+
+@pytest.mark.parametrize("stride", STRIDES)
+def test_tangents_are_what_differences_tend_to(stride):
+    """Of all that the exact map yields: state, distance covered, legs at the bottom."""
+    z, u = (np.array(v) for v in STRIDES[stride])
+    step, n = ReturnMap(P, stride), len(z)
+    columns = [*range(n), *range(3, 3 + len(u))]
+    _, jacobian, _ = step.derivatives(z, u, np.array(columns))
+    inputs = np.concatenate((z, u))
+    for j, x in enumerate(inputs):
+        size = max(abs(x), 1.0)
+
+        def at(value, j=j):
+            moved = inputs.copy()
+            moved[j] = value
+            return step.evaluate(moved[:n], moved[n:])[0]
+
+        expected = extrapolated(at, x, 1e-3 * size) * size
+        np.testing.assert_allclose(jacobian[:, j] * size, expected, atol=2e-9, rtol=2e-9)
+
+
+@settings(max_examples=50)
+@given(z=walking, alpha=st.floats(64.0, 68.0))
+def test_tangents_keep_energy(z, alpha):
+    """With springs that do not change, E(z') = E(z): dE(z') J is dE(z) by z, and 0 by alpha."""
+    step, u = ReturnMap(P, "w"), controls(np.radians(alpha), K0, K0)
+    end, jacobian, outcome = step.derivatives(np.array(z), u, np.arange(4))
+    if outcome is not Outcome.SECTION:
+        return
+
+    def slope(state):  # the spring under the CoM at VLO, gravity, speed
+        return np.array(
+            [
+                P.mass * state[0],
+                P.mass * P.gravity - K0 * (P.rest_length - state[1]),
+                P.mass * state[2],
+            ]
+        )
+
+    kept = slope(end) @ jacobian[:3]
+    scale = np.abs(slope(end)) @ np.abs(jacobian[:3])
+    # The map keeps energy to its series' 1e-13; by the state it varies a thousand times as much.
+    np.testing.assert_array_less(np.abs(kept - [*slope(z), 0.0]), 1e-9 * scale)
+
+
 @pytest.mark.parametrize(("stride", "kind"), CASES)
 def test_batch_equals_scalar(stride, kind):
     z, u = STRIDES[stride]
