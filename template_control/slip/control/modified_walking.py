@@ -18,7 +18,6 @@ from template_control.slip.dynamics.model import Kernel, Model, model_of, stride
 from template_control.slip.maps.return_map import (
     RESULTS,
     Derivatives,
-    MapWorkspace,
     closed_form,
     new_workspace,
     one_stride,
@@ -123,59 +122,6 @@ def modified_step(
 
 
 @compiled
-def modified_jacobian(
-    kernel: Kernel,
-    kind: int | None,
-    z: Array,
-    aim: Aim,
-    controls: Array,
-    columns: IntArray,
-    work: MapWorkspace,
-    found: Derivatives,
-) -> int:
-    """:func:`modified_step` with its derivatives by touchdown angle and kappa_1.
-
-    With kappa_2 of (38), whose own derivative comes from the legs' lengths at the bottom,
-
-        dkappa_2 = ((kappa_1 - kappa_2) dmu_3 + (mu_3 - mu_2) dkappa_1) / (mu_3 - mu_1).
-
-    Args:
-        columns: (c,) what to differentiate by: 3 + slot.
-        work: overwritten.
-        found: overwritten.
-        The rest as in :func:`modified_step`.
-    """
-    outcome = modified_step(kernel, kind, z, aim, controls, work.scratch, found.result)
-    kappa_1, kappa_2 = controls[_K_SC], controls[_K_SD]
-    size = columns.shape[0]
-    slopes = np.zeros(size)
-    low, high = aim.stiffness_range
-    if outcome == _SECTION and low < kappa_2 < high:
-        section_jacobian(kernel, kind, z, controls, columns, work, found)
-        rest_length, result = model_of(kernel).rest_length, found.result
-        mu_1 = (rest_length - aim.target[1]) ** 2
-        mu_2 = (rest_length - z[1]) ** 2
-        mu_3 = (rest_length - result[5]) ** 2 + (rest_length - result[4]) ** 2
-        for c in range(size):
-            for leg in range(4, 6):
-                shorter = -2.0 * (rest_length - result[leg]) * found.jacobian[leg, c]
-                slopes[c] += (kappa_1 - kappa_2) * shorter
-            if columns[c] == 3 + _K_SC:
-                slopes[c] += mu_3 - mu_2
-            slopes[c] /= mu_3 - mu_1
-    every = np.empty(size + 1, columns.dtype)
-    every[:size], every[size] = columns, 3 + _K_SD
-    both = Derivatives(found.result, np.empty((RESULTS, size + 1)))
-    outcome = section_jacobian(kernel, kind, z, controls, every, work, both)
-    for c in range(size):
-        for i in range(RESULTS):
-            found.jacobian[i, c] = both.jacobian[i, c] + both.jacobian[i, size] * slopes[c]
-            if outcome != _SECTION:
-                found.jacobian[i, c] = np.nan
-    return outcome
-
-
-@compiled
 def modified_many(
     kernel: Kernel, kind: int | None, z: Array, aim: Aim, controls: Array, scratch: Scratch
 ) -> tuple[Array, IntArray]:
@@ -274,11 +220,24 @@ class ModifiedMap:
         return found
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
-        """See :meth:`~.step_solver.Step.derivatives`; kappa_2 varies along with u."""
-        controls = np.array(u)
-        found = Derivatives(np.empty(RESULTS), np.empty((RESULTS, len(columns))))
-        outcome = modified_jacobian(
-            *self._kernel, np.array(z), self._aim, controls, columns, self._work, found
-        )
-        u[_K_SD] = controls[_K_SD]
-        return *found, Outcome(outcome)
+        """See :meth:`~.step_solver.Step.derivatives`; kappa_2 of (38) varies along with u.
+
+        dkappa_2 = ((kappa_1 - kappa_2) dmu_3 + (mu_3 - mu_2) dkappa_1) / (mu_3 - mu_1).
+        """
+        result, outcome = self.evaluate(z, u)
+        if outcome is not Outcome.SECTION:
+            return result, np.full((RESULTS, len(columns)), np.nan), outcome
+        # kappa_2 comes last: how it varies follows from the legs' lengths at the bottom.
+        every = np.append(columns, 3 + _K_SD)
+        found = Derivatives(np.empty(RESULTS), np.empty((RESULTS, len(every))))
+        section_jacobian(*self._kernel, np.array(z), np.array(u), every, self._work, found)
+        jacobian = found.jacobian[:, :-1]
+        low, high = self._range
+        if low < u[_K_SD] < high:
+            compressed = self.parameters.rest_length - result[4:]
+            released = self.parameters.rest_length - np.array([z[1], self.target[1]])
+            mu_2, mu_1 = np.square(released)
+            mu_3, mu_3_slopes = compressed @ compressed, -2.0 * compressed @ jacobian[4:]
+            slopes = (u[_K_SC] - u[_K_SD]) * mu_3_slopes + (mu_3 - mu_2) * (columns == 3 + _K_SC)
+            jacobian = jacobian + np.outer(found.jacobian[:, -1], slopes / (mu_3 - mu_1))
+        return result, jacobian, outcome

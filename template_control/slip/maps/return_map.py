@@ -88,7 +88,7 @@ def _branch(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratc
 
 
 @inner
-def begin(z: Array, scratch: Scratch) -> None:
+def _begin(z: Array, scratch: Scratch) -> None:
     """Put a stride's start (3,) dx/dt, y, dy/dt over the origin, where both toes are."""
     state = scratch.state
     state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
@@ -97,7 +97,7 @@ def begin(z: Array, scratch: Scratch) -> None:
 
 
 @inner
-def conclude(scratch: Scratch, result: Array) -> None:
+def _conclude(scratch: Scratch, result: Array) -> None:
     """Write where a stride has ended into ``result`` (RESULTS,)."""
     state, bottom = scratch.state, scratch.bottom
     result[0], result[1], result[2], result[3] = state[2], state[1], state[3], state[0]
@@ -124,9 +124,9 @@ def one_stride(
         result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance covered
             [m], lengths of rear and front leg at the (virtual) bottom [m], NaN if there was none.
     """
-    begin(z, scratch)
+    _begin(z, scratch)
     outcome = _stride(kernel, kind, scratch.state, scratch.toes, controls, scratch)
-    conclude(scratch, result)
+    _conclude(scratch, result)
     return outcome
 
 
@@ -167,14 +167,13 @@ def _jacobian(
     z: Array,
     controls: Array,
     columns: IntArray,
-    scratch: Scratch,
-    tangents: Tangents,
+    work: MapWorkspace,
     found: Derivatives,
 ) -> int:
     """Write all of ``found``; returns the Outcome's value."""
     if kind is None:
-        return _tangents(kernel, kind, z, controls, columns, scratch, tangents, found)
-    return _differences(kernel, kind, z, controls, columns, scratch, tangents, found)
+        return _tangents(kernel, kind, z, controls, columns, work, found)
+    return _differences(kernel, kind, z, controls, columns, work, found)
 
 
 def _tangents(
@@ -183,14 +182,14 @@ def _tangents(
     z: Array,
     controls: Array,
     columns: IntArray,
-    scratch: Scratch,
-    tangents: Tangents,
+    work: MapWorkspace,
     found: Derivatives,
 ) -> int:
     """:func:`_jacobian` of the exact map, by :func:`~.tangent.stride_tangents`."""
-    begin(z, scratch)
+    scratch, tangents = work
+    _begin(z, scratch)
     ended = run_stride(kernel, scratch.state, scratch.toes, controls, _RECORDED, scratch)
-    conclude(scratch, found.result)
+    _conclude(scratch, found.result)
     stride_tangents(kernel, controls, ended[2], ended[3], scratch, tangents)
     state, bottom, jacobian = tangents.state, tangents.bottom, found.jacobian
     for c in range(columns.shape[0]):
@@ -206,8 +205,7 @@ def _differences(
     z: Array,
     controls: Array,
     columns: IntArray,
-    scratch: Scratch,
-    tangents: Tangents,
+    work: MapWorkspace,
     found: Derivatives,
 ) -> int:
     """:func:`_jacobian` of a closed form, by central differences."""
@@ -219,16 +217,16 @@ def _differences(
         # Stiffnesses (1e4 N/m) move by as large a share as speeds do.
         h = _DIFFERENCE * max(abs(at), 1.0)
         inputs[i] = at - h
-        before = one_stride(kernel, kind, z, controls, scratch, result)
+        before = one_stride(kernel, kind, z, controls, work.scratch, result)
         for k in range(RESULTS):
             jacobian[k, c] = result[k]
         inputs[i] = at + h
-        after = one_stride(kernel, kind, z, controls, scratch, result)
+        after = one_stride(kernel, kind, z, controls, work.scratch, result)
         inputs[i] = at
         width = 2.0 * h if before == after else np.nan
         for k in range(RESULTS):
             jacobian[k, c] = (result[k] - jacobian[k, c]) / width
-    return int(one_stride(kernel, kind, z, controls, scratch, result))
+    return int(one_stride(kernel, kind, z, controls, work.scratch, result))
 
 
 @inner_by_type(_jacobian)
@@ -238,8 +236,7 @@ def _derived(
     z: Any,
     controls: Any,
     columns: Any,
-    scratch: Any,
-    tangents: Any,
+    work: Any,
     found: Any,
 ) -> Any:
     """The branch of :func:`_jacobian` that the type of ``kind`` takes."""
@@ -263,7 +260,7 @@ def section_jacobian(
     0 to 2 the state, 3 + slot the controls. ``work`` and ``found`` are overwritten; ``z`` and
     ``controls`` are what they were afterwards.
     """
-    return _jacobian(kernel, kind, z, controls, columns, work.scratch, work.tangents, found)
+    return _jacobian(kernel, kind, z, controls, columns, work, found)
 
 
 class Mapped(NamedTuple):
