@@ -18,7 +18,7 @@ from template_control.slip.gaits.family_search import stance_figures
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy, with_push_off
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.gaits.walking_by_speed import gait_for_speed, walking_by_speed
-from template_control.slip.maps.return_map import RESULTS, ReturnMap
+from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale
@@ -226,7 +226,7 @@ def knee_torque(robot: Biped, gait: RunningGait) -> float:
 def _shortest_leg(gait: RunningGait) -> float:
     """Length of the template's leg at the bottom [m]."""
     result, _ = ReturnMap(gait.parameters, gait.stride).evaluate(gait.apex, gait.controls)
-    return float(result[RESULTS - 2])
+    return float(result[REAR_BOTTOM])
 
 
 def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Positive = 1.0) -> None:

@@ -31,7 +31,7 @@ from template_control.embedding.planners.look_ahead import (
     PlanTarget,
     look_ahead,
 )
-from template_control.embedding.planners.lqr import LqrPlanner
+from template_control.embedding.planners.lqr import KNEE_MOMENT, KNEE_STRAIGHT, LqrPlanner
 from template_control.embedding.planners.planner import ANY_ANGLE, Context, Decision, Planner
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import ScenarioError
@@ -51,14 +51,14 @@ Array = NDArray[np.float64]
 
 MOST_STEPS = 6
 """That a plan may look ahead."""
-RISE = (0.15, 0.02)
+RISE = (0.13, 0.01)
 """|dy/dt| at VLO that costs nothing, and what is beyond it and costs 1 [m/s], for the reference
 template: from there on the template soon leaves the ground, or the leg sinks."""
 SPACING = 0.05
 """Spacing of the speeds at VLO whose gaits the search leads to where no plan is cheap [m/s], for
 the reference template; each gait that is made is kept."""
 _SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the wanted change of speed, tried in turn
-_ROUNDS = 4  # Gauss-Newton steps of a plan at most
+_ROUNDS = 12  # Gauss-Newton steps of a plan at most: the way to a slower gait took 8
 _BEHIND = 0.08  # difference between wanted and accepted speed that is none [m/s], for the reference
 _MOST_STRIDES = 1000  # that are rehearsed, of a route that does not end
 
@@ -120,7 +120,10 @@ class AheadPlanner(Planner):
         self._problem = plan_problem(parameters, self.table)
         self._work = new_workspace()
         self._plan = Plan(
-            np.empty((o.steps + 1, PADDED)), np.empty((o.steps, CONTROLS)), np.empty(WIDTH)
+            np.empty((o.steps + 1, PADDED)),
+            np.empty((o.steps, CONTROLS)),
+            np.empty((o.steps, 3)),
+            np.empty(WIDTH),
         )
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
         self._lead_to(self._first)
@@ -170,15 +173,16 @@ class AheadPlanner(Planner):
         change = min(max(min(max(wanted, low), high) - present, -pace), pace)
         for share in _SHARES:
             speed = present + share * change
-            cost = self._look(z, speed, angles)
-            if cost <= self.options.cheap:
+            cost, excess = self._look(z, speed, angles)
+            if excess <= self.options.cheap:
                 return self._decision(speed, wanted, True)
             cheapest = min(cheapest, (cost, speed))
         return self._otherwise(z, wanted, cheapest, angles)
 
-    def _look(self, z: Array, speed: float, angles: tuple[float, float]) -> float:
+    def _look(self, z: Array, speed: float, angles: tuple[float, float]) -> tuple[float, float]:
         aim = PlanTarget(speed, self.offset, (float(angles[0]), float(angles[1])))
-        return float(look_ahead(self._problem, self._work, z, aim, self._plan))
+        cost, excess = look_ahead(self._problem, self._work, z, aim, self._plan)
+        return float(cost), float(excess)
 
     def _decision(self, speed: float, wanted: float, nominal: bool) -> Decision:
         """The first step of the last plan."""
@@ -219,6 +223,8 @@ def plan_problem(parameters: SlipParameters, table: GaitTable) -> PlanProblem:
         table=table,
         tolerance=STATE_TOLERANCE * scale.state,
         rise=(beyond * scale.speed, tolerance * scale.speed),
+        knee_reach=KNEE_STRAIGHT * scale.length,
+        knee_moment=KNEE_MOMENT * scale.length * parameters.mass * parameters.gravity,
         rounds=_ROUNDS,
         columns=COLUMNS,
     )
@@ -228,7 +234,7 @@ def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
     row = np.ones((1, WIDTH))
     known = plan_problem(SlipParameters(), GaitTable(np.ones(1), row))._replace(rounds=1)
-    plan = Plan(np.empty((2, PADDED)), np.empty((1, CONTROLS)), np.empty(WIDTH))
+    plan = Plan(np.empty((2, PADDED)), np.empty((1, CONTROLS)), np.empty((1, 3)), np.empty(WIDTH))
     aim = PlanTarget(1.0, np.zeros(PADDED), ANY_ANGLE)
     work = new_workspace()
     look_ahead(known, work, np.ones(PADDED), aim, plan)

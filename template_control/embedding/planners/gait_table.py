@@ -67,7 +67,7 @@ def gait_row(table: GaitTable, speed: float, row: Array) -> None:
 
 STATE_TOLERANCE = np.array([0.06, 0.006, 0.04])
 """Differences of dx/dt, y, dy/dt from a gait's that cost 1 [m/s, m, m/s], for the reference."""
-CONTROL_TOLERANCE = np.array([0.04, 0.15, 0.15, 0.15])
+CONTROL_TOLERANCE = np.array([0.08, 0.3, 0.3, 0.3])
 """Differences of alpha [rad], kappa_1, kappa_2 and kappa_p from a gait's that cost 1."""
 STRIDE: Final = StrideKind.WALK_PUSH_OFF
 """The steps of these gaits."""

@@ -3,7 +3,7 @@
 Over N steps with controls u_0 to u_(N-1) and states z_1 to z_N at VLO, it is:
 
     sum |(z_i - z*) / tolerance|^2 + |(u_i - u*) / control tolerance|^2 + (rise beyond)^2
-    + (z_N - z*)' P (z_N - z*)
+    + (knee moments beyond)^2 + (z_N - z*)' P (z_N - z*)
 
 z* and u* are the aimed gait's, shifted so that the robot, with its offset, settles on it; the
 sum over states ends at z_(N-1); P is the LQR's cost-to-go of the same costs.
@@ -36,6 +36,7 @@ from template_control.embedding.planners.stride_solver import bounded_step
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
+    REAR_BOTTOM,
     RESULTS,
     Derivatives,
     MapWorkspace,
@@ -63,6 +64,8 @@ class PlanProblem(NamedTuple):
         table: gaits by speed.
         tolerance: (3,) differences of the states that cost 1.
         rise: |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s].
+        knee_reach: length of the leg at which the knee is straight [m].
+        knee_moment: moment of the leg force about the knee that costs nothing [N m].
         rounds: Gauss-Newton steps at most.
         columns: (7,) of the map's derivatives, states and controls.
     """
@@ -71,6 +74,8 @@ class PlanProblem(NamedTuple):
     table: GaitTable
     tolerance: Array
     rise: tuple[float, float]
+    knee_reach: float
+    knee_moment: float
     rounds: int
     columns: NDArray[np.int64]
 
@@ -95,19 +100,26 @@ class Plan(NamedTuple):
     Attributes:
         states: (N + 1, 3) at VLO, the present one first.
         controls: (N, 4) alpha and shares of the aimed gait's k.
+        lengths: (N, 3) of the rear and the front leg at the virtual bottom, and of the rear leg at
+            touchdown [m].
         row: of the aimed gait, see :mod:`~.gait_table`.
     """
 
     states: Array
     controls: Array
+    lengths: Array
     row: Array
 
 
 STATES = 3
 """Of a section at VLO."""
 
-PER_STEP = STATES + 1 + CONTROLS
-"""Residuals of a step: states, what rises beyond, controls."""
+_LIMITS = STATES + CONTROLS
+_KNEES = 3
+PER_STEP = STATES + CONTROLS + 1 + _KNEES
+"""Residuals of a step: states, controls, what rises beyond, what the knees bear beyond: of the rear
+and of the front leg at the virtual bottom, and of the rear leg just after touchdown."""
+_KNEE_TOLERANCE = 0.05  # share of the knee moment beyond that costs 1
 
 
 @compiled
@@ -158,7 +170,7 @@ def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Arr
         plan: its states and controls.
         target: (7,) z* and u*.
         factor: (3, 3) lower triangular L with P = L L'.
-        out: (8 N,) overwritten: of each step its state, what rises beyond, its controls.
+        out: (11 N,) overwritten: of each step what PER_STEP counts.
 
     Returns:
         The cost, their sum of squares.
@@ -173,14 +185,87 @@ def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Arr
                 out[row + j] = 0.0
                 for k in range(j, STATES):
                     out[row + j] += factor[k, j] * (plan.states[i + 1, k] - target[k])
-        beyond = abs(plan.states[i + 1, 2]) - p.rise[0]
-        out[row + STATES] = max(beyond, 0.0) / p.rise[1]
         for j in range(CONTROLS):
             miss = plan.controls[i, j] - target[STATES + j]
-            out[row + STATES + 1 + j] = miss / CONTROL_TOLERANCE[j]
+            out[row + STATES + j] = miss / CONTROL_TOLERANCE[j]
+        beyond = abs(plan.states[i + 1, 2]) - p.rise[0]
+        out[row + _LIMITS] = max(beyond, 0.0) / p.rise[1]
+        for leg in range(_KNEES):
+            moment = knee_moment(p, plan, i, leg)[0]
+            beyond = (moment / p.knee_moment - 1.0) / _KNEE_TOLERANCE
+            out[row + _LIMITS + 1 + leg] = max(beyond, 0.0)
     for i in range(PER_STEP * steps):
         cost += out[i] * out[i]
     return cost
+
+
+@compiled
+def excess(out: Array) -> float:
+    """What of a plan's cost says that it cannot be done, or leads nowhere.
+
+    Args:
+        out: (11 N,) from :func:`residuals`.
+
+    Returns:
+        The limits' share of the cost, and that of the last state.
+    """
+    total, steps = 0.0, out.shape[0] // PER_STEP
+    for i in range(steps):
+        for j in range(_LIMITS, PER_STEP):
+            total += out[PER_STEP * i + j] ** 2
+    for j in range(STATES):
+        total += out[PER_STEP * (steps - 1) + j] ** 2
+    return total
+
+
+@compiled
+def knee_moment(p: PlanProblem, plan: Plan, i: int, leg: int) -> tuple[float, float, int]:
+    """Moment of a leg's force about its knee, which is half-way up the leg.
+
+    M = kappa (l0 - l) sqrt(reach^2 - l^2) / 2, with the larger of the stiffnesses that the leg has
+    before and after.
+
+    Args:
+        p: the knee.
+        plan: its controls and legs' lengths.
+        i: which step.
+        leg: rear or front one at the virtual bottom, or the rear one at touchdown.
+
+    Returns:
+        M [N m], its derivative by the length [N], and which control the stiffness is.
+    """
+    u, length = plan.controls[i], plan.lengths[i, leg]
+    stiff = 3 if leg != 1 else (1 if u[1] >= u[2] else 2)
+    force = u[stiff] * plan.row[STIFFNESS] * (p.kernel.rest_length - length)
+    arm = 0.5 * np.sqrt(max(p.knee_reach**2 - length**2, 1e-6 * p.knee_reach**2))
+    by_length = -u[stiff] * plan.row[STIFFNESS] * arm - 0.25 * force * length / arm
+    return force * arm, by_length, stiff
+
+
+@compiled
+def _chain(
+    jacobian: Array, first: int, skip: int, plan: Plan, i: int, state: Array, out: Array
+) -> None:
+    """Derivatives of three results of step ``i`` by the controls of all steps up to it.
+
+    Args:
+        jacobian: of the step, by its state, of ``skip`` columns, and its controls.
+        first: place of the three results.
+        skip: 0 where the state is what it is.
+        plan: its unit of stiffness.
+        i: which step.
+        state: (3, c) derivatives of the step's own state.
+        out: (3, c) overwritten.
+    """
+    for a in range(3):
+        for c in range(CONTROLS * i):
+            total = 0.0
+            for b in range(skip):
+                total += jacobian[first + a, b] * state[b, c]
+            out[a, c] = total
+        for c in range(CONTROLS):
+            unit = 1.0 if c == 0 else plan.row[STIFFNESS]
+            out[a, CONTROLS * i + c] = jacobian[first + a, skip + c] * unit
 
 
 @compiled
@@ -192,7 +277,7 @@ def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: 
         work: overwritten.
         plan: its states and controls; the template completes its steps.
         factor: as for :func:`residuals`.
-        rows: (8 N, 4 N) overwritten.
+        rows: (11 N, 4 N) overwritten.
     """
     steps = plan.controls.shape[0]
     size = CONTROLS * steps
@@ -200,6 +285,7 @@ def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: 
     by_control = np.empty((RESULTS, CONTROLS))
     by_both = np.empty((RESULTS, STATES + CONTROLS))
     state, following = np.zeros((STATES, size)), np.zeros((STATES, size))
+    lengths = np.zeros((_KNEES, size))
     for i in range(PER_STEP * steps):
         for j in range(size):
             rows[i, j] = 0.0
@@ -213,15 +299,8 @@ def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: 
             found = Derivatives(result, by_both)
             section_jacobian(p.kernel, None, plan.states[i], u, p.columns, work, found)
         skip = 0 if i == 0 else STATES
-        for a in range(STATES):
-            for c in range(CONTROLS * i):
-                total = 0.0
-                for b in range(STATES):
-                    total += by_both[a, b] * state[b, c]
-                following[a, c] = total
-            for c in range(CONTROLS):
-                unit = 1.0 if c == 0 else plan.row[STIFFNESS]
-                following[a, CONTROLS * i + c] = found.jacobian[a, skip + c] * unit
+        _chain(found.jacobian, 0, skip, plan, i, state, following)
+        _chain(found.jacobian, REAR_BOTTOM, skip, plan, i, state, lengths)
         row = PER_STEP * i
         beyond = abs(plan.states[i + 1, 2]) > p.rise[0]
         sign = 1.0 if plan.states[i + 1, 2] > 0.0 else -1.0
@@ -235,9 +314,18 @@ def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: 
                     for k in range(a, STATES):
                         rows[row + a, c] += factor[k, a] * state[k, c]
             if beyond:
-                rows[row + STATES, c] = sign * state[2, c] / p.rise[1]
+                rows[row + _LIMITS, c] = sign * state[2, c] / p.rise[1]
         for c in range(CONTROLS):
-            rows[row + STATES + 1 + c, CONTROLS * i + c] = 1.0 / CONTROL_TOLERANCE[c]
+            rows[row + STATES + c, CONTROLS * i + c] = 1.0 / CONTROL_TOLERANCE[c]
+        for leg in range(_KNEES):
+            moment, by_length, stiff = knee_moment(p, plan, i, leg)
+            if moment <= p.knee_moment:
+                continue
+            unit = _KNEE_TOLERANCE * p.knee_moment
+            for c in range(CONTROLS * (i + 1)):
+                rows[row + _LIMITS + 1 + leg, c] = by_length * lengths[leg, c] / unit
+            stiffer = moment / plan.controls[i, stiff]
+            rows[row + _LIMITS + 1 + leg, CONTROLS * i + stiff] += stiffer / unit
 
 
 @compiled
@@ -249,6 +337,8 @@ def _step(p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan, i: in
         return False
     for j in range(STATES):
         plan.states[i + 1, j] = result[j] + aim.offset[j]
+    for j in range(_KNEES):
+        plan.lengths[i, j] = result[REAR_BOTTOM + j]
     return True
 
 
@@ -305,7 +395,9 @@ def _guess(
 
 
 @compiled
-def look_ahead(p: PlanProblem, work: MapWorkspace, z: Array, aim: PlanTarget, plan: Plan) -> float:
+def look_ahead(
+    p: PlanProblem, work: MapWorkspace, z: Array, aim: PlanTarget, plan: Plan
+) -> tuple[float, float]:
     """Plan N steps from a VLO.
 
     Args:
@@ -316,7 +408,8 @@ def look_ahead(p: PlanProblem, work: MapWorkspace, z: Array, aim: PlanTarget, pl
         plan: overwritten.
 
     Returns:
-        The plan's cost; inf where the template completes no steps to begin with.
+        The plan's cost, and its :func:`excess`; inf where the template completes no steps to begin
+        with.
     """
     steps = plan.controls.shape[0]
     size = CONTROLS * steps
@@ -327,7 +420,7 @@ def look_ahead(p: PlanProblem, work: MapWorkspace, z: Array, aim: PlanTarget, pl
     feedback = 1.0
     while not _guess(p, work, aim, plan, target, feedback):
         if feedback == 0.0:
-            return np.inf
+            return np.inf, np.inf
         feedback = max(feedback - _LESS, 0.0)
     lower, upper = np.empty(size), np.empty(size)
     rows, residual = np.empty((PER_STEP * steps, size)), np.empty(PER_STEP * steps)
@@ -358,9 +451,10 @@ def look_ahead(p: PlanProblem, work: MapWorkspace, z: Array, aim: PlanTarget, pl
             for i in range(size):
                 plan.controls[i // CONTROLS, i % CONTROLS] = start[i]
             _roll(p, work, aim, plan)
+            residuals(p, plan, target, factor, residual)
             break
         small = cost - lowered < _DONE * max(lowered, 1.0)
         cost = lowered
         if small:
             break
-    return cost
+    return cost, excess(residual)

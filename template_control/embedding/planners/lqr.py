@@ -88,8 +88,8 @@ _ROUNDS = 2  # of Newton's method for the fixed point; it begins at the last one
 # is a few millimetres above l0 in steady walks too.
 _FLIGHT = 0.005  # [m], for the reference template
 # Five-link's numbers: its knees have 350 N m, and its walks need some of them for the other leg.
-_KNEE_STRAIGHT = 1.095  # leg length at which the knee is straight [m]: it ends above the hip
-_KNEE_MOMENT = 0.41  # of the leg force about the knee, over the weight, that costs nothing [m]
+KNEE_STRAIGHT = 1.095  # leg length at which the knee is straight [m]: it ends above the hip
+KNEE_MOMENT = 0.41  # of the leg force about the knee, over the weight, that costs nothing [m]
 
 # Second steps that are tried after the law's own: alpha relative to the gait's [rad], kappa_1,
 # kappa_2 (and kappa_p) over k0. A leg that is stiffer before its virtual bottom than after takes
@@ -311,8 +311,8 @@ class LqrPlanner(Planner):
             earliest=min(o.earliest_touchdown, o.earliest_share * self.gait.step_duration),
             stiffness=p.leg_stiffness,
             knee_load=KneeLoadPenalty(
-                _KNEE_STRAIGHT * self._scale.length,
-                _KNEE_MOMENT * self._scale.length * p.mass * p.gravity,
+                KNEE_STRAIGHT * self._scale.length,
+                KNEE_MOMENT * self._scale.length * p.mass * p.gravity,
                 o.knee_load_price,
             ),
             kernel=stride_kernel(p, self._here.stride),

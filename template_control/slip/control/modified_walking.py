@@ -234,10 +234,10 @@ class ModifiedMap:
         jacobian = found.jacobian[:, :-1]
         low, high = self._range
         if low < u[_K_SD] < high:
-            compressed = self.parameters.rest_length - result[4:]
+            compressed = self.parameters.rest_length - result[4:6]
             released = self.parameters.rest_length - np.array([z[1], self.target[1]])
             mu_2, mu_1 = np.square(released)
-            mu_3, mu_3_slopes = compressed @ compressed, -2.0 * compressed @ jacobian[4:]
+            mu_3, mu_3_slopes = compressed @ compressed, -2.0 * compressed @ jacobian[4:6]
             slopes = (u[_K_SC] - u[_K_SD]) * mu_3_slopes + (mu_3 - mu_2) * (columns == 3 + _K_SC)
             jacobian = jacobian + np.outer(found.jacobian[:, -1], slopes / (mu_3 - mu_1))
         return result, jacobian, outcome

@@ -21,7 +21,7 @@ from template_control.slip.dynamics.guards import (
     all_bends,
     sample,
 )
-from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_bottom
+from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_lengths
 from template_control.slip.dynamics.locate import Watch, arm, first_event, root
 from template_control.slip.dynamics.model import Kernel, Model, backward, model_of
 
@@ -403,7 +403,7 @@ def closed_form_stride(
             continue
         edge += first_edge
         event = tables.event[edge]
-        note_bottom(event, state, toes, scratch.bottom)
+        note_lengths(event, state, toes, scratch.lengths)
         apply_reset(tables.reset[edge], state, toes, rest_length, alpha)
         if tables.outcome[edge] >= 0:
             return tables.outcome[edge]

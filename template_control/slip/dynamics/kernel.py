@@ -25,6 +25,7 @@ _PLACE_REAR = int(Reset.PLACE_REAR)
 _PLACE_FRONT = int(Reset.PLACE_FRONT)
 _SHIFT = int(Reset.SHIFT)
 _SWAP = int(Reset.SWAP)
+_TOUCHDOWN = int(Event.TOUCHDOWN)
 _BOTTOM = int(Event.BOTTOM)
 _VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
 _TIMEOUT = int(Outcome.TIMEOUT)
@@ -47,7 +48,8 @@ class Scratch(NamedTuple):
         path: (COEFFICIENTS,) of a closed-form phase.
         out, probe: (6,) samples of a path.
         state, toes: (4,) and (2,) of the section maps.
-        bottom: (2,) lengths of rear and front leg at the last (virtual) bottom [m].
+        lengths: (3,) of rear and front leg at the last (virtual) bottom, and of the rear leg at the
+            last touchdown [m].
         stiffness: (2,) of the phase's legs.
         values, bends, armed: (2, NUM_EVENTS), (NUM_EVENTS,) and (MAX_EDGES,) the guards.
     """
@@ -62,7 +64,7 @@ class Scratch(NamedTuple):
     probe: Array
     state: Array
     toes: Array
-    bottom: Array
+    lengths: Array
     stiffness: Array
     values: Array
     bends: Array
@@ -82,7 +84,7 @@ def new_scratch() -> Scratch:
         probe=np.zeros(6),
         state=np.zeros(4),
         toes=np.zeros(2),
-        bottom=np.zeros(2),
+        lengths=np.zeros(3),
         stiffness=np.zeros(2),
         values=np.zeros((2, NUM_EVENTS)),
         bends=np.zeros(NUM_EVENTS),
@@ -109,15 +111,17 @@ def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha
 
 
 @inner
-def note_bottom(event: int, state: Array, toes: Array, bottom: Array) -> None:
-    """Write the legs' lengths (2,) [m] into ``bottom`` if the event is a bottom, virtual or not.
+def note_lengths(event: int, state: Array, toes: Array, lengths: Array) -> None:
+    """Write legs' lengths [m] into ``lengths`` (3,) of :class:`Scratch` at a bottom or a touchdown.
 
     ``state`` (4,) is x, y, dx/dt, dy/dt of the CoM [m, m/s], ``toes`` (2,) x of rear and front toe
     [m].
     """
     if event in (_BOTTOM, _VIRTUAL_BOTTOM):
         for leg in range(2):
-            bottom[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
+            lengths[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
+    elif event == _TOUCHDOWN:
+        lengths[2] = np.sqrt((state[0] - toes[0]) ** 2 + state[1] ** 2)
 
 
 @inner
@@ -191,7 +195,7 @@ def run_stride(
         for i in range(4):
             events[row, 4 + i] = state[i]
         event_count += 1
-        note_bottom(event, state, toes, scratch.bottom)
+        note_lengths(event, state, toes, scratch.lengths)
         apply_reset(tables.reset[fired], state, toes, rest_length, alpha)
         if outcome >= 0:
             return outcome, (target if target >= 0 else node), segments, event_count, time

@@ -30,6 +30,7 @@ _PLACE_REAR = int(Reset.PLACE_REAR)
 _PLACE_FRONT = int(Reset.PLACE_FRONT)
 _SHIFT = int(Reset.SHIFT)
 _SWAP = int(Reset.SWAP)
+_TOUCHDOWN = int(Event.TOUCHDOWN)
 _BOTTOM = int(Event.BOTTOM)
 _VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
 _ALPHA = 3 + int(Slot.TOUCHDOWN_ANGLE)
@@ -47,7 +48,8 @@ class Tangents(NamedTuple):
     Attributes:
         state: (4, COLUMNS) derivatives of x, y, dx/dt, dy/dt.
         toes: (2, COLUMNS) of the x of rear and front toe.
-        bottom: (2, COLUMNS) of the lengths of rear and front leg at the (virtual) bottom.
+        lengths: (3, COLUMNS) of the lengths of rear and front leg at the (virtual) bottom, and of
+            the rear leg at touchdown.
         flow: (4, _INPUTS) of a phase's final state by what it begins with.
         leg: (6, ORDER - 1) series of a leg: r^2, r^-3, 1/r, d_x/r^3, d_x^2/r^3, d_x d_y/r^3.
         force: (2, 3, ORDER - 1) series of G of each leg: xx, xy, yy.
@@ -59,7 +61,7 @@ class Tangents(NamedTuple):
 
     state: Array
     toes: Array
-    bottom: Array
+    lengths: Array
     flow: Array
     leg: Array
     force: Array
@@ -74,7 +76,7 @@ def new_tangents() -> Tangents:
     return Tangents(
         state=np.zeros((4, COLUMNS)),
         toes=np.zeros((2, COLUMNS)),
-        bottom=np.zeros((2, COLUMNS)),
+        lengths=np.zeros((3, COLUMNS)),
         flow=np.zeros((4, _INPUTS)),
         leg=np.zeros((6, ORDER - 1)),
         force=np.zeros((2, 3, ORDER - 1)),
@@ -211,6 +213,16 @@ def _carry(rear: int, front: int, tangents: Tangents) -> None:
 
 
 @inner
+def _lengthen(row: int, leg: int, at: Array, toes: Array, tangents: Tangents) -> None:
+    """Write the derivatives of a leg's length into a row of ``tangents.lengths``."""
+    d, y = at[0] - toes[leg], at[1]
+    length = np.sqrt(d * d + y * y)
+    for c in range(COLUMNS):
+        along = d * (tangents.state[0, c] - tangents.toes[leg, c]) + y * tangents.state[1, c]
+        tangents.lengths[row, c] = along / length
+
+
+@inner
 def _fire(
     event: int, at: Array, alpha: float, toes: Array, rest_length: float, tangents: Tangents
 ) -> None:
@@ -222,7 +234,7 @@ def _fire(
         alpha: touchdown angle [rad].
         toes: (2,) x of rear and front toe [m].
         rest_length: l0 [m].
-        tangents: ``state`` and, at a bottom, ``bottom`` are overwritten.
+        tangents: ``state`` and, where the event has them, ``lengths`` are overwritten.
     """
     g, state, moved = tangents.guard, tangents.state, tangents.toes
     guard_gradient(event, at, toes, g)
@@ -237,12 +249,10 @@ def _fire(
         for i in range(4):
             state[i, c] += at[2 + i] * time
     if event in (_BOTTOM, _VIRTUAL_BOTTOM):
-        for leg in range(2):
-            d, y = at[0] - toes[leg], at[1]
-            length = np.sqrt(d * d + y * y)
-            for c in range(COLUMNS):
-                along = d * (state[0, c] - moved[leg, c]) + y * state[1, c]
-                tangents.bottom[leg, c] = along / length
+        _lengthen(0, 0, at, toes, tangents)
+        _lengthen(1, 1, at, toes, tangents)
+    elif event == _TOUCHDOWN:
+        _lengthen(2, 0, at, toes, tangents)
 
 
 @inner
@@ -278,14 +288,14 @@ def stride_tangents(
         controls: (NUM_SLOTS,) u of the stride.
         segments, events: numbers of recorded ones.
         scratch: with the stride's path and events.
-        tangents: ``state``, ``toes`` and ``bottom`` are overwritten with the derivatives at the
+        tangents: ``state``, ``toes`` and ``lengths`` are overwritten with the derivatives at the
             stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the controls.
     """
     tables, model = kernel.tables, model_of(kernel)
     alpha, rest_length = controls[0], model.rest_length
     tangents.state[:] = 0.0
     tangents.toes[:] = 0.0
-    tangents.bottom[:] = np.nan
+    tangents.lengths[:] = np.nan
     tangents.state[2, 0] = tangents.state[1, 1] = tangents.state[3, 2] = 1.0
     fired = 0
     for i in range(segments):

@@ -29,8 +29,12 @@ IntArray = NDArray[np.int64]
 _LAST_ONLY, _RECORDED = np.bool_(False), np.bool_(True)
 _DIFFERENCE = 3e-6  # relative; leaves 1e-11 of the third derivative and 1e-9 of rounding
 
-RESULTS = 6
-"""Numbers a map yields: dx/dt, y, dy/dt, distance covered, legs' lengths at the bottom."""
+RESULTS = 7
+"""Numbers a map yields: dx/dt, y, dy/dt, distance covered, legs' lengths at the bottom, the rear
+leg's at touchdown."""
+
+REAR_BOTTOM, FRONT_BOTTOM, REAR_TOUCHDOWN = 4, 5, 6
+"""Places of the legs' lengths among them."""
 
 
 class MapWorkspace(NamedTuple):
@@ -93,15 +97,15 @@ def _begin(z: Array, scratch: Scratch) -> None:
     state = scratch.state
     state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
     scratch.toes[0] = scratch.toes[1] = 0.0
-    scratch.bottom[0] = scratch.bottom[1] = np.nan
+    scratch.lengths[0] = scratch.lengths[1] = scratch.lengths[2] = np.nan
 
 
 @inner
 def _conclude(scratch: Scratch, result: Array) -> None:
     """Write where a stride has ended into ``result`` (RESULTS,)."""
-    state, bottom = scratch.state, scratch.bottom
+    state, lengths = scratch.state, scratch.lengths
     result[0], result[1], result[2], result[3] = state[2], state[1], state[3], state[0]
-    result[4], result[5] = bottom[0], bottom[1]
+    result[4], result[5], result[6] = lengths[0], lengths[1], lengths[2]
 
 
 @inner
@@ -121,8 +125,9 @@ def one_stride(
         z: (3,) dx/dt, y, dy/dt at the section [m/s, m, m/s]; dy/dt is 0 at apex.
         controls: (NUM_SLOTS,) u by Slot.
         scratch: overwritten.
-        result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance covered
-            [m], lengths of rear and front leg at the (virtual) bottom [m], NaN if there was none.
+        result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance
+            covered [m], lengths of rear and front leg at the (virtual) bottom and of the rear leg
+            at touchdown [m], NaN if there was none.
     """
     _begin(z, scratch)
     outcome = _stride(kernel, kind, scratch.state, scratch.toes, controls, scratch)
@@ -191,11 +196,13 @@ def _tangents(
     ended = run_stride(kernel, scratch.state, scratch.toes, controls, _RECORDED, scratch)
     _conclude(scratch, found.result)
     stride_tangents(kernel, controls, ended[2], ended[3], scratch, tangents)
-    state, bottom, jacobian = tangents.state, tangents.bottom, found.jacobian
+    state, lengths, jacobian = tangents.state, tangents.lengths, found.jacobian
     for c in range(columns.shape[0]):
         j = columns[c]
         jacobian[0, c], jacobian[1, c], jacobian[2, c] = state[2, j], state[1, j], state[3, j]
-        jacobian[3, c], jacobian[4, c], jacobian[5, c] = state[0, j], bottom[0, j], bottom[1, j]
+        jacobian[3, c] = state[0, j]
+        for leg in range(3):
+            jacobian[4 + leg, c] = lengths[leg, j]
     return ended[0]
 
 
@@ -406,7 +413,7 @@ class ReturnMap:
             result[..., : self.dimensions[1]],
             outcome.reshape(shape),
             result[..., PADDED],
-            result[..., PADDED + 1 :],
+            result[..., PADDED + 1 : PADDED + 3],
         )
 
     def linearise(self, z: ArrayLike, u: ArrayLike) -> Linearisation:

@@ -28,9 +28,11 @@ from template_control.embedding.planners.gait_table import (
 )
 from template_control.embedding.planners.look_ahead import (
     BOUNDS,
+    PER_STEP,
     Plan,
     PlanTarget,
     aimed,
+    knee_moment,
     look_ahead,
     residuals,
     slopes,
@@ -41,7 +43,7 @@ from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
-from template_control.slip.maps.return_map import ReturnMap, new_workspace
+from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap, new_workspace
 from template_control.slip.scenario.route import SpeedProfile, SpeedRoute
 
 P = tc.SlipParameters()
@@ -69,30 +71,37 @@ def table():
 def plan_from(z, speed, steps=3, **changes):
     """A plan's cost, the plan, and what it was made with."""
     known = plan_problem(P, table())._replace(**changes)
-    plan = Plan(np.empty((steps + 1, 3)), np.empty((steps, CONTROLS)), np.empty(WIDTH))
+    states, legs = np.empty((steps + 1, 3)), np.empty((steps, 3))
+    plan = Plan(states, np.empty((steps, CONTROLS)), legs, np.empty(WIDTH))
     work = new_workspace()
     aim = PlanTarget(speed, np.zeros(3), ANY_ANGLE)
-    return look_ahead(known, work, z, aim, plan), plan, (known, work, aim)
+    cost, _ = look_ahead(known, work, z, aim, plan)
+    return cost, plan, (known, work, aim)
 
 
-def test_derivatives_are_those_of_the_residuals():
+@pytest.mark.parametrize("moment", [np.inf, 250.0])
+def test_derivatives_are_those_of_the_residuals(moment):
     z = row_at(table(), 0.8)[STATE : STATE + 3] + [0.03, 0.002, 0.16]
-    _, plan, (known, work, aim) = plan_from(z, 0.9, rounds=1)
+    _, plan, (known, work, aim) = plan_from(z, 0.9, rounds=1, knee_moment=moment)
     target, factor = np.empty(7), np.empty((3, 3))
     aimed(known, aim, plan, target, factor)
     size = plan.controls.size
-    rows = np.empty((8 * len(plan.controls), size))
+    rows = np.empty((PER_STEP * len(plan.controls), size))
     slopes(known, work, plan, factor, rows)
     step = ReturnMap(P, "wp")
 
     def missed(change):
         states, controls = [plan.states[0]], plan.controls + change.reshape(plan.controls.shape)
+        legs = []
         for row in controls:
             u = np.zeros(6)
             u[SLOTS] = row * [1.0, *[plan.row[STIFFNESS]] * 3]
-            states.append(step.step(states[-1], u)[0])
+            result, _ = step.evaluate(states[-1], u)
+            states.append(result[:3])
+            legs.append(result[REAR_BOTTOM:])
         out = np.empty(len(rows))
-        residuals(known, Plan(np.array(states), controls, plan.row), target, factor, out)
+        there = Plan(np.array(states), controls, np.array(legs), plan.row)
+        residuals(known, there, target, factor, out)
         return out
 
     for column, change in zip(rows.T, 1e-6 * np.eye(size), strict=True):
@@ -145,6 +154,30 @@ def test_dy_dt_costs_above_its_bound():
     assert np.abs(plan.states[1:, 2]).max() < sum(RISE)
 
 
+@pytest.mark.parametrize("faster", [0.15, -0.15])
+def test_a_plan_keeps_to_what_the_knees_bear(faster):
+    z = row_at(table(), 0.8)[STATE : STATE + 3]
+
+    def largest(limit):
+        _, plan, (known, *_) = plan_from(z, 0.8 + faster, knee_moment=limit)
+        legs = [(i, leg) for i in range(len(plan.lengths)) for leg in range(3)]
+        return max(knee_moment(known, plan, i, leg)[0] for i, leg in legs)
+
+    free = largest(np.inf)
+    limit = 0.9 * free
+    assert largest(limit) - limit < 0.6 * (free - limit)  # the limit is soft
+
+
+def test_what_cannot_be_done_is_told_from_what_is_dear():
+    """A change of all controls costs, and exceeds nothing."""
+    z = row_at(table(), 0.8)[STATE : STATE + 3]
+    cost, plan, (known, work, aim) = plan_from(z, 0.9)
+    _, excess = look_ahead(known, work, z, aim, plan)
+    assert excess < 0.5 * cost
+    weak = known._replace(knee_moment=0.3 * known.knee_moment)
+    assert look_ahead(weak, work, z, aim, plan)[1] > OPTIONS.cheap
+
+
 def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
     z = row_at(table(), 0.9)[STATE : STATE + 3]
     taken = planner.decide(Context(z, z + [0.05, 0.0, 0.0]))
@@ -182,7 +215,7 @@ def test_the_template_goes_through_all_speeds_and_back(planner):
         assert decision.nominal
         z, outcome = step.step(z, decision.controls)
         assert outcome is Outcome.SECTION
-        assert abs(z[2]) < RISE[0]
+        assert abs(z[2]) < 0.15
         speeds.append(z[0])
     assert max(speeds) == pytest.approx(1.3, abs=0.02)
     assert speeds[-1] == pytest.approx(0.27, abs=0.02)
