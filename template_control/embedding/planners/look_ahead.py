@@ -436,7 +436,7 @@ def look_ahead(
         for r in range(residual.shape[0]):
             for i in range(size):
                 residual[r] += rows[r, i] * (x[i] - start[i])
-        there = bounded_step(rows, residual, x, lower, upper)
+        there = bounded_step(rows, residual, x, lower, upper, 0.0)
         share, lowered = 1.0, np.inf
         for _ in range(_HALVINGS):
             for i in range(size):

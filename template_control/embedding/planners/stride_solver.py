@@ -25,12 +25,15 @@ _NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it 
 
 
 @compiled
-def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Array) -> Array:
-    """x + dx with the least |rows dx + residual| between the bounds.
+def bounded_step(
+    rows: Array, residual: Array, x: Array, lower: Array, upper: Array, damping: float
+) -> Array:
+    """x + dx with the least |rows dx + residual|^2 + damping |D dx|^2 between the bounds.
 
-    A variable that would leave its bounds is held there, and the others are solved for again.
-    ``rows`` (r, f) is the Jacobian of the residual (r,) at x (f,), which is within the bounds; its
-    columns are independent.
+    D holds the lengths of the columns of ``rows``: Levenberg's damping in Marquardt's scale; 0 for
+    a step of Gauss and Newton. A variable that would leave its bounds is held there, and the others
+    are solved for again. ``rows`` (r, f) is the Jacobian of the residual (r,) at x (f,), which is
+    within the bounds; its columns are independent.
     """
     size = x.shape[0]
     there = np.empty(size)
@@ -54,6 +57,7 @@ def bounded_step(rows: Array, residual: Array, x: Array, lower: Array, upper: Ar
                 for r in range(rows.shape[0]):
                     total += rows[r, free[a]] * rows[r, free[b]]
                 normal[a, b] = total
+            normal[a, a] *= 1.0 + damping
             right[a, 0] = 0.0
         for r in range(rows.shape[0]):
             left = residual[r]
@@ -102,6 +106,7 @@ def improve(
     aim: Array,
     tolerance: Array,
     prior: Array,
+    damping: float,
 ) -> tuple[float, float, Array, Array]:
     """One step towards the least |(end - aim) / tolerance|^2 + |(x - base) / change|^2.
 
@@ -111,6 +116,7 @@ def improve(
         aim: (m,) where it should end.
         tolerance: (m,) errors that count as 1.
         prior: (4, f) base, change, lower and upper bounds.
+        damping: of the step, see :func:`bounded_step`.
 
     Returns:
         The cost at x; the longest component of the step in units of its change; (f,) the next x;
@@ -133,7 +139,7 @@ def improve(
         rows[m + j, j] = 1.0 / prior[1, j]
     for i in range(m + size):
         cost += residual[i] * residual[i]
-    better = bounded_step(rows, residual, x, prior[2], prior[3])
+    better = bounded_step(rows, residual, x, prior[2], prior[3], damping)
     longest = 0.0
     for j in range(size):
         longest = max(longest, abs(better[j] - x[j]) / prior[1, j])
@@ -144,6 +150,7 @@ def improve(
 
 _DIFFERENCE = 1e-6  # of a control
 _GRID = 5  # points of each control, where the base's stride fails
+_LESS = 0.1  # of the damping, after a step that lowers the cost; after another one as much more
 _CLOSE = 0.03  # a step this short, in units of change, is the last: what it leaves is its square
 
 
@@ -155,7 +162,7 @@ class Prior:
         controls: (NUM_SLOTS,) u by Slot; those that are not free stay.
         slots: the f free ones.
         table: (4, f) of these: their values, changes that count as 1, lower and upper bounds.
-        rounds: Gauss-Newton steps.
+        rounds: Gauss-Newton steps; as many more may be tried again, shorter.
     """
 
     controls: Array
@@ -255,37 +262,36 @@ def solve_stride(
     u = prior.controls.copy()
     wish, errors = np.array([aim, tolerance])
     here, by_state = np.empty(0), np.empty((len(wish), 0))  # the state is what it is
-    x = prior.base
-    best: tuple[float, Array, Array] | None = None
-    for number in range(prior.rounds + 1):
+    x, damping, least = prior.base, 0.0, np.inf
+    best: tuple[Array, ...] | None = None
+    left = prior.rounds + 1
+    for number in range(2 * prior.rounds + 1):
         u[prior.slots] = x
         end, jacobian, outcome = stride.slopes(u)
-        if outcome is not Outcome.SECTION:
-            if best is not None:
-                x = 0.5 * (x + best[1])
-            elif number == 0:
-                x = _from_grid(stride, aim, prior, tolerance)
-            else:
+        cost, less = np.inf, _LESS * damping if damping > _LESS else 0.0
+        if outcome is Outcome.SECTION:
+            tried = (here, x, end, by_state, jacobian)
+            cost, longest, x, _ = improve(tried, here, wish, errors, prior.table, less)
+        elif best is None:
+            if number:
                 break
+            x = _from_grid(stride, aim, prior, tolerance)
             continue
-        linear = here, x, end, by_state, jacobian
-        cost, longest, there, _ = improve(linear, here, wish, errors, prior.table)
-        if best is not None and cost >= best[0]:
-            x = 0.5 * (x + best[1])
-            continue
-        best = (cost, x, end)
+        if cost < least:
+            best, least, damping, left = tried, cost, less, left - 1
+        else:
+            damping = max(damping / _LESS, 1.0)
+            _, longest, x, _ = improve(best, here, wish, errors, prior.table, damping)
+        if left == 0:
+            break
         if longest < _CLOSE:
-            u[prior.slots] = there
+            u[prior.slots] = x
             end, outcome = stride.at(u)
             if outcome is Outcome.SECTION:
                 return u, end
             break
-        x = there
-    if best is None:
-        u[prior.slots] = prior.base
-        return u, None
-    u[prior.slots] = best[1]
-    return u, best[2]
+    u[prior.slots] = prior.base if best is None else best[1]
+    return u, None if best is None else best[2]
 
 
 def _from_grid(stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array) -> Array:
@@ -376,7 +382,7 @@ class NearbyStrides:
         self, linear: Linear, z: Array, aim: Array, prior: Prior
     ) -> tuple[Array, Array] | None:
         """On the derivatives of a solution that is known; None where they do not hold."""
-        _, turn, x, end = improve(tuple(linear), z, aim, self.tolerance, prior.table)
+        _, turn, x, end = improve(tuple(linear), z, aim, self.tolerance, prior.table, 0.0)
         if turn > _TURN:
             return None
         u = prior.controls.copy()

@@ -89,7 +89,7 @@ def step_search() -> None:
 def catch() -> None:
     """The planner of the run that a walk breaks into."""
     one, square, prior = np.ones(1), np.ones((1, 1)), np.ones((4, 1))
-    improve((one, one, one, square, square), one, one, one, prior)
+    improve((one, one, one, square, square), one, one, one, prior, 0.0)
     leg_bounds(np.ones(2), np.ones(3), (0.0, 1.0), 1.0, (1.0, 1.0, 1.0), (0.0, 1.0))
 
 

@@ -78,6 +78,19 @@ def test_no_control_near_by_is_cheaper(faster, higher, seed):
     assert cost(other, aim, its) > cost(u, aim, its) * (1.0 - 1e-3) - 1e-9
 
 
+@pytest.mark.parametrize("speed", [2.19, 2.2275, 2.2525, 2.29])
+def test_a_brake_is_found_where_whole_steps_fail(speed):
+    # Halved steps ended at fifty times the cost: the run came to its walk too fast, and fell.
+    aim, start = np.array([speed - 0.35, 0.9784]), np.array([speed, 0.9748])
+    base = running_gait(P, 1.85).controls[SLOTS]
+    change = np.array([0.03, 0.3 * base[1], 0.3 * base[2]])
+    low, high = base * [0.0, 0.4, 0.4], base * [0.0, 2.5, 2.5]
+    low[0], high[0] = base[0] - 0.1, min(base[0] + 0.1, np.arcsin(start[1]) - 0.005)
+    its = Prior(GAIT.controls.copy(), SLOTS, np.array([base, change, low, high]), 10)
+    _, end = solve_stride(FromSection(STEP, start, SLOTS), aim, its, TOLERANCE)
+    assert np.all(np.abs(end - aim) < [0.06, 0.002])
+
+
 def test_differences_agree_with_exact_derivatives():
     def ahead(u):
         return STEP.step(GAIT.apex, u)
@@ -122,7 +135,7 @@ def test_a_grid_is_tried_where_the_base_fails_and_none_is_said_where_it_does_too
     np.testing.assert_array_equal(u[SLOTS], base)
 
 
-def test_it_halves_a_step_that_goes_where_the_stride_fails():
+def test_it_shortens_a_step_that_goes_where_the_stride_fails():
     def ahead(u):
         value = u[Slot.K_SC] / GAIT.controls[Slot.K_SC]
         return np.array([value]), Outcome.SECTION if value < 1.2 else Outcome.FALL
@@ -140,7 +153,7 @@ def test_a_bounded_step_stays_and_no_free_one_is_better(seed):
     rows, residual = rng.normal(size=(5, 3)), rng.normal(size=5)
     lower, upper = -rng.uniform(0.0, 1.0, 3), rng.uniform(0.0, 1.0, 3)
     x = rng.uniform(lower, upper)
-    there = bounded_step(rows, residual, x, lower, upper)
+    there = bounded_step(rows, residual, x, lower, upper, 0.0)
     assert np.all((there >= lower) & (there <= upper))
     size = np.linalg.norm(rows @ (there - x) + residual)
     # Along what is not at a bound no change helps.
