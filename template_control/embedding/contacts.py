@@ -1,4 +1,4 @@
-"""Contact state of the feet: flags of the sensors, checked against walls and the path.
+"""State of the contacts: flags of the sensors, checked against walls and the path.
 
 This is the only place where contact flags are judged. Everything in the controller that asks
 whether a foot stands reads :attr:`ContactMonitor.standing`.
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
+from template_control.robot.biped import SINGLE
+from template_control.robot.terms import LEGS, MOST_CONTACTS
 from template_control.slip.similarity import TIME, tuned
 
 Array = NDArray[np.float64]
@@ -54,11 +56,14 @@ CONTACTS = np.dtype(
         ("least", _F),  # horizontal force that a wall has at least [N]
         ("doubt", _F),  # [s], of the options
         ("linger", _F),  # [s], of the options
-        ("expected", _I, (2,)),  # by foot: IN_AIR, ON_GROUND or DUE
-        ("flags", _I, (2,)),  # of the last tick; 0 where a wall is pressed
-        ("held", _F, (2,)),  # time that each flag has been as it is [s]
-        ("wall", _F, (2,)),  # time that each foot's wall still counts [s]
-        ("standing", np.uint8, (2,)),  # whether each foot is on ground to stand on
+        ("expected", _I, (LEGS,)),  # by foot: IN_AIR, ON_GROUND or DUE
+        ("contacts", _I),  # number of them
+        ("foot", _I, (MOST_CONTACTS,)),  # that each contact is of
+        ("flags", _I, (MOST_CONTACTS,)),  # of the last tick; 0 where a wall is pressed
+        ("held", _F, (MOST_CONTACTS,)),  # time that each flag has been as it is [s]
+        ("touching", np.uint8, (MOST_CONTACTS,)),  # whether each contact is on ground to stand on
+        ("wall", _F, (LEGS,)),  # time that each foot's wall still counts [s]
+        ("standing", np.uint8, (LEGS,)),  # whether each foot stands: on one contact at least
     ],
     align=True,
 )
@@ -75,44 +80,58 @@ NO_FORCE: Array = np.zeros((0, 0))
 def update_contacts(c: Any, flags: NDArray[np.bool_], force: Array, dt: float) -> None:
     """Take in the flags of a tick.
 
-    ``c``, of ``CONTACTS``, is overwritten but for ``expected``. ``flags`` (2,) say whether each
-    foot touches anything, ``force`` (2, d) is on each foot, forward first and up last [N];
+    ``c``, of ``CONTACTS``, is overwritten but for ``expected``. ``flags`` (n,) say whether each
+    contact touches anything, ``force`` (n, d) is on each, forward first and up last [N];
     ``NO_FORCE``: walls are not looked for. ``dt`` is since the last tick [s].
     """
-    for foot in range(2):
-        flag = 1 if flags[foot] else 0
+    for foot in range(LEGS):
+        c.standing[foot] = 0
+        c.wall[foot] -= dt
+    for i in range(c.contacts):
+        flag, foot = 1 if flags[i] else 0, c.foot[i]
         if force.shape[0] > 0:
-            along, up = force[foot, 0], force[foot, force.shape[1] - 1]
-            presses = abs(along) > max(c.least, _STEEPNESS * up)
-            c.wall[foot] = c.linger if presses and along < 0.0 else c.wall[foot] - dt
-            if presses:
+            along, up = force[i, 0], force[i, force.shape[1] - 1]
+            if abs(along) > max(c.least, _STEEPNESS * up):
                 flag = 0
-        c.held[foot] = c.held[foot] + dt if flag == c.flags[foot] else dt
-        c.flags[foot] = flag
-        expected = c.expected[foot]
-        if expected in (DUE, flag) or c.held[foot] >= c.doubt:
-            c.standing[foot] = flag
+                if along < 0.0:
+                    c.wall[foot] = c.linger
+        c.held[i] = c.held[i] + dt if flag == c.flags[i] else dt
+        c.flags[i] = flag
+        if c.expected[foot] in (DUE, flag) or c.held[i] >= c.doubt:
+            c.touching[i] = flag
+        if c.touching[i]:
+            c.standing[foot] = 1
 
 
 class ContactMonitor:
-    """Debounced contact state of both feet, of which ``standing`` (2,) are on ground to stand on.
+    """Debounced state of the contacts; ``standing`` (2,) says which feet are on ground.
 
     A flag that says what the path expects of its foot is believed at once: a foot stands, is in the
     air, or is due to land, where either flag is expected. Any other flag is believed after
-    ``ContactOptions.doubt``. A foot pressed against a wall does not stand. ``weight`` is the
-    robot's [N]; ``data`` (1,) are of ``CONTACTS``, own memory if not given.
+    ``ContactOptions.doubt``. A foot pressed against a wall does not stand; one of several contacts
+    stands on one of them. ``weight`` is the robot's [N], ``groups`` are the contacts of either
+    foot; ``data`` (1,) are of ``CONTACTS``, own memory if not given.
     """
 
-    def __init__(self, options: ContactOptions, weight: float, data: Any = None) -> None:
+    def __init__(
+        self,
+        options: ContactOptions,
+        weight: float,
+        data: Any = None,
+        groups: Sequence[Sequence[int]] = SINGLE,
+    ) -> None:
         self.data = np.zeros(1, CONTACTS) if data is None else data
         now = self.data[0]
+        now["contacts"] = sum(map(len, groups))
+        for foot, group in enumerate(groups):
+            now["foot"][list(group)] = foot
         now["least"], now["doubt"], now["linger"] = _FORCE * weight, options.doubt, options.linger
         self.standing: NDArray[np.bool_] = self.data["standing"][0].view(bool)
         self.begin()
 
     def begin(self) -> None:
         """Forget an earlier run; no foot is said to stand yet."""
-        for name in ("standing", "wall", "flags", "held"):
+        for name in ("standing", "touching", "wall", "flags", "held"):
             self.data[name] = 0
 
     def blocked(self, foot: int) -> bool:

@@ -42,6 +42,7 @@ from template_control.embedding.tick import (
     feel_in_space,
     fired_edge,
     sense,
+    stand,
 )
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
@@ -125,7 +126,7 @@ class EmbeddingController:
         com = self.references.com
         self.path_clock = PathClock(self.parameters, o.replan, com, tick["path"])
         weight = robot.mass * robot.gravity
-        self.contacts = ContactMonitor(o.contacts, weight, tick["contacts"])
+        self.contacts = ContactMonitor(o.contacts, weight, tick["contacts"], robot.groups)
         standing = self.contacts.standing
         self.observer = StateObserver(robot, self.feet, standing, com[4:], tick["sensed"])
         self._guards = RobotGuards(self.parameters, o.guards, tick["guards"])
@@ -264,9 +265,9 @@ class EmbeddingController:
         Args:
             q: (nq,) measured configuration.
             v: (nv,) measured velocity.
-            contact: (2,) whether each foot touches the ground, as its sensor says.
+            contact: (n,) whether each contact touches the ground, as its sensor says.
             dt: control period [s].
-            force: (2, d) the ground's force on each foot, forward first and up last [N], by which
+            force: (n, d) the ground's force on each, forward first and up last [N], by which
                 a foot in the air shows a wall, and one that slides how slippery the ground is;
                 None: they show neither. Feet that also swing sideways show no walls.
 
@@ -313,6 +314,7 @@ class EmbeddingController:
         """Write the plan to where ticks read it."""
         now = self._tick[0]
         self.path_clock.take(self.supervisor)
+        stand(self._tick, self.robot.data, *self._memory)
         now["tilt"], now["trim"] = self.frame.angle, self.learners.trim.acceleration
         sideways = None if self.lateral is None else self.lateral.arrays(self.supervisor)
         self._path: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
@@ -320,7 +322,7 @@ class EmbeddingController:
     def _act(self, dt: float) -> Solution:
         """References, rows and torques."""
         qp, tasks = self.qp, self.mode.tasks
-        room = qp.room(len(self.mode.stance), self.learners.load.factor)
+        room = qp.room(int(qp.data["contacts"][0]), self.learners.load.factor)
         parts = self._tick, self._terms, *self._memory, *self._path
         rows = tasks.program, tasks.table, dt
         if tasks.others:

@@ -115,7 +115,9 @@ class EmbeddingOptions(QpOptions):
 def _with_numbers(task: Task, numbers: Mapping[str, Any], where: str) -> Task:
     """A task with some of its numbers replaced."""
     known: list[str] = (
-        [f.name for f in fields(task) if f.name != "leg"] if is_dataclass(task) else []
+        [f.name for f in fields(task) if f.name not in ("leg", "contact")]
+        if is_dataclass(task)
+        else []
     )
     for name in numbers:
         if name not in known:

@@ -41,7 +41,7 @@ from template_control.embedding.swing import (
     quintic_step,
     swing_step,
 )
-from template_control.robot.terms import UP
+from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.problem import solve_free
 from template_control.whole_body.tasks import write_rows
@@ -93,8 +93,8 @@ def sense(
 ) -> int:
     """Take in what was measured, and find out whether anything is to be decided.
 
-    ``tick``, ``data``, ``references``, ``qp``: see the module. ``contact`` (2,) says whether each
-    foot touches the ground, ``force`` (2, 2) is the ground's on each foot, forward and up [N], or
+    ``tick``, ``data``, ``references``, ``qp``: see the module. ``contact`` (n,) says whether each
+    contact touches the ground, ``force`` (n, 2) is the ground's on each, forward and up [N], or
     ``NO_FORCE``; ``dt`` is the control period [s].
     """
     t, r = tick[0], data[0]
@@ -102,7 +102,7 @@ def sense(
     update_contacts(t.contacts, contact, force, dt)
     if force.shape[0] > 0:
         feel_friction(tick, data, qp, force, dt)
-    for foot in range(2):
+    for foot in range(LEGS):
         t.feet.swing_time[foot] += dt
     for leg in range(t.mode.stances):
         foot = t.feet.roles[leg]
@@ -110,10 +110,34 @@ def sense(
             t.lateral.stood[foot, k] = r.foot_position[foot, k]
     if not read_state(t.sensed, t.feet, r, t.mode):
         return DIVERGED
+    stand(tick, data, references, qp)
     if fired_edge(tick) >= 0:
         return EVENTFUL
     speed, reference = t.sensed.state[2], references[0].com[2]
     return EVENTFUL if plan_is_due(t.path, t.mode, speed, reference, t.time) else QUIET
+
+
+@compiled
+def stand(tick: Any, data: Any, references: Any, qp: Any) -> None:
+    """Write which contacts the QP has on the ground; arguments: see the module.
+
+    A foot stands on those of its contacts that touch the ground; one none of which does, as its
+    sensors say, on all of them.
+    """
+    t, r, want, p = tick[0], data[0], references[0], qp[0]
+    p.contacts = 0
+    for i in range(r.contacts):
+        want.stands[i] = 0
+    for leg in range(t.mode.stances):
+        foot = t.feet.roles[leg]
+        lifted = True
+        for i in range(r.members[foot]):
+            lifted = lifted and not t.contacts.touching[r.group[foot, i]]
+        for i in range(r.members[foot]):
+            contact = r.group[foot, i]
+            if lifted or t.contacts.touching[contact]:
+                p.contact[p.contacts], want.stands[contact] = contact, 1
+                p.contacts += 1
 
 
 @compiled
@@ -140,13 +164,13 @@ def feel_friction(tick: Any, data: Any, qp: Any, force: Array, dt: float) -> Non
     ``tick``, ``data``, ``qp``: see the module; the rest as for :func:`.feel_slides`.
     """
     t = tick[0]
-    if feel_slides(t.slides, t.contacts.standing, force, data[0].foot_velocity, dt):
+    if feel_slides(t.slides, t.contacts.touching, force, data[0].contact_velocity, dt):
         qp[0].friction = t.friction_margin * t.slides.coefficient
 
 
 @compiled
 def feel_in_space(tick: Any, data: Any, qp: Any, force: Array, axes: Array, dt: float) -> None:
-    """As :func:`feel_friction`, of forces (2, 3) in the world's axes [N].
+    """As :func:`feel_friction`, of forces (n, 3) in the world's axes [N].
 
     ``axes`` (3, 3) are a floating-base robot's.
     """
@@ -191,14 +215,14 @@ def advance(
     want.com_now[0] -= s.toes[0]
     want.com_push = t.trim if mode.trim_momentum else 0.0
     want.pitch = advance_lean(t.lean, r.attitude[1] - t.tilt, dt) + t.tilt
-    for leg in range(2):
+    for leg in range(LEGS):
         want.feet[leg] = t.feet.roles[leg]
+    _bear(t, r, qp[0], want, arrays[4].shape[1])
     write_rows(program, data, arrays, references, table)
     if mode.estimate_load:
         observe_load(t.load, want.lift, dt)
     predict_velocity(s, want.com[4:], dt)
     t.time += dt
-    _stand(t, r, qp[0], arrays[4].shape[1])
 
 
 @compiled
@@ -300,18 +324,25 @@ def _turn(t: Any, want: Any, dt: float) -> None:
 
 
 @compiled
-def _stand(t: Any, r: Any, qp: Any, directions: int) -> None:
-    """Write the feet on the ground, the template's forces on them, and how far they unload."""
-    mode, forces = t.mode, t.path.forces
-    qp.feet = mode.stances
+def _bear(t: Any, r: Any, qp: Any, want: Any, directions: int) -> None:
+    """Write the template's forces on the contacts that stand, and how far they unload.
+
+    Those of a foot share the leg's force.
+    """
+    mode, forces, at = t.mode, t.path.forces, 0
     for leg in range(mode.stances):
-        foot = t.feet.roles[leg]
-        qp.foot[leg], qp.cap[leg] = foot, np.inf
-        if mode.unloads[leg]:
-            qp.cap[leg] = unload_cap(forces[leg, 1], r.mass * r.gravity)
-        qp.force[leg, 0], qp.force[leg, directions - 1] = forces[leg, 0], forces[leg, 1]
-        if directions > UP:
-            # In space a leg's force points at the CoM sideways too.
-            away = r.com[_SIDE] - r.foot_position[foot, _SIDE]
-            up = r.com[UP] - r.foot_position[foot, UP]
-            qp.force[leg, _SIDE] = forces[leg, 1] * away / up
+        foot, share = t.feet.roles[leg], 0
+        for i in range(r.members[foot]):
+            share += want.stands[r.group[foot, i]]
+        for _ in range(share):
+            qp.cap[at] = np.inf
+            if mode.unloads[leg]:
+                qp.cap[at] = unload_cap(forces[leg, 1], r.mass * r.gravity) / share
+            qp.force[at, 0] = forces[leg, 0] / share
+            qp.force[at, directions - 1] = forces[leg, 1] / share
+            if directions > UP:
+                # In space a leg's force points at the CoM sideways too.
+                away = r.com[_SIDE] - r.foot_position[foot, _SIDE]
+                up = r.com[UP] - r.foot_position[foot, UP]
+                qp.force[at, _SIDE] = forces[leg, 1] * away / up / share
+            at += 1

@@ -223,7 +223,7 @@ class NoiseFilter:
         self._options = options
         self._base, self._joints = _Pair(deviation), _Pair(deviation)
         self._state: tuple[Array, Array] | None = None
-        self._contact = np.zeros(2, dtype=bool)
+        self._contact = np.zeros(len(robot.feet), dtype=bool)
         self._landed = np.inf
 
     def update(
@@ -238,7 +238,7 @@ class NoiseFilter:
         Args:
             measured: (nq,) configuration and (nv,) velocity.
             acceleration: (nv,) that the whole-body QP expects since the tick before.
-            contact: (2,) whether each foot touches the ground.
+            contact: (n,) whether each contact touches the ground.
             dt: since then [s].
 
         Returns:

@@ -20,12 +20,19 @@ from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
+SINGLE = ((0,), (1,))
+"""Groups of a biped with point feet: each contact is a foot."""
+
 _BENT = np.array([-0.4, 0.8])  # of hip and knee [rad]
 _SAGITTAL = {2: 1, 3: UP}  # by directions: from forward to up
 
 
 class Biped(Robot):
-    """A biped with point feet, and its kinematics and dynamics at the last :meth:`update`.
+    """A robot on two template legs, and its kinematics and dynamics at the last :meth:`update`.
+
+    It touches the ground at *contacts*, the lowest points of its foot spheres. A leg of the
+    template is a group of contacts, and its foot is their mean. A biped with point feet has two
+    groups of one; of a quadruped that trots either diagonal pair is a virtual leg (Raibert).
 
     Sagittal quantities have two entries, x forward and y up: of a planar robot in the world, of a
     free one in its heading frame.
@@ -36,7 +43,8 @@ class Biped(Robot):
         path: the URDF file.
         urdf: its text, as Pinocchio and PyBullet load it.
         model: the Pinocchio model.
-        feet: names of the two foot frames, left then right.
+        feet: names of the contacts' frames; of a biped left then right.
+        groups: the contacts of each of the two template legs.
         foot_radius: radius of the foot spheres [m].
         walk: touchdown angle [rad] and speed at VLO over sqrt(g l0) of its default gait, or
             None where none is better than the library's.
@@ -54,11 +62,14 @@ class Biped(Robot):
         angular_momentum: about the CoM, forward pitch positive [kg m^2/s].
         angular_momentum_jacobian: (nv,) its row of the centroidal momentum matrix.
         angular_momentum_bias: that row's time derivative times v [N m].
-        foot_position: (2, 2) lowest point of each foot sphere [m].
-        foot_velocity: (2, 2) of the material point there [m/s].
+        contact_position: (n, d) lowest point of each foot sphere, in all ``directions`` [m].
+        contact_velocity: (n, d) of the material point there [m/s].
+        contact_jacobian: (n, d, nv) maps v to each contact's velocity.
+        contact_bias: (n, d) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
+        foot_position: (2, 2) of each template leg's foot, the mean of its contacts [m].
+        foot_velocity: (2, 2) [m/s].
         foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
-        foot_bias: (2, 2) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
-        contact_velocity, contact_jacobian, contact_bias: of each foot in all ``directions``.
+        foot_bias: (2, 2) dJ/dt v of these Jacobians [m/s^2].
         hips: (2,) the point the legs hang from [m].
         hip_speed: its forward velocity [m/s].
         pitch, pitch_rate: of the trunk in the sagittal plane [rad, rad/s].
@@ -66,7 +77,8 @@ class Biped(Robot):
 
     path: Path
     urdf: str
-    feet: tuple[str, str]
+    feet: tuple[str, ...]
+    groups: tuple[tuple[int, ...], ...]
     foot_radius: float
     walk: tuple[float, float] | None
     legs: tuple[tuple[int, ...], ...]
@@ -83,8 +95,7 @@ class Biped(Robot):
     angular_momentum_bias = Number("momentum_bias", 1)
     foot_position: Array
     foot_velocity: Array
-    foot_jacobian: Array
-    foot_bias: Array
+    contact_position: Array
     contact_velocity: Array
     contact_jacobian: Array
     contact_bias: Array
@@ -98,14 +109,19 @@ class Biped(Robot):
         path: Path,
         urdf: str,
         model: pin.Model,
-        feet: tuple[str, str],
+        feet: tuple[str, ...],
         foot_radius: float,
         walk: tuple[float, float] | None = None,
+        *,
+        groups: tuple[tuple[int, ...], ...] = SINGLE,
     ) -> None:
-        super().__init__(model)
+        super().__init__(model, len(feet))
         first = 1 + self.base_joints
         self.path, self.urdf = path, urdf
-        self.feet, self.foot_radius, self.walk = feet, foot_radius, walk
+        self.feet, self.foot_radius, self.walk, self.groups = feet, foot_radius, walk, groups
+        now = self.data[0]
+        for leg, group in enumerate(groups):
+            now["members"][leg], now["group"][leg, : len(group)] = len(group), group
         self._foot_ids = tuple(foot_frame(model, foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
@@ -131,15 +147,32 @@ class Biped(Robot):
         )
         self.com_jacobian = j.com[::step]
         self.angular_momentum_jacobian = j.momentum[len(j.momentum) // 2]
-        self.foot_position, self.foot_velocity, self.foot_bias = (
-            now[name][0, :, ::UP] for name in ("foot_position", "foot_velocity", "foot_bias")
+        self.foot_position, self.foot_velocity = (
+            now[name][0, :, ::UP] for name in ("foot_position", "foot_velocity")
         )
-        self.foot_jacobian = j.contact[:, ::step]
-        every = UP // step
-        self.contact_velocity = now["foot_velocity"][0, :, ::every]
-        self.contact_bias = now["foot_bias"][0, :, ::every]
+        contacts, every = len(self.feet), UP // step
+        self.contact_position, self.contact_velocity, self.contact_bias = (
+            now[f"contact_{name}"][0, :contacts, ::every]
+            for name in ("position", "velocity", "bias")
+        )
         self.contact_jacobian = j.contact
         self.hips = now["hips"][0, ::UP]
+
+    @property
+    def foot_jacobian(self) -> Array:
+        """See the class."""
+        return self._means(self.contact_jacobian[:, :: _SAGITTAL[self.directions]])
+
+    @property
+    def foot_bias(self) -> Array:
+        """See the class."""
+        return self._means(self.contact_bias[:, :: _SAGITTAL[self.directions]])
+
+    def _means(self, values: Array) -> Array:
+        """(2, ...) means over the groups of contacts; views of contacts that are feet."""
+        if self.groups == SINGLE:
+            return values
+        return np.array([values[list(group)].mean(axis=0) for group in self.groups])
 
     def changed(
         self, gravity: float | None = None, masses: Mapping[str, float] | None = None
@@ -159,7 +192,8 @@ class Biped(Robot):
             model = self._model_of(self.path, urdf)
             add_feet(self.path, urdf, model, self.feet)
         model.gravity.linear = np.array([0.0, 0.0, -(gravity or self.gravity)])
-        return type(self)(self.path, urdf, model, self.feet, self.foot_radius, self.walk)
+        rest = self.feet, self.foot_radius, self.walk
+        return type(self)(self.path, urdf, model, *rest, groups=self.groups)
 
     @staticmethod
     @abstractmethod
@@ -170,23 +204,22 @@ class Biped(Robot):
     def _prepare(self) -> None:
         """Make what :meth:`update` reads and writes."""
 
-    def _compute(self, q: Array, v: Array) -> tuple[Array, Array]:
+    def _compute(self, q: Array, v: Array) -> tuple[Array, ...]:
         """Let Pinocchio compute all at (q, v).
 
         Returns:
-            Of each foot's frame the (6,) classical acceleration dJ/dt v, linear then angular, in
+            Of each contact's frame the (6,) classical acceleration dJ/dt v, linear then angular, in
             the world's axes [m/s^2, rad/s^2].
         """
         model, data = self.model, self._data
         pin.computeAllTerms(model, data, q, v)
         pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
-        left, right = self._foot_ids
-        pin.updateFramePlacement(model, data, left)
-        pin.updateFramePlacement(model, data, right)
-        return (
-            pin.getFrameClassicalAcceleration(model, data, left, WORLD_ALIGNED).vector,
-            pin.getFrameClassicalAcceleration(model, data, right, WORLD_ALIGNED).vector,
-        )
+        drift = []
+        for frame in self._foot_ids:
+            pin.updateFramePlacement(model, data, frame)
+            bias = pin.getFrameClassicalAcceleration(model, data, frame, WORLD_ALIGNED)
+            drift.append(bias.vector)
+        return tuple(drift)
 
     def neutral(self) -> Array:
         """(nq,) upright, with straight vertical legs."""

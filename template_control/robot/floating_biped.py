@@ -73,9 +73,10 @@ class SpaceTerms(NamedTuple):
         momentum: (3,) angular, about the CoM [N m s].
         momentum_jacobian: (3, nv).
         momentum_bias: (3,) [N m].
-        foot: (2, 3) lowest points of the feet [m].
-        foot_jacobian: (2, 3, nv).
-        foot_bias: (2, 3) [m/s^2].
+        foot: (2, 3) of the template legs' feet, the means of their contacts [m].
+        contact: (n, 3) lowest points of the foot spheres [m].
+        contact_jacobian: (n, 3, nv).
+        contact_bias: (n, 3) [m/s^2].
         turning: (3,) angular velocity of the trunk [rad/s].
         turning_jacobian: (3, nv); its bias is 0.
     """
@@ -88,8 +89,9 @@ class SpaceTerms(NamedTuple):
     momentum_jacobian: Array
     momentum_bias: Array
     foot: Array
-    foot_jacobian: Array
-    foot_bias: Array
+    contact: Array
+    contact_jacobian: Array
+    contact_bias: Array
     turning: Array
     turning_jacobian: Array
 
@@ -106,8 +108,9 @@ class SpaceTerms(NamedTuple):
             momentum_jacobian=j.momentum,
             momentum_bias=now["momentum_bias"],
             foot=now["foot_position"],
-            foot_jacobian=j.contact,
-            foot_bias=now["foot_bias"],
+            contact=now["contact_position"][: len(j.contact)],
+            contact_jacobian=j.contact,
+            contact_bias=now["contact_bias"][: len(j.contact)],
             turning=now["turning"],
             turning_jacobian=j.turning,
         )
@@ -150,10 +153,9 @@ class FloatingBaseBiped(Biped):
         model, data = self.model, self._data
         self.rotation: Array = data.oMi[_ROOT].rotation
         self._hips = [data.oMi[leg[-HINGES]] for leg in self._leg_joints]
-        self._in_leg = np.zeros((2, 3))
-        left, right = self._hips
-        places = (left.translation, right.translation, left.rotation, right.rotation)
-        self._trunk = tuple(Trunk(self.rotation, *places, self._in_leg))
+        self._in_leg = np.zeros((len(self._hips), 3))
+        places, axes = zip(*((hip.translation, hip.rotation) for hip in self._hips), strict=True)
+        self._trunk = tuple(Trunk(self.rotation, places, axes, self._in_leg))
         self.space = SpaceTerms.of(self.data, self.jacobians)
         self._frame = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
         self.axes = np.eye(3)

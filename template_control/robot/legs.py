@@ -133,7 +133,7 @@ def leg_joints(model: pin.Model, feet: Sequence[str], base_joints: int) -> list[
 
 
 def carrying(model: pin.Model, frames: Sequence[int]) -> Array:
-    """(2, nv) of the feet: 1 where a velocity moves the foot, else 0."""
+    """(n, nv) of n feet: 1 where a velocity moves the foot, else 0."""
     carries = np.zeros((len(frames), model.nv))
     for row, frame in zip(carries, frames, strict=True):
         for joint in model.supports[model.frames[frame].parentJoint]:

@@ -71,7 +71,7 @@ class Robot(ABC):
     fastest = Number("fastest")
     soonest_stop = Number("soonest_stop")
 
-    def __init__(self, model: pin.Model) -> None:
+    def __init__(self, model: pin.Model, contacts: int = 0) -> None:
         self.model, self.name = model, model.name or "the robot"
         self.nq, self.nv = model.nq, model.nv
         self.mass = float(pin.computeTotalMass(model))
@@ -86,7 +86,8 @@ class Robot(ABC):
         self._data = data = model.createData()
         self.data = np.zeros(1, ROBOT_DATA)
         self.data["mass"], self.data["gravity"] = self.mass, self.gravity
-        self.jacobians = j = Jacobians.zeros(data, self.directions, self.base_dof)
+        self.data["contacts"] = contacts
+        self.jacobians = j = Jacobians.zeros(data, self.directions, self.base_dof, contacts)
         self.arrays = tuple(j)
         self.mass_matrix, self.nonlinear_effects = j.mass_matrix, j.nonlinear_effects
         self.joint_angle, self.joint_velocity = j.joints

@@ -294,7 +294,8 @@ def _floating_configuration(
 
     def error(_: Array) -> Array:
         turn = pin.log3(robot.rotation @ upright.T)
-        return np.concatenate((robot.space.com - pose.com, turn, (robot.space.foot - feet).ravel()))
+        away = robot.space.contact - feet
+        return np.concatenate((robot.space.com - pose.com, turn, away.ravel()))
 
     def step(q: Array, error: Array) -> Array:
         rows, r = _rows(robot), robot.foot_radius
@@ -311,7 +312,7 @@ def _floating_configuration(
 def _rows(robot: FloatingBaseBiped) -> Array:
     """(12, nv) Jacobians of the CoM, the trunk's turning and both feet."""
     s = robot.space
-    feet = s.foot_jacobian.reshape(-1, robot.nv)
+    feet = s.contact_jacobian.reshape(-1, robot.nv)
     return np.concatenate((s.com_jacobian, s.turning_jacobian, feet))
 
 

@@ -26,6 +26,12 @@ PLANAR_DOF = 3
 FLOATING_DOF = 6
 """Degrees of freedom of a floating base."""
 
+LEGS = 2
+"""Legs of the template, each a group of a robot's contacts."""
+
+MOST_CONTACTS = 8
+"""Contacts that a robot may have: room for as many is in the memory that compiled code shares."""
+
 UP = 2
 """Index of the vertical direction; 0 is forward, 1 to the left."""
 
@@ -38,18 +44,23 @@ ROBOT_DATA = np.dtype(
         ("gravity", _F),  # [m/s^2]
         ("foot_radius", _F),  # of the foot spheres [m]
         ("leg_length", _F),  # from hip to the foot sphere's centre with a straight knee [m]
+        ("contacts", _I),  # number of points that may touch the ground
+        ("members", _I, (LEGS,)),  # number of contacts in the group of each template leg
+        ("group", _I, (LEGS, MOST_CONTACTS)),  # which
         ("spare", _I),  # number of spare joints
-        ("spare_joint", _I, (2,)),  # their indices among the actuated joints
-        ("spare_angle", _F, (2,)),  # where they rest [rad]
+        ("spare_joint", _I, (LEGS,)),  # their indices among the actuated joints
+        ("spare_angle", _F, (LEGS,)),  # where they rest [rad]
         # -- at the last update: forward, left, up; a planar robot's left is 0 --
         ("com", _F, (3,)),  # centre of mass [m]
         ("com_velocity", _F, (3,)),  # [m/s]
         ("com_bias", _F, (3,)),  # dJ/dt v of its Jacobian [m/s^2]
         ("momentum", _F, (3,)),  # angular, about the CoM, by axis: pitch is 1 [N m s]
         ("momentum_bias", _F, (3,)),  # dA/dt v of its matrix [N m]
-        ("foot_position", _F, (2, 3)),  # lowest points of the foot spheres [m]
-        ("foot_velocity", _F, (2, 3)),  # of the material points there [m/s]
-        ("foot_bias", _F, (2, 3)),  # dJ/dt v of their Jacobians, for rolling feet [m/s^2]
+        ("contact_position", _F, (MOST_CONTACTS, 3)),  # lowest points of the spheres [m]
+        ("contact_velocity", _F, (MOST_CONTACTS, 3)),  # of the material points there [m/s]
+        ("contact_bias", _F, (MOST_CONTACTS, 3)),  # dJ/dt v of their Jacobians, rolling [m/s^2]
+        ("foot_position", _F, (LEGS, 3)),  # of each template leg: the mean of its contacts [m]
+        ("foot_velocity", _F, (LEGS, 3)),  # the same [m/s]
         ("attitude", _F, (3,)),  # roll, pitch and yaw of the trunk [rad]
         ("turning", _F, (3,)),  # angular velocity of the trunk, by axis [rad/s]
         ("hips", _F, (3,)),  # the point the legs hang from [m]
@@ -70,7 +81,7 @@ class Jacobians(NamedTuple):
         nonlinear_effects: (nv,) C(q, v) v + g(q), and the joints' damping [N, N m].
         com: (d, nv) maps v to the CoM's velocity, d the directions.
         momentum: (1, nv) or (3, nv) angular momentum about the CoM: pitch, or all axes.
-        contact: (2, d, nv) maps v to each foot's velocity.
+        contact: (n, d, nv) maps v to each contact's velocity.
         turning: (0, nv) or (3, nv) angular velocity of a floating trunk; its bias is 0.
         joints: (2, nu) angles and velocities of the actuated joints [rad, rad/s].
     """
@@ -84,27 +95,27 @@ class Jacobians(NamedTuple):
     joints: Array
 
     @classmethod
-    def zeros(cls, data: Any, directions: int, base_dof: int) -> Jacobians:
+    def zeros(cls, data: Any, directions: int, base_dof: int, contacts: int) -> Jacobians:
         """All zero but for what Pinocchio writes; ``directions`` are those of a contact."""
         nv, axes = len(data.nle), 3 if directions > UP else 1
-        shapes = ((directions, nv), (axes, nv), (2, directions, nv), (axes // 3 * 3, nv))
+        shapes = ((directions, nv), (axes, nv), (contacts, directions, nv), (axes // 3 * 3, nv))
         found = [np.zeros(shape) for shape in (*shapes, (2, nv - base_dof))]
         return cls(data.M, data.nle, *found)
 
 
-Sources = tuple[Array, ...]
+Sources = tuple[Any, ...]
 """Views into Pinocchio's data: a plain tuple, with which a call takes half of the time."""
 
 
 def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array) -> Sources:
     """Views that :func:`gather_planar` reads in Pinocchio's data, which every update writes.
 
-    ``frames`` are the feet's; ``limits`` (4, nu) the joints' largest speeds [rad/s], lower and
+    ``frames`` are the contacts'; ``limits`` (4, nu) the joints' largest speeds [rad/s], lower and
     upper stops [rad], damping [N m s/rad].
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.g)
-    feet = tuple(data.oMf[frame].translation for frame in frames)
-    return (*whole, *feet, data.Jcom, data.Ag, data.J, carrying(model, frames), limits)
+    places = tuple(data.oMf[frame].translation for frame in frames)
+    return (*whole, places, data.Jcom, data.Ag, data.J, carrying(model, frames), limits)
 
 
 @compiled
@@ -150,21 +161,21 @@ def gather_joints(
 
 @compiled
 def gather_planar(
-    views: Sources, q: Array, v: Array, drift: tuple[Array, Array], data: Any, out: tuple[Any, ...]
+    views: Sources, q: Array, v: Array, drift: tuple[Array, ...], data: Any, out: tuple[Any, ...]
 ) -> bool:
     """Write the planar terms at the state that Pinocchio has last computed; True if it is finite.
 
     Args:
         views: from :func:`sources`.
         q, v: (nv,) the state.
-        drift: of each foot's frame the (6,) classical acceleration dJ/dt v, linear then angular, in
-            the world's axes [m/s^2, rad/s^2].
+        drift: of each contact's frame the (6,) classical acceleration dJ/dt v, linear then angular,
+            in the world's axes [m/s^2, rad/s^2].
         data: (1,) of ``ROBOT_DATA``, overwritten.
         out: of :class:`Jacobians`, as a plain tuple: ``nonlinear_effects``, ``com``, ``momentum``,
             ``contact`` and ``joints``, overwritten.
     """
-    centre, speed, pull, momentum, weight, left, right = views[:7]
-    com_jacobian, centroidal, jacobian, carries, limits = views[7:]
+    centre, speed, pull, momentum, weight, places = views[:6]
+    com_jacobian, centroidal, jacobian, carries, limits = views[6:]
     effects, jcom, jspin, contact, joints = out
     s = data[0]
     finite = gather_joints(q, v, limits, s, effects, joints)
@@ -175,19 +186,20 @@ def gather_planar(
         jcom[0, k], jcom[1, k] = com_jacobian[0, k], com_jacobian[2, k]
         jspin[0, k] = centroidal[4, k]
     r = s.foot_radius
-    for i in range(2):
-        place = left if i == 0 else right
+    for i in range(contact.shape[0]):
+        place = places[i]
         x, z = place[0], place[2]
-        s.foot_position[i, 0], s.foot_position[i, UP] = x, z - r
+        s.contact_position[i, 0], s.contact_position[i, UP] = x, z - r
         for k in range(q.shape[0]):
             turn = jacobian[4, k]
             # Rolling without slip: the material point below the sphere's centre is at rest.
             contact[i, 0, k] = (jacobian[0, k] + turn * z - r * turn) * carries[i, k]
             contact[i, 1, k] = (jacobian[2, k] - turn * x) * carries[i, k]
-        s.foot_bias[i, 0] = drift[i][0] - r * drift[i][4]
-        s.foot_bias[i, UP] = drift[i][2]
+        s.contact_bias[i, 0] = drift[i][0] - r * drift[i][4]
+        s.contact_bias[i, UP] = drift[i][2]
         moving = np.dot(contact[i], v)
-        s.foot_velocity[i, 0], s.foot_velocity[i, UP] = moving[0], moving[1]
+        s.contact_velocity[i, 0], s.contact_velocity[i, UP] = moving[0], moving[1]
+    _gather_feet(s)
     # The base coordinates' rows of C v are the rates of linear momentum and of the angular
     # momentum about the base at zero acceleration; move the latter to the CoM.
     force_x = effects[0] - weight[0]
@@ -200,22 +212,34 @@ def gather_planar(
     return finite
 
 
+@compiled
+def _gather_feet(s: Any) -> None:
+    """Write the means over the groups of contacts; a contact by itself is the foot, as it is."""
+    for leg in range(LEGS):
+        members = s.members[leg]
+        for k in range(3):
+            place, speed = 0.0, 0.0
+            for i in range(members):
+                contact = s.group[leg, i]
+                place += s.contact_position[contact, k]
+                speed += s.contact_velocity[contact, k]
+            s.foot_position[leg, k], s.foot_velocity[leg, k] = place / members, speed / members
+
+
 class Trunk(NamedTuple):
     """Views into Pinocchio's data of a floating base and its hips, and where they are.
 
     Attributes:
         rotation: (3, 3) of the trunk, to the world.
-        left, right: (3,) places of the hips' joints in the world [m].
-        left_axes, right_axes: (3, 3) of these joints.
-        points: (2, 3) of each hip's axis, from its joint, in the joint's axes: in the plane in
+        places: of each hip's joint, (3,) in the world [m].
+        axes: (3, 3) of each of these joints.
+        points: (n, 3) of each hip's axis, from its joint, in the joint's axes: in the plane in
             which the leg swings [m].
     """
 
     rotation: Array
-    left: Array
-    right: Array
-    left_axes: Array
-    right_axes: Array
+    places: tuple[Array, ...]
+    axes: tuple[Array, ...]
     points: Array
 
 
@@ -224,7 +248,7 @@ def gather_floating(
     views: Sources,
     q: Array,
     v: Array,
-    drift: tuple[Array, Array],
+    drift: tuple[Array, ...],
     data: Any,
     out: tuple[Any, ...],
     base: tuple[Any, ...],
@@ -235,8 +259,8 @@ def gather_floating(
     ``base`` (5,) is :class:`Trunk` as a plain tuple, of the heading frame: x and y of its origin in
     the world [m], cosine and sine of the heading, y of the trunk's hips from its origin [m].
     """
-    centre, speed, _, momentum, weight, left, right = views[:7]
-    jcom_world, centroidal, jacobian, carries, limits = views[7:]
+    centre, speed, _, momentum, weight, places = views[:6]
+    jcom_world, centroidal, jacobian, carries, limits = views[6:]
     effects, jcom, jspin, contact, jturning, joints = out
     frame, trunk = base
     rotation, st, nv = trunk[0], data[0], v.shape[0]
@@ -274,12 +298,12 @@ def gather_floating(
     st.momentum_bias[0] = c * moment[0] + s * moment[1]
     st.momentum_bias[1] = c * moment[1] - s * moment[0]
     st.momentum_bias[2] = moment[2]
-    for i in range(2):
-        place = left if i == 0 else right
+    for i in range(contact.shape[0]):
+        place = places[i]
         px, py, pz = place[0], place[1], place[2]
         x, y = px - frame[0], py - frame[1]
-        st.foot_position[i, 0], st.foot_position[i, 1] = c * x + s * y, c * y - s * x
-        st.foot_position[i, 2] = pz - r
+        st.contact_position[i, 0], st.contact_position[i, 1] = c * x + s * y, c * y - s * x
+        st.contact_position[i, 2] = pz - r
         for k in range(nv):
             wx, wy, wz = jacobian[3, k], jacobian[4, k], jacobian[5, k]
             # Rolling without slip: the material point below the sphere's centre is at rest.
@@ -288,11 +312,12 @@ def gather_floating(
             contact[i, 0, k], contact[i, 1, k] = c * jx + s * jy, c * jy - s * jx
             contact[i, 2, k] = (jacobian[2, k] + wx * py - wy * px) * carries[i, k]
         bx, by = drift[i][0] - r * drift[i][4], drift[i][1] + r * drift[i][3]
-        st.foot_bias[i, 0], st.foot_bias[i, 1] = c * bx + s * by, c * by - s * bx
-        st.foot_bias[i, 2] = drift[i][2]
+        st.contact_bias[i, 0], st.contact_bias[i, 1] = c * bx + s * by, c * by - s * bx
+        st.contact_bias[i, 2] = drift[i][2]
         moving = np.dot(contact[i], v)
         for k in range(3):
-            st.foot_velocity[i, k] = moving[k]
+            st.contact_velocity[i, k] = moving[k]
+    _gather_feet(st)
     for k in range(3):
         jturning[0, 3 + k] = c * rotation[0, k] + s * rotation[1, k]
         jturning[1, 3 + k] = c * rotation[1, k] - s * rotation[0, k]
@@ -308,7 +333,7 @@ def gather_floating(
 @compiled
 def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any, ...]) -> None:
     """Write how the trunk stands, and where its hips are."""
-    rotation, left, right, left_axes, right_axes, points = trunk
+    rotation, places, axes, points = trunk
     c, s = frame[2], frame[3]
     ahead = c * rotation[0, 2] + s * rotation[1, 2]
     aside = c * rotation[1, 2] - s * rotation[0, 2]
@@ -317,10 +342,13 @@ def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any
     state.attitude[2] = np.arctan2(
         c * rotation[1, 0] - s * rotation[0, 0], c * rotation[0, 0] + s * rotation[1, 0]
     )
-    one, other = np.dot(left_axes, points[0]), np.dot(right_axes, points[1])
-    middle = np.empty(3)
+    middle = np.zeros(3)
+    for i in range(len(places)):
+        place, point = places[i], np.dot(axes[i], points[i])
+        for k in range(3):
+            middle[k] += place[k] + point[k]
     for k in range(3):
-        middle[k] = 0.5 * ((left[k] + one[k]) + (right[k] + other[k]))
+        middle[k] /= len(places)
     state.hips[0] = c * (middle[0] - frame[0]) + s * (middle[1] - frame[1])
     state.hips[1] = c * (middle[1] - frame[1]) - s * (middle[0] - frame[0])
     state.hips[2] = middle[2]

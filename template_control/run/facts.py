@@ -58,6 +58,7 @@ class Facts:
         mass: [kg].
         trunk_com: height of the trunk's own CoM above the hips [m].
         joints, feet: names.
+        groups: the contacts, by their places in ``feet``, of each template leg.
         legs: for each foot, the indices into ``joints`` of its joints, hip first.
         torque_limit, velocity_limit: (nu,) of the joints [N m, rad/s].
         nodes, phases: of the automaton.
@@ -113,6 +114,11 @@ class Facts:
     summary = Fact(Statistics.read)
     sections: Fact[tuple[str, ...]] = Fact(tuple)
     strides: Fact[tuple[str, ...]] = Fact(tuple)
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """See the class; runs recorded before there were several contacts are of bipeds."""
+        return _joints_of_legs(self.metadata.get("groups", ((0,), (1,))))
 
     @property
     def weight(self) -> float:

@@ -29,6 +29,7 @@ def about(controller: EmbeddingController) -> dict[str, Any]:
         "torque_limit": controller.qp.torque_limit,
         "velocity_limit": robot.velocity_limit,
         "feet": robot.feet,
+        "groups": robot.groups,
         "legs": robot.legs,
         "trunk_com": robot.trunk_com,
         "nodes": [node.name for node in nodes],

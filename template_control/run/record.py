@@ -34,9 +34,9 @@ LAYOUT = storage.Layout(
         "angular_momentum": "T",
         "template_com": "T 2",
         "template_velocity": "T 2",
-        "foot": "T 2 2",
+        "foot": "T n 2",
         "joint": "T nu 2",
-        "contact_force": "T 2 2",
+        "contact_force": "T n 2",
         "template_force": "T 2 2",
         "node": "T <nodes",
         "rear": "T <2",
@@ -89,15 +89,16 @@ class Record(Facts):
         com, com_velocity: (T, 2).
         angular_momentum: (T,) about the CoM, forward pitch positive [kg m^2/s].
         template_com, template_velocity: (T, 2) the template at the robot's phase.
-        foot: (T, 2, 2) lowest points of the feet.
+        foot: (T, n, 2) lowest points of the foot spheres, of a biped two.
         joint: (T, nu, 2) positions of the actuated joints.
-        contact_force: (T, 2, 2) the ground's force on each foot during the step before the
+        contact_force: (T, n, 2) the ground's force on each of them during the step before the
             sample, averaged over the physics step [N].
         template_force: (T, 2, 2) the template's leg forces, rear and front [N].
         node: (T,) index into ``nodes``.
-        rear: (T,) index of the rear stance foot.
+        rear: (T,) index of the template leg that is the rear one.
         solved: (T,) False where the QP was not solved.
-        swing_reference: (T, 2, 2) position of each foot's reference, NaN where it has none.
+        swing_reference: (T, 2, 2) position of the reference of each template leg's foot, NaN where
+            it has none.
         push: (T,) disturbance on the trunk, forward positive; of a free robot its size, negative
             where it acts backward [N].
         section: (S,) index into ``sections`` of each section reached, the start's included.
@@ -198,6 +199,14 @@ class Record(Facts):
     def kinds_of_stride(self) -> list[str]:
         """(S,) kind of the stride that begins at each section."""
         return [self.strides[i] for i in self.stride]
+
+    def of_legs(self, values: Array) -> Array:
+        """(T, 2, ...) means of what each contact has, over the contacts of each template leg.
+
+        Args:
+            values: (T, n, ...) such as ``foot``.
+        """
+        return np.stack([values[:, list(group)].mean(axis=1) for group in self.groups], axis=1)
 
     @property
     def com_error(self) -> Array:
@@ -323,8 +332,8 @@ _FLOATING_LAYOUT = storage.Layout(
         **LAYOUT.fields,
         "q": "T nq",
         "space_com": "T 3",
-        "space_foot": "T 2 3",
-        "space_force": "T 2 3",
+        "space_foot": "T n 3",
+        "space_force": "T n 3",
         "attitude": "T 3",
         "heading": "T",
         "sway": "T 2",
@@ -344,14 +353,14 @@ class FloatingRecord(Record):
 
     Attributes:
         space_com: (T, 3) of the CoM in the world, x, y to the left, z up [m].
-        space_foot: (T, 2, 3) lowest points of the feet in the world [m].
-        space_force: (T, 2, 3) the ground's force on each foot in the world [N].
+        space_foot: (T, n, 3) lowest points of the foot spheres in the world [m].
+        space_force: (T, n, 3) the ground's force on each of them in the world [N].
         attitude: (T, 3) roll, pitch and yaw of the trunk in the heading frame [rad].
         heading: (T,) angle from the world's x to the heading frame's [rad].
         sway: (T, 2) y of the CoM from the rear foot and dy/dt, in the heading frame; dy/dt has the
             angular momentum about the CoM as ``section_state`` has it [m, m/s].
-        side_reference: (T, 2) y of each foot's reference in the heading frame, NaN where it has
-            none [m].
+        side_reference: (T, 2) y of the reference of each template leg's foot in the heading frame,
+            NaN where it has none [m].
     """
 
     file_format: ClassVar[str] = "template-control free run 2"

@@ -16,6 +16,7 @@ from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.state import FloatingSnapshot
 from template_control.errors import ParameterError
 from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.terms import LEGS
 from template_control.run.metadata import about, outcome
 from template_control.run.record import FloatingRecord, Record
 from template_control.run.statistics import Counts, Statistics, count, statistics
@@ -40,15 +41,6 @@ _NUMBERS = {
 # Of these, what no field of the record holds.
 _OTHERWISE = ("stands", "interval", "tick_seconds", "solve_seconds")
 _KINDS = {"node": np.int64, "rear": np.int64, "solved": np.bool_}
-_FLOATING = {
-    "space_com": (3,),
-    "space_foot": (2, 3),
-    "space_force": (2, 3),
-    "attitude": (3,),
-    "heading": (),
-    "sway": (2,),
-    "side_reference": (2,),
-}
 
 
 class Recorder:
@@ -89,7 +81,7 @@ class Recorder:
         self.controller, self.every = controller, every
         robot = controller.robot
         self._floating = robot if isinstance(robot, FloatingBaseBiped) else None
-        nu = len(robot.joint_names)
+        nu, contacts = len(robot.joint_names), len(robot.feet)
         # In the order in which a tick writes them; single numbers are written together.
         shapes: dict[str, tuple[int, ...]] = {
             "q": (robot.nq,),
@@ -97,15 +89,24 @@ class Recorder:
             "torque": (nu,),
             "com": (2,),
             "com_velocity": (2,),
-            "foot": (2, 2),
-            "contact_force": (2, 2),
+            "foot": (contacts, 2),
+            "contact_force": (contacts, 2),
             "template_com": (2,),
             "template_velocity": (2,),
-            "template_force": (2, 2),
-            "swing_reference": (2, 2),
+            "template_force": (LEGS, 2),
+            "swing_reference": (LEGS, 2),
             "joint": (nu, 2),
-            **(_FLOATING if self._floating is not None else {}),
         }
+        if self._floating is not None:
+            shapes |= {
+                "space_com": (3,),
+                "space_foot": (contacts, 3),
+                "space_force": (contacts, 3),
+                "attitude": (3,),
+                "heading": (),
+                "sway": (2,),
+                "side_reference": (LEGS,),
+            }
         widths = {**_NUMBERS, **{name: prod(shape) for name, shape in shapes.items()}}
         ends = np.cumsum(list(widths.values()))
         starts = ends - list(widths.values())
@@ -151,8 +152,8 @@ class Recorder:
         Args:
             q: (nq,) configuration, without the noise of the sensors where that is known.
             v: (nv,) velocity.
-            force: (2, d) the ground's force on each foot, forward first and up last [N]; NaN where
-                nobody knows it.
+            force: (n, d) the ground's force on each contact, forward first and up last [N]; NaN
+                where nobody knows it.
             solution: that the controller has just computed.
             time: of the tick [s]; None: the controller's.
             push: disturbance on the trunk; of a free robot its size, negative backward [N].
@@ -184,7 +185,8 @@ class Recorder:
             more = _in_space(floating, s, force)
             cosine, sine = np.cos(floating.heading), np.sin(floating.heading)
             force = np.column_stack((cosine * force[:, 0] + sine * force[:, 1], force[:, 2]))
-        planar = (q, v, solution.torque, robot.com, robot.com_velocity, robot.foot_position, force)
+        places = robot.contact_position[:, :: robot.directions - 1]
+        planar = (q, v, solution.torque, robot.com, robot.com_velocity, places, force)
         template = s.template_com, s.template_velocity, s.template_force, s.swing_reference
         for column, value in zip(self._written, (*planar, *template, *more), strict=True):
             column[row] = value
@@ -270,6 +272,6 @@ class Recorder:
 def _in_space(robot: FloatingBaseBiped, s: FloatingSnapshot, force: Array) -> tuple[Any, ...]:
     """Columns that only a floating-base robot has, in their order."""
     space = robot.space
-    feet = robot.to_world(space.foot)
+    feet = robot.to_world(space.contact)
     angles = robot.roll_pitch_yaw()
     return robot.to_world(space.com), feet, force, angles, robot.heading, s.sway, s.side_reference

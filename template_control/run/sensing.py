@@ -79,7 +79,7 @@ class Senses(Protocol):
     def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
         """q, v that the controller gets of the true q (nq,) [m, rad] and v (nv,) [m/s, rad/s].
 
-        The true arrays are not changed; ``contact`` (2,) says whether each foot touches the ground.
+        The true arrays are not changed; ``contact`` (n,) says which contacts touch the ground.
         """
 
     def expect(self, acceleration: Array) -> None:
@@ -145,9 +145,9 @@ class ContactSensors:
         self._draws = np.random.default_rng((options.seed, _CONTACT_DRAWS))
 
     def measure(self, forces: Array) -> tuple[NDArray[np.bool_], Array]:
-        """Flags (2,) and forces (2, d) as the controller gets them; without errors the true forces.
+        """Flags (n,) and forces (n, d) as the controller gets them; without errors the true forces.
 
-        ``forces`` (2, d) are the ground's on each foot, up last [N]; they are not changed.
+        ``forces`` (n, d) are the ground's on each contact, up last [N]; they are not changed.
         """
         touching = forces[:, -1] > self._threshold
         if self._errors == 0.0:

@@ -205,7 +205,8 @@ def _loop(
     robot, supervisor = controller.robot, controller.supervisor
     dt = o.world.time_step
     delay = TorqueDelay(o.delay_ticks)
-    q, v, forces = robot.neutral(), np.zeros(robot.nv), np.zeros((2, robot.directions))
+    q, v = robot.neutral(), np.zeros(robot.nv)
+    forces = np.zeros((len(robot.feet), robot.directions))
     contacts = ContactSensors(o.sensors, o.falls.contact_force * robot.mass * robot.gravity)
     thrown = o.falls.thrown * controller.parameters.speed_unit
     done, tick, failures = 0, 0, QpFailures(robot.name)

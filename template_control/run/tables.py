@@ -36,7 +36,7 @@ _SAMPLED: dict[str, tuple[tuple[str, ...], str]] = {
     "node": ((), ""),
     "rear": ((), ""),
     "solved": ((), ""),
-    "swing_reference": (("foot", "axis"), "m"),
+    "swing_reference": (("group", "axis"), "m"),
     "push": ((), "N"),
     "space_com": (("space_axis",), "m"),
     "space_foot": (("foot", "space_axis"), "m"),
@@ -44,7 +44,7 @@ _SAMPLED: dict[str, tuple[tuple[str, ...], str]] = {
     "attitude": (("angle",), "rad"),
     "heading": ((), "rad"),
     "sway": (("sway_state",), ""),
-    "side_reference": (("foot",), "m"),
+    "side_reference": (("group",), "m"),
 }
 _BY_SECTION: dict[str, tuple[tuple[str, ...], str]] = {
     "section": ((), ""),
@@ -83,6 +83,7 @@ def _labels(record: Any) -> dict[str, Mapping[str, str]]:
         "velocity": rates | dict.fromkeys(joints, "rad/s"),
         "joint": dict.fromkeys(joints, ""),
         "foot": feet,
+        "group": dict.fromkeys(_groups(record), ""),
         "leg": {"rear": "", "front": ""},
         "axis": dict.fromkeys("xy", ""),
         "space_axis": dict.fromkeys("xyz", ""),
@@ -93,15 +94,17 @@ def _labels(record: Any) -> dict[str, Mapping[str, str]]:
     }
 
 
+def _groups(record: Any) -> list[str]:
+    """Names of the template legs' feet: of their contacts."""
+    return ["+".join(record.feet[contact] for contact in group) for group in record.groups]
+
+
 def _values(record: Any, name: str) -> NDArray[Any]:
     """A field; indices as the names that they stand for."""
-    names = {
-        "node": "nodes",
-        "rear": "feet",
-        "section": "sections",
-        "stride": "strides",
-    }
     values = getattr(record, name)
+    if name == "rear":
+        return np.array(_groups(record))[values]
+    names = {"node": "nodes", "section": "sections", "stride": "strides"}
     return np.array(getattr(record, names[name]))[values] if name in names else values
 
 

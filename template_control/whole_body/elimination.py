@@ -1,6 +1,6 @@
 """Floating-base dynamics and contact constraints, eliminated exactly.
 
-With the stance feet fixed, the joint torques determine everything else:
+With the contacts fixed, the joint torques determine everything else:
 
     [M  -J^T] [a]   [S tau - h]
     [J    0 ] [f] = [  -dJ v  ]
@@ -88,14 +88,14 @@ def eliminate(
     Args:
         mass_matrix: (nv, nv) M.
         nonlinear_effects: (nv,) h.
-        jacobian: (m, nv) stacked Jacobian J of the stance feet.
+        jacobian: (m, nv) stacked Jacobian J of the contacts.
         bias: (m,) dJ/dt v.
         base_dof: unactuated coordinates, the first ones.
         a_map: (nv, nv - base_dof + 1) overwritten: A, and a0 in the last column.
         f_map: (m, nv - base_dof + 1) overwritten: F, and f0 in the last column.
 
     Returns:
-        False where M or J M^-1 J^T is singular (a straight leg, coinciding feet).
+        False where M or J M^-1 J^T is singular (a straight leg, coinciding contacts).
     """
     nv, m = mass_matrix.shape[0], jacobian.shape[0]
     nu = nv - base_dof

@@ -1,12 +1,12 @@
 """The whole-body QP in its only unknowns, the joint torques.
 
-Torques are scaled by their limits and forces by the robot's weight; f_n is a foot's normal force,
-f_t each of its tangential ones, of which there is one in the plane and two in space:
+Torques are scaled by their limits and forces by the robot's weight; f_n is the normal force at a
+contact, f_t each of its tangential ones, of which there is one in the plane and two in space:
 
     min  1/2 z^T H z + g^T z      z = tau / tau_max
     s.t. -1 <= z <= 1                           torque limits
-         0 <= mu f_n -+ f_t                     linearised friction cone, each stance foot
-         0 <= f_n <= cap                        unilateral contact, unloading foot
+         0 <= mu f_n -+ f_t                     linearised friction cone, each contact
+         0 <= f_n <= cap                        unilateral contact, unloading leg
          low <= a_joint <= high                 only where a joint is near its speed limit
 
 H is badly conditioned (tasks against regularisers), and a proximal solver is slow along
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.robot.terms import UP
+from template_control.robot.terms import MOST_CONTACTS, UP
 from template_control.whole_body.elimination import cholesky, eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
@@ -49,10 +49,10 @@ QP_DATA = np.dtype(
         ("stop_share", _F),  # share of its limit from which on a joint slows down before its stop
         ("stop_time", _F),  # by which a stop is looked at before a joint is there [s]
         ("load", _F),  # ratio of the real to the modelled inertia
-        ("feet", _I),  # number of feet on the ground
-        ("foot", _I, (2,)),  # which
-        ("force", _F, (2, 3)),  # to stay near, of each, by direction [N]
-        ("cap", _F, (2,)),  # largest normal force of each; inf: none [N]
+        ("contacts", _I),  # number of contacts on the ground
+        ("contact", _I, (MOST_CONTACTS,)),  # which
+        ("force", _F, (MOST_CONTACTS, 3)),  # to stay near, of each, by direction [N]
+        ("cap", _F, (MOST_CONTACTS,)),  # largest normal force of each; inf: none [N]
     ],
     align=True,
 )
@@ -60,8 +60,8 @@ QP_DATA = np.dtype(
 
 
 @compiled
-def rows_per_foot(directions: int) -> int:
-    """Constraints of a stance foot: two for each tangential direction, one for the normal one.
+def rows_per_contact(directions: int) -> int:
+    """Constraints of a contact: two for each tangential direction, one for the normal one.
 
     ``directions`` are those of its force, 2 in the plane, 3 in space.
     """
@@ -120,8 +120,8 @@ def matrices(work: Array, nv: int, nu: int, forces: int, rows: int) -> tuple[Arr
 def sizes(p: Any, arrays: tuple[Any, ...], bounds: Array) -> tuple[int, int, int, int]:
     """Arguments of :func:`matrices` after the first; arguments as for :func:`assemble`."""
     directions, nv, nu = arrays[4].shape[1], arrays[0].shape[0], arrays[6].shape[1]
-    rows = nu + rows_per_foot(directions) * p.feet + bounds.shape[1]
-    return nv, nu, directions * p.feet, rows
+    rows = nu + rows_per_contact(directions) * p.contacts + bounds.shape[1]
+    return nv, nu, directions * p.contacts, rows
 
 
 @compiled
@@ -153,17 +153,17 @@ def assemble(
     out = matrices(work, nv, nu, forces, rows)
     a_map, f_map, factor, gradient, constraint, lower, upper, minimum = out
     mass_matrix, nonlinear_effects, contact = arrays[0], arrays[1], arrays[4]
-    feet, directions = p.feet, contact.shape[1]
-    per_foot, weight, friction = rows_per_foot(directions), r.mass * r.gravity, p.friction
-    jacobian, bias = np.empty((directions * feet, nv)), np.empty(directions * feet)
-    for i in range(feet):
-        foot = p.foot[i]
+    contacts, directions = p.contacts, contact.shape[1]
+    per_contact, weight, friction = rows_per_contact(directions), r.mass * r.gravity, p.friction
+    jacobian, bias = np.empty((directions * contacts, nv)), np.empty(directions * contacts)
+    for i in range(contacts):
+        point = p.contact[i]
         for d in range(directions):
             axis = UP if d == directions - 1 else d
             for k in range(nv):
-                jacobian[i * directions + d, k] = contact[foot, d, k]
-            sliding = p.contact_damping * r.foot_velocity[foot, axis]
-            bias[i * directions + d] = r.foot_bias[foot, axis] + sliding
+                jacobian[i * directions + d, k] = contact[point, d, k]
+            sliding = p.contact_damping * r.contact_velocity[point, axis]
+            bias[i * directions + d] = r.contact_bias[point, axis] + sliding
     if not eliminate(mass_matrix, nonlinear_effects, jacobian, bias, nv - nu, a_map, f_map):
         return SINGULAR
     factor[:] = 0.0
@@ -180,21 +180,21 @@ def assemble(
                 row[j] += tasks[t, k] * a_map[k, j]
         row[nu] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
         _add_square(row, tasks[t, nv + WEIGHT], torque_limit, factor, gradient)
-    for foot in range(feet):
+    for i in range(contacts):
         for d in range(directions):
             for j in range(nu + 1):
-                row[j] = f_map[foot * directions + d, j] / weight
-            row[nu] -= p.force[foot, d] / weight
+                row[j] = f_map[i * directions + d, j] / weight
+            row[nu] -= p.force[i, d] / weight
             _add_square(row, p.force_cost, torque_limit, factor, gradient)
 
     constraint[:] = 0.0
     for i in range(nu):
         constraint[i, i] = 1.0
         lower[i], upper[i] = -1.0, 1.0
-    for foot in range(feet):
-        top, normal = nu + per_foot * foot, directions * foot + directions - 1
+    for i in range(contacts):
+        top, normal = nu + per_contact * i, directions * i + directions - 1
         for d in range(directions - 1):
-            along = directions * foot + d
+            along = directions * i + d
             for side in range(2):
                 sign, at = 1.0 - 2.0 * side, top + 2 * d + side
                 for j in range(nu):
@@ -205,13 +205,13 @@ def assemble(
                     )
                 lower[at] = -(friction * f_map[normal, nu] + sign * f_map[along, nu]) / weight
                 upper[at] = _FAR
-        at = top + per_foot - 1
+        at = top + per_contact - 1
         for j in range(nu):
             constraint[at, j] = f_map[normal, j] * torque_limit[j] / weight
         lower[at] = -f_map[normal, nu] / weight
-        upper[at] = min(_FAR, (p.cap[foot] - f_map[normal, nu]) / weight)
+        upper[at] = min(_FAR, (p.cap[i] - f_map[normal, nu]) / weight)
     for i in range(bounds.shape[1]):
-        row_of, joint = nu + per_foot * feet + i, nv - nu + i
+        row_of, joint = nu + per_contact * contacts + i, nv - nu + i
         for j in range(nu):
             constraint[row_of, j] = a_map[joint, j] * torque_limit[j]
         lower[row_of] = bounds[0, i] - a_map[joint, nu]
@@ -306,7 +306,7 @@ def follow(a_map: Array, f_map: Array, tau: Array, acceleration: Array, force: A
     """Write the accelerations and contact forces that joint torques (nu,) [N m] bring about.
 
     The maps are those of :func:`assemble`. ``acceleration`` (nv,) [m/s^2, rad/s^2] and ``force`` (d
-    c,), on each stance foot [N], are overwritten.
+    c,), at each contact [N], are overwritten.
     """
     _affine(a_map, tau, acceleration)
     _affine(f_map, tau, force)
@@ -329,7 +329,7 @@ def answer(p: Any, work: Array, found: tuple[Array, ...]) -> None:
 
     ``p`` is of ``QP_DATA``, ``work`` of :func:`matrices`, filled by :func:`assemble`. ``found`` has
     the model's torques (nu,), and is overwritten: (nu,) the robot's torques [N m], (d c,) the force
-    on each stance foot [N], (nv,) generalised accelerations [m/s^2, rad/s^2].
+    at each contact [N], (nv,) generalised accelerations [m/s^2, rad/s^2].
     """
     model, torque, force, acceleration = found
     out = matrices(work, acceleration.shape[0], torque.shape[0], force.shape[0], 0)

@@ -1,4 +1,4 @@
-"""Whole-body control on ProxQP: one warm-started workspace per contact state.
+"""Whole-body control on ProxQP: one warm-started workspace per number of contacts.
 
 ProxQP is asked where a limit acts. Elsewhere the minimum is known without it
 (:mod:`~template_control.whole_body.problem`).
@@ -42,7 +42,7 @@ from template_control.whole_body.problem import (
     answer,
     assemble,
     matrices,
-    rows_per_foot,
+    rows_per_contact,
     solve_free,
     torques,
 )
@@ -128,21 +128,21 @@ class QpOptions(Checked):
 
 
 class Stance(NamedTuple):
-    """The feet on the ground and what they should do there.
+    """The contacts on the ground and what they should do there.
 
     Attributes:
-        feet: indices of the feet, none to two.
-        force: (d c,) contact forces to stay near, of each foot x and y, in space x, y and z [N].
-        cap: (c,) largest normal force of each foot [N] (inf: none).
+        contacts: their indices.
+        force: (d c,) contact forces to stay near, of each x and y, in space x, y and z [N].
+        cap: (c,) largest normal force of each [N] (inf: none).
     """
 
-    feet: tuple[int, ...] = ()
+    contacts: tuple[int, ...] = ()
     force: Array = np.zeros(0)
     cap: Array = np.zeros(0)
 
 
 AIRBORNE = Stance()
-"""Of a robot none of whose feet stands, or that has none."""
+"""Of a robot none of whose contacts is on the ground, or that has none."""
 
 
 class Solution(NamedTuple):
@@ -150,7 +150,7 @@ class Solution(NamedTuple):
 
     Attributes:
         torque: (nu,) joint torques [N m], within their limits.
-        force: (d c,) contact forces of each stance foot [N], by direction.
+        force: (d c,) force at each contact on the ground [N], by direction.
         acceleration: (nv,) generalised accelerations.
         solved: False where the QP was infeasible, singular or not solved within its caps;
             the torques are then the last solved ones, and force and acceleration follow
@@ -190,19 +190,19 @@ def bound_joints(robot: Robot, options: QpOptions, bounds: Array, slack: float) 
 
 
 class Workspace:
-    """Matrices and ProxQP object for one number of stance feet.
+    """Matrices and ProxQP object for one number of contacts on the ground.
 
     ``bounded`` is how many accelerations of joints have bounds, none or all; they are ``bounds``
     (2, bounded) [rad/s^2]. ``work`` holds the numbers of the matrices, in one array.
     """
 
-    def __init__(self, robot: Robot, feet: int, bounded: int = 0) -> None:
+    def __init__(self, robot: Robot, contacts: int, bounded: int = 0) -> None:
         nv, nu, directions = robot.nv, len(robot.torque_limit), robot.directions
-        rows = nu + rows_per_foot(directions) * feet + bounded
+        rows = nu + rows_per_contact(directions) * contacts + bounded
         self._identity = np.eye(nu)
-        numbers = (nu + 1) * (nv + directions * feet) + nu * (nu + 2) + rows * (nu + 2)
+        numbers = (nu + 1) * (nv + directions * contacts) + nu * (nu + 2) + rows * (nu + 2)
         self.work = np.zeros(numbers)
-        self.matrices = Matrices(*matrices(self.work, nv, nu, directions * feet, rows))
+        self.matrices = Matrices(*matrices(self.work, nv, nu, directions * contacts, rows))
         self.bounds = np.zeros((2, bounded))
         self.rows = rows
         self._proxqp = load_proxqp()
@@ -278,9 +278,10 @@ class WholeBodyQp:
         now["speed_share"], now["stop_share"] = o.speed_share, o.stop_share
         now["stop_time"], now["load"] = o.stop_horizon / o.speed_share, 1.0
         self._options = o
-        nu = len(robot.torque_limit)
+        nu, most = len(robot.torque_limit), int(robot.data["contacts"][0])
         self.workspaces, self._braked = (
-            [Workspace(robot, feet, bounded) for feet in range(3)] for bounded in (0, nu)
+            [Workspace(robot, contacts, bounded) for contacts in range(most + 1)]
+            for bounded in (0, nu)
         )
         self._torque = np.zeros(nu)
         self._load = 1.0
@@ -303,30 +304,30 @@ class WholeBodyQp:
 
         Args:
             tasks: rows, desired accelerations and weights.
-            stance: the feet on the ground; none of a robot with a fixed base.
+            stance: the contacts on the ground; none of a robot with a fixed base.
             load: ratio of the real to the modelled inertia; the torques are scaled by it
                 and stay within their limits.
 
         Raises:
             ParameterError: naming a task that wrote a number which is not finite.
         """
-        now, feet = self.data[0], len(stance.feet)
-        now["feet"], now["foot"][:feet], now["cap"][:feet] = feet, stance.feet, stance.cap
-        directions = self.robot.directions
-        now["force"][:feet, :directions] = stance.force.reshape(feet, directions)
-        robot, room = self.robot, self.room(feet, load)
+        now, count = self.data[0], len(stance.contacts)
+        now["contacts"], now["contact"][:count] = count, stance.contacts
+        now["cap"][:count], directions = stance.cap, self.robot.directions
+        now["force"][:count, :directions] = stance.force.reshape(count, directions)
+        robot, room = self.robot, self.room(count, load)
         kind = solve_free(self.data, robot.data, robot.arrays, tasks.table, room)
         return self.finish(kind, tasks, room)
 
-    def room(self, feet: int, load: float) -> tuple[Any, ...]:
+    def room(self, contacts: int, load: float) -> tuple[Any, ...]:
         """Arrays for :func:`.problem.solve_free`; those of the answer are new.
 
         Args:
-            feet: on the ground.
+            contacts: on the ground.
             load: as for :meth:`solve`.
         """
-        robot, w, empty = self.robot, self.workspaces[feet], np.empty
-        torque, force = empty(len(self._torque)), empty(robot.directions * feet)
+        robot, w, empty = self.robot, self.workspaces[contacts], np.empty
+        torque, force = empty(len(self._torque)), empty(robot.directions * contacts)
         found = self._torque, torque, force, empty(robot.nv)
         if load != self._load:
             self._take_load(load)
@@ -364,12 +365,12 @@ class WholeBodyQp:
     ) -> tuple[float, bool]:
         """Fill ``found`` where limits act; seconds in ProxQP, and whether it is solved."""
         now, robot = self.data[0], self.robot
-        feet = int(now["feet"])
+        contacts = int(now["contacts"])
         # With bounds, with bounds that let a joint which is too fast stay so, and without.
         slacks = (-np.inf, 0.0, None) if kind == BRAKED else (None,)
         seconds = 0.0
         for slack in slacks:
-            w = (self.workspaces if slack is None else self._braked)[feet]
+            w = (self.workspaces if slack is None else self._braked)[contacts]
             if slack is not None:
                 bound_joints(robot, self._options, w.bounds, slack)
             found_kind, solved, more = self._attempt(w, kind, tasks, limit)
@@ -380,7 +381,7 @@ class WholeBodyQp:
             best = w.matrices.minimum if found_kind == FREE else w.qp.results.x
             torques(w.matrices.factor, best, limit, self._torque)
         else:
-            self._tell(found_kind != SINGULAR, feet)
+            self._tell(found_kind != SINGULAR, contacts)
             np.clip(self._torque, -limit, limit, out=self._torque)
         answer(now, w.work, found)
         return seconds, solved
@@ -406,13 +407,13 @@ class WholeBodyQp:
         solved = kind != SINGULAR and w.solve()
         return kind, solved, time.perf_counter() - start
 
-    def _tell(self, regular: bool, feet: int) -> None:
+    def _tell(self, regular: bool, contacts: int) -> None:
         """Log that the last solved torques are kept, once for failures in a row."""
         if not self._failing:
             why = "has no solution within its limits" if regular else "is singular"
             _LOG.warning(
-                "%s: the QP with %d stance feet %s: the last torques are kept",
+                "%s: the QP with %d contacts on the ground %s: the last torques are kept",
                 self.robot.name,
-                feet,
+                contacts,
                 why,
             )

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.robot.terms import LEGS, MOST_CONTACTS
 from template_control.structured import Number
 
 Array = NDArray[np.float64]
@@ -31,10 +32,12 @@ REFERENCES = np.dtype(
         ("pitch", _F),
         ("lean", _F, (3,)),
         ("spin", _F),
-        ("feet", _I, (2,)),
-        ("foot", _F, (2, 2, 3)),
-        ("side", _F, (2, 3)),
-        ("furthest", _F, (2,)),
+        ("feet", _I, (LEGS,)),
+        ("foot", _F, (LEGS, 2, 3)),
+        ("side", _F, (LEGS, 3)),
+        ("furthest", _F, (LEGS,)),
+        ("offset", _F, (MOST_CONTACTS, 3, 3)),
+        ("stands", _I, (MOST_CONTACTS,)),
         ("lift", _F),
     ],
     align=True,
@@ -62,6 +65,10 @@ class References:
             heading frame.
         furthest: (2,) largest x that each foot may be moved to, so that its leg does not go
             straight [m].
+        offset: (n, 3, 3) of each contact from the reference of its foot: x, y and z in space, each
+            position, velocity, acceleration [m, m/s, m/s^2]; 0 of a contact that is a foot.
+        stands: (n,) of each contact, whether the QP has it on the ground: a ``FootTask`` or a
+            ``SideFootTask`` then asks for nothing.
         lift: the feedback part of the CoM's vertical acceleration; a ``ComTask`` writes it
             [m/s^2].
         data: (1,) of ``REFERENCES``, all of them.
@@ -77,6 +84,8 @@ class References:
         self.foot: Array = now["foot"]
         self.side: Array = now["side"]
         self.furthest: Array = now["furthest"]
+        self.offset: Array = now["offset"]
+        self.stands: NDArray[np.int64] = now["stands"]
         self.feet[1], self.furthest[:], self.pitch = 1, np.inf, pitch
 
     com_push, pitch, lift = (Number(name) for name in ("com_push", "pitch", "lift"))

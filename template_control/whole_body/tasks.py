@@ -8,14 +8,14 @@ is :class:`~template_control.robot.terms.Jacobians` as a plain tuple, ``want`` i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import NotNegative
+from template_control.checks.ranges import Index, NotNegative
 from template_control.compiled import compiled
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
@@ -46,6 +46,7 @@ TASK = np.dtype(
         ("kind", _I),  # which formula: a task's ``kind``
         ("first", _I),  # row of the stack
         ("leg", _I),  # role of the task's foot
+        ("contact", _I),  # which one of the foot's group
         ("gains", _F, (4,)),  # kp and kd, twice where the task has two pairs
         ("weight", _F, (3,)),  # of the first rows
     ],
@@ -87,6 +88,7 @@ class CompiledTask(Checked):
         found = np.zeros(1, TASK)
         found["kind"], found["first"] = self.kind, first
         found["leg"], weights = getattr(self, "leg", 0), self.weights
+        found["contact"] = getattr(self, "contact", 0)
         found["weight"][0, : len(weights)] = weights
         found["gains"][0, : len(self.numbers)] = self.numbers
         return found
@@ -106,6 +108,12 @@ class CompiledTask(Checked):
             raise ParameterError(
                 f"robot {robot.name} is held in its plane, and a {type(self).__name__} asks for a"
                 " free one: take load_floating_robot, or tasks of the plane"
+            )
+        contact, members = getattr(self, "contact", 0), min(map(len, robot.groups))
+        if contact >= members:
+            raise ParameterError(
+                f"a {type(self).__name__} asks for contact {contact} of a leg, and the legs of"
+                f" {robot.name} have {members}: give a smaller number"
             )
 
     def write(self, robot: Robot, references: References, rows: Rows) -> None:
@@ -164,7 +172,7 @@ def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array)
 
 @dataclass(frozen=True)
 class FootTask(CompiledTask):
-    """Two rows, x and y of a foot p, towards its reference r.
+    """Two rows, x and y of a contact p of a foot, towards its reference r.
 
         J a + dJ/dt v = r'' + kp (r - p) + kd (r' - p')
 
@@ -172,14 +180,18 @@ class FootTask(CompiledTask):
     leg reaches, moving with the hips: a knee that goes straight hits its stop with tens of
     kilonewtons.
 
+    A contact that the QP has on the ground already is asked for nothing.
+
     Attributes:
         leg: the foot's role.
+        contact: which one of the foot's contacts.
         weight: of x and y [s^4/m^2].
         gains: kp [1/s^2] and kd [1/s].
         hold_gains: of the feedback that holds the foot back.
     """
 
     leg: Leg = Leg.FRONT
+    contact: Index = field(default=0, kw_only=True)
     weight: tuple[NotNegative, NotNegative] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
     gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
     hold_gains: tuple[NotNegative, NotNegative] = tuned((1e4, 200.0), RATE_SQUARED, RATE)
@@ -197,17 +209,19 @@ def foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array
     """Write the rows of a :class:`FootTask`; arguments as for :func:`write_rows`."""
     contact, foot = arrays[4], want.feet[task.leg]
     kp, kd, hold_p, hold_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
-    nv = contact.shape[2]
+    point, nv = r.group[foot, task.contact], contact.shape[2]
     for row in range(2):
         axis, direction = row * UP, row * (contact.shape[1] - 1)
         for k in range(nv):
-            rows[row, k] = contact[foot, direction, k]
-        rows[row, nv + BIAS] = r.foot_bias[foot, axis]
-        ahead = want.foot[foot, row, 0] - r.foot_position[foot, axis]
-        faster = want.foot[foot, row, 1] - r.foot_velocity[foot, axis]
-        rows[row, nv + DESIRED] = want.foot[foot, row, 2] + kp * ahead + kd * faster
-    ahead = want.furthest[foot] - r.foot_position[foot, 0]
-    held = hold_p * ahead + hold_d * (r.hip_speed - r.foot_velocity[foot, 0])
+            rows[row, k] = contact[point, direction, k]
+        rows[row, nv + BIAS] = r.contact_bias[point, axis]
+        wanted, away = want.foot[foot, row], want.offset[point, axis]
+        ahead = wanted[0] + away[0] - r.contact_position[point, axis]
+        faster = wanted[1] + away[1] - r.contact_velocity[point, axis]
+        rows[row, nv + DESIRED] = wanted[2] + away[2] + kp * ahead + kd * faster
+        rows[row, nv + WEIGHT] = 0.0 if want.stands[point] else task.weight[row]
+    ahead = want.furthest[foot] + want.offset[point, 0, 0] - r.contact_position[point, 0]
+    held = hold_p * ahead + hold_d * (r.hip_speed - r.contact_velocity[point, 0])
     rows[0, nv + DESIRED] = min(rows[0, nv + DESIRED], held)
 
 
@@ -384,17 +398,19 @@ def spin_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array
 
 @dataclass(frozen=True)
 class SideFootTask(CompiledTask):
-    """One row: y of a foot p towards its reference r, in addition to the two of a ``FootTask``.
+    """One row: y of a contact p towards its reference r, beyond the two of a ``FootTask``.
 
         J a + dJ/dt v = r'' + kp (r - p) + kd (r' - p')
 
     Attributes:
         leg: the foot's role.
+        contact: which one of the foot's contacts.
         weight: [s^4/m^2].
         gains: kp [1/s^2] and kd [1/s].
     """
 
     leg: Leg = Leg.FRONT
+    contact: Index = field(default=0, kw_only=True)
     weight: NotNegative = tuned(1.0, PER_ACCELERATION_SQUARED)
     gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
 
@@ -406,17 +422,20 @@ class SideFootTask(CompiledTask):
 def side_foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
     """Write the row of a :class:`SideFootTask`; arguments as for :func:`write_rows`."""
     contact, foot, nv = arrays[4], want.feet[task.leg], rows.shape[1] - 3
+    point = r.group[foot, task.contact]
+    wanted, off = want.side[foot], want.offset[point, _SIDE]
     for k in range(nv):
-        rows[0, k] = contact[foot, _SIDE, k]
-    rows[0, nv + BIAS] = r.foot_bias[foot, _SIDE]
-    away = want.side[foot, 0] - r.foot_position[foot, _SIDE]
-    behind = want.side[foot, 1] - r.foot_velocity[foot, _SIDE]
-    rows[0, nv + DESIRED] = want.side[foot, 2] + task.gains[0] * away + task.gains[1] * behind
+        rows[0, k] = contact[point, _SIDE, k]
+    rows[0, nv + BIAS] = r.contact_bias[point, _SIDE]
+    away = wanted[0] + off[0] - r.contact_position[point, _SIDE]
+    behind = wanted[1] + off[1] - r.contact_velocity[point, _SIDE]
+    rows[0, nv + DESIRED] = wanted[2] + off[2] + task.gains[0] * away + task.gains[1] * behind
+    rows[0, nv + WEIGHT] = 0.0 if want.stands[point] else task.weight[0]
 
 
 @dataclass(frozen=True)
 class SpareJointTask(CompiledTask):
-    """Two rows, one for each leg: q'' = kp (q0 - q) - kd q'.
+    """Two rows, one for each leg of a biped: q'' = kp (q0 - q) - kd q'.
 
     A foot is placed by three hinges. Of four, the one about the axis that is nearest to the
     vertical turns the leg about itself. Without it the rows are empty.

@@ -215,7 +215,7 @@ class LateralMotion:
 
     def lift(self, foot: int) -> None:
         """A foot begins its swing."""
-        speed = float(self.robot.contact_velocity[foot, _SIDE])
+        speed = float(self.robot.data[0]["foot_velocity"][foot, _SIDE])
         self._references.side[foot] = self.side(foot), speed, 0.0
 
     def arrays(self, supervisor: StrideSupervisor) -> tuple[Any, ...]:

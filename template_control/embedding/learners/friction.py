@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
+from template_control.robot.terms import MOST_CONTACTS
 from template_control.slip.similarity import TIME, Scale, tuned
 from template_control.structured import Number
 
@@ -54,14 +55,14 @@ SLIDES = np.dtype(
         ("settling", _F),  # [s], of the options
         ("lowest", _F),  # of the options
         ("coefficient", _F),  # the estimate
-        ("standing", _F, (2,)),  # time since each foot's touchdown [s]
-        ("time", _F, (2,)),  # that each foot has slid for [s]
-        ("along", _F, (2,)),  # sums of the ground's forces since it began to slide [N]
-        ("normal", _F, (2,)),
+        ("standing", _F, (MOST_CONTACTS,)),  # time since each contact's touchdown [s]
+        ("time", _F, (MOST_CONTACTS,)),  # that each has slid for [s]
+        ("along", _F, (MOST_CONTACTS,)),  # sums of the ground's forces since then [N]
+        ("normal", _F, (MOST_CONTACTS,)),
     ],
     align=True,
 )
-"""Friction's estimate, and each foot's slide."""
+"""Friction's estimate, and each contact's slide."""
 
 
 @compiled
@@ -70,14 +71,14 @@ def feel_slides(s: Any, standing: NDArray[np.uint8], force: Array, speed: Array,
 
     Args:
         s: of ``SLIDES``, overwritten.
-        standing: (2,) whether each foot is on ground to stand on; one that chatters is, though it
-            carries nothing every other millisecond.
-        force: (2, d) the ground's force on each foot, along the ground first and up last [N].
-        speed: (2, d - 1 or more) of the feet's material points along the ground [m/s].
+        standing: (n,) whether each contact is on ground to stand on; one that chatters is, though
+            it carries nothing every other millisecond.
+        force: (n, d) the ground's force on each, along the ground first and up last [N].
+        speed: (n, d - 1 or more) of their material points along the ground [m/s].
         dt: since the last look [s].
     """
     before, level = s.coefficient, force.shape[1] - 1
-    for foot in range(2):
+    for foot in range(force.shape[0]):
         if not standing[foot]:
             s.standing[foot] = 0.0
             _end(s, foot)

@@ -50,13 +50,14 @@ def exact_map() -> None:
 
 def whole_tick() -> None:
     """A tick of the controller; only Pinocchio knows how its arrays lie."""
-    from template_control.embedding.tick import TICK, act, sense  # which imports planners
+    from template_control.embedding.tick import TICK, act, sense, stand  # which imports planners
 
     robot, references, tick = load_robot("five-link"), References(), np.zeros(1, TICK)
     robot.update(robot.neutral(), np.zeros(robot.nv))
     qp, tasks = WholeBodyQp(robot), TaskStack((PostureTask(),), robot.nv)
     memory = references.data, qp.data
     sense(tick, robot.data, *memory, np.zeros(2, dtype=bool), np.zeros((2, 2)), 1e-3)
+    stand(tick, robot.data, *memory)
     curve = np.ones((2, 1, ORDER + 1)), np.ones((1, 7)), np.ones(3)
     rest = tasks.program, tasks.table, 1e-3, qp.room(0, 1.0)
     act(tick, (robot.data, robot.arrays), *memory, curve, None, rest)

@@ -138,7 +138,7 @@ def test_terms_match_finite_differences_in_the_heading_frame(free_robot):
         np.testing.assert_allclose(s.com_velocity, com, atol=1e-7)
         np.testing.assert_allclose(s.com_bias, velocity, atol=1e-6)
         np.testing.assert_allclose(s.momentum_bias, momentum, atol=1e-6)
-        np.testing.assert_allclose(s.foot_bias, foot, atol=1e-5)
+        np.testing.assert_allclose(s.contact_bias, foot, atol=1e-5)
         np.testing.assert_allclose(turning, 0.0, atol=1e-6)
         np.testing.assert_allclose(s.com_jacobian @ v, s.com_velocity, atol=1e-12)
         np.testing.assert_allclose(s.momentum_jacobian @ v, s.momentum, atol=1e-12)

@@ -8,7 +8,7 @@ import pytest
 
 from template_control.robot.library import load_robot
 from template_control.slip.automaton.vocabulary import Leg
-from template_control.whole_body.problem import rows_per_foot
+from template_control.whole_body.problem import rows_per_contact
 from template_control.whole_body.solver import (
     FORCE_COST,
     TORQUE_COST,
@@ -33,7 +33,7 @@ TASKS = {
     1: (ComTask((0.01, 3.0)), PostureTask(), FootTask(Leg.FRONT)),
     2: (ComTask((1.0, 3.0)), PostureTask()),
 }
-ROWS_PER_FOOT = rows_per_foot(2)
+ROWS_PER_FOOT = rows_per_contact(2)
 STANCES = {0: (), 1: (0,), 2: (0, 1)}
 
 
