@@ -22,7 +22,7 @@ from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.plant import default_plant
 from template_control.plant.terrain_spec import terrain_from
-from template_control.robot.library import FLOATING_ROBOTS, ROBOTS
+from template_control.robot.library import FLOATING_ROBOTS, SHIPPED
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import STEPS
 from template_control.run.options import Phase, Push, TurningRate
@@ -74,7 +74,7 @@ _MANY = {"action": "append"}
 
 def _model(robot: str) -> RobotSpec:
     """A path is made absolute, so that what is written down does not depend on the folder."""
-    own = robot not in ROBOTS and ("/" in robot or robot.endswith(".urdf"))
+    own = robot not in SHIPPED and ("/" in robot or robot.endswith(".urdf"))
     return RobotSpec(str(Path(robot).absolute()) if own else robot)
 
 
@@ -95,7 +95,7 @@ ROBOT = (
     Flag(
         "--robot",
         "robot",
-        f"a shipped robot ({', '.join(ROBOTS)}) or the path of a planar URDF; {_DEFAULT} if not"
+        f"a shipped robot ({', '.join(SHIPPED)}) or the path of a planar URDF; {_DEFAULT} if not"
         " given",
         {"metavar": "NAME|URDF"},
         _model,
@@ -104,7 +104,7 @@ ROBOT = (
         "--floating-base --free",
         "robot.free",
         f"nothing holds the robot: it walks in space, as {', '.join(FLOATING_ROBOTS)} can, and 3D"
-        " URDFs of two legs with hip ab- and adduction",
+        " URDFs of two or four legs with hip ab- and adduction",
         _ON,
     ),
 )
@@ -147,8 +147,8 @@ OWN_URDF = (
     Flag(
         "--feet",
         "robot.feet",
-        "its foot links; left_foot and right_foot if not given",
-        {"nargs": 2, "metavar": ("LEFT", "RIGHT")},
+        "its foot links, left and right, or four; left_foot and right_foot if not given",
+        {"nargs": "+", "metavar": "LINK"},
     ),
     Flag(
         "--sagittal-joints",

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from template_control.embedding.robot_template import default_gait
-from template_control.robot.library import ROBOTS, load_robot
+from template_control.robot.legs import HINGES
+from template_control.robot.library import ROBOTS, SHIPPED, load_floating_robot, load_robot
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.terminal import Table, plain_console
 
@@ -24,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """List them."""
-    rows = [_describe(name) for name in ROBOTS]
+    rows = [_describe(name) for name in SHIPPED]
     if options.json:
         print(json.dumps(rows))
         return 0
@@ -33,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     for i, column in enumerate(columns):
         table.add_column(column, justify="left" if i == 0 else "right")
     for row in rows:
-        hip, knee = row["torque_limit"][:2]
+        hip, knee = row["hip_knee_torque"]
         gait = row["gait"]
         table.add_row(
             row["robot"],
@@ -53,15 +54,16 @@ def run(options: argparse.Namespace) -> int:
 
 def _describe(name: str) -> dict[str, Any]:
     """A robot in SI units (angles where named so in degrees)."""
-    robot = load_robot(name)
+    robot = load_robot(name) if name in ROBOTS else load_floating_robot(name)
     gait = default_gait(robot)
     p = gait.parameters
     return {
         "robot": name,
-        "about": ROBOTS[name],
+        "about": SHIPPED[name],
         "mass": robot.mass,
         "leg_length": robot.leg_length,
         "joints": list(robot.joint_names),
+        "hip_knee_torque": robot.torque_limit[list(robot.legs[0][-HINGES:])].tolist(),
         "torque_limit": robot.torque_limit.tolist(),
         "velocity_limit": robot.velocity_limit.tolist(),
         "template": {"rest_length": p.rest_length, "leg_stiffness": p.leg_stiffness},

@@ -28,6 +28,9 @@ Undisturbed feet come up to 10 ms before it."""
 SINKING = 0.3
 """A foot that still comes down faster than this is not due: it may graze an edge [m/s, of the
 reference template]. A walking swing ends with 0.2 m/s (``SwingOptions.landing_speed``)."""
+SETTLING = 0.6
+"""A contact comes down as fast to those of its foot that have landed [m/s, of the reference
+template]: soon, and not hard."""
 # A force whose horizontal part is more than this many times its vertical one comes from a wall:
 # from ground to stand on it is the friction coefficient's at most.
 _STEEPNESS = 1.0

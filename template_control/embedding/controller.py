@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.embedding.contacts import EARLY, NO_FORCE, SINKING, ContactMonitor
+from template_control.embedding.contacts import EARLY, NO_FORCE, SETTLING, SINKING, ContactMonitor
 from template_control.embedding.free.motion import LateralMotion
 from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.free.trot import default_options
 from template_control.embedding.ground import SlopingGround
 from template_control.embedding.learners.learners import Learners
 from template_control.embedding.modes import PLACED, PathClock, RobotGuards, modes
@@ -47,7 +48,6 @@ from template_control.embedding.tick import (
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.robot.terms import UP
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Leg
@@ -110,12 +110,13 @@ class EmbeddingController:
         if route is None:
             raise ParameterError("several planners and no route: say which stride comes next")
         scale = Scale.of(route.parameters)
-        given = options or (FreeOptions() if robot.directions > UP else EmbeddingOptions())
+        given = options or default_options(robot)
         o = scaled(replace(given, phases=given.phase_table(), tasks={}), scale)
         self.robot, self.options, self.parameters = robot, o, route.parameters
         self._tick = tick = np.zeros(1, TICK)
         now = tick[0]
         now["early"], now["sinking"] = EARLY * scale.time, SINKING * scale.speed
+        now["settling"] = SETTLING * scale.speed
         now["friction_margin"] = o.friction_margin
         self.learners = Learners(o, self.parameters, robot, tick)
         self.ground = SlopingGround(robot, self.parameters.rest_length)

@@ -197,13 +197,14 @@ def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
     hip = robot.base_dof + joint
     momentum = abs(float(robot.angular_momentum_jacobian[hip])) * _QUINTIC_SPEED * angle / time
     torque = float(robot.mass_matrix[hip, hip]) * _QUINTIC_ACCELERATION * angle / time**2
+    momentum *= len(robot.groups[0])  # legs swing together
     return float(momentum / (p.mass * gait.vlo[1])), float(torque / robot.torque_limit[joint])
 
 
 def _stance(robot: Biped, gait: WalkingGait) -> float:
     """The largest knee torque over its limit, of a leg without mass that pushes as the spring."""
     p = gait.parameters
-    torque = stance_figures(gait)[0] * p.mass * p.gravity * p.rest_length
+    torque = stance_figures(gait)[0] * p.mass * p.gravity * p.rest_length / len(robot.groups[0])
     return torque / min(float(robot.torque_limit[leg[-1]]) for leg in robot.legs)
 
 
@@ -220,7 +221,8 @@ def knee_torque(robot: Biped, gait: RunningGait) -> float:
     half = 0.5 * max(leg - above_hip - robot.foot_radius, 0.0)
     away = float(np.sqrt(max(straight**2 - half**2, 0.0)))
     p = gait.parameters
-    return _KNEES * float(gait.controls[Slot.K_SC]) * (p.rest_length - leg) * away
+    torque = _KNEES * float(gait.controls[Slot.K_SC]) * (p.rest_length - leg) * away
+    return torque / len(robot.groups[0])  # knees that bend together
 
 
 def _shortest_leg(gait: RunningGait) -> float:

@@ -25,7 +25,7 @@ from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.compiled import compiled
 from template_control.robot.biped import Biped
-from template_control.robot.terms import UP
+from template_control.robot.terms import MOST_CONTACTS, UP
 from template_control.slip.automaton.vocabulary import Leg, Reset
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, Scale, scaled, tuned
@@ -83,6 +83,8 @@ FEET = np.dtype(
         ("swing_time", _F, (2,)),  # time since each foot lifted off [s]
         ("elapsed", _F, (2,)),  # duration of the reference's swing so far [s]
         ("over", _F, (2,)),  # height that the reference keeps, above a wall it met [m]
+        ("spread", _F, (MOST_CONTACTS, 2)),  # of each contact from its foot, as the trunk faces [m]
+        ("lifted", _F, (MOST_CONTACTS, 3)),  # the same where the foot lifted off [m]
         *((name, _F, (2,)) for name in _SHAPE),  # of each foot's ``SwingOptions``
     ],
     align=True,
@@ -172,6 +174,34 @@ def furthest(share: float, hip: tuple[float, float], height: float, leg_length: 
     """
     below, reach = hip[1] - height, share * leg_length
     return hip[0] + np.sqrt(max(reach * reach - below * below, 0.0))
+
+
+@compiled
+def spread_contacts(f: Any, foot: int, r: Any, yaw: float, duration: float, offset: Array) -> None:
+    """Write where the contacts of a foot in the air are to be, from the foot's reference.
+
+    They stand around their foot as the trunk faces, at ``yaw`` [rad]. How far they were off when
+    the foot lifted fades over half a ``duration`` of a step [s] along a quintic. ``f`` is of
+    ``FEET``, ``r`` of ``ROBOT_DATA``; ``offset`` (n, 3, 3) is that of ``REFERENCES``.
+    """
+    half = 0.5 * duration
+    s = min(f.swing_time[foot] / half, 1.0)
+    fade = 1.0 - s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+    rate = -30.0 * (s * (1.0 - s)) ** 2 / half
+    bend = -60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / half**2
+    c, sine = np.cos(yaw), np.sin(yaw)
+    for i in range(r.members[foot]):
+        contact = r.group[foot, i]
+        x, y = f.spread[contact, 0], f.spread[contact, 1]
+        for axis in range(3):
+            place = 0.0
+            if axis == 0:
+                place = c * x - sine * y
+            elif axis == 1:
+                place = c * y + sine * x
+            off = f.lifted[contact, axis] - place
+            offset[contact, axis, 0] = place + fade * off
+            offset[contact, axis, 1], offset[contact, axis, 2] = rate * off, bend * off
 
 
 @compiled
@@ -335,6 +365,11 @@ class Feet:
         and velocity in the updated model.
         """
         self.swing_time[foot] = swung
+        for contact in robot.groups[foot]:
+            now = robot.data[0]
+            away = now["contact_position"][contact] - now["foot_position"][foot]
+            self.data["spread"][0, contact] = robot.spread[contact]
+            self.data["lifted"][0, contact] = away
         self.swing[foot].start(robot.foot_position[foot], robot.foot_velocity[foot], swung)
 
     def apply(self, reset: Reset) -> None:

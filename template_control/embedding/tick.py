@@ -39,6 +39,7 @@ from template_control.embedding.swing import (
     furthest,
     meet_wall,
     quintic_step,
+    spread_contacts,
     swing_step,
 )
 from template_control.robot.terms import LEGS, UP
@@ -55,6 +56,7 @@ TICK = np.dtype(
         ("time", _F),  # since the start [s]
         ("early", _F),  # a touchdown is due from this long before its time on the path [s]
         ("sinking", _F),  # a foot that comes down faster is not due [m/s]
+        ("settling", _F),  # a contact comes down to others of its foot as fast [m/s]
         ("friction_margin", _F),  # share of the friction that the cones use
         ("tilt", _F),  # of the axes with the ground [rad]
         ("trim", _F),  # acceleration that the momentum trim adds in its phases [m/s^2]
@@ -210,6 +212,7 @@ def advance(
     if lateral is not None:
         _swing_sideways(t, r, want, lateral, dt)
         _turn(t, want, dt)
+        _place_contacts(t, r, want)
     for k in range(4):
         want.com_now[k] = s.state[k]
     want.com_now[0] -= s.toes[0]
@@ -321,6 +324,32 @@ def _turn(t: Any, want: Any, dt: float) -> None:
     done = min((t.time - lateral.begun) / lateral.duration, 1.0)
     want.lean[2] = lateral.turn * (done - 0.5)
     want.spin = lateral.spin
+
+
+@compiled
+def _place_contacts(t: Any, r: Any, want: Any) -> None:
+    """Write where the contacts of a foot with several are to be, from the foot's reference.
+
+    Those of a foot that stands on others come straight down.
+    """
+    f, mode = t.feet, t.mode
+    for i in range(mode.swings):
+        foot = f.roles[mode.swing_leg[i]]
+        if r.members[foot] > 1:
+            spread_contacts(f, foot, r, want.lean[2], t.path.step_duration, want.offset)
+    for leg in range(mode.stances):
+        foot = f.roles[leg]
+        want.furthest[foot] = np.inf
+        for i in range(r.members[foot]):
+            contact = r.group[foot, i]
+            if want.stands[contact]:
+                continue
+            for axis in range(3):
+                reference = want.side[foot] if axis == 1 else want.foot[foot, axis // 2]
+                down = -t.settling if axis == 2 else 0.0
+                away = want.offset[contact, axis]
+                away[0] = r.contact_position[contact, axis] - reference[0]
+                away[1], away[2] = down - reference[1], -reference[2]
 
 
 @compiled

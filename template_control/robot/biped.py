@@ -49,7 +49,9 @@ class Biped(Robot):
         walk: touchdown angle [rad] and speed at VLO over sqrt(g l0) of its default gait, or
             None where none is better than the library's.
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
-        leg_length: from hip to the foot sphere's centre with a straight knee [m].
+        leg_length: from hip to the foot sphere's centre, with a knee as straight as its range lets
+            it be [m].
+        spread: (n, 2) x and y of each contact from its foot, where the legs hang down [m].
         joint_sign: (nu,) 1 of a hip or knee that turns about +y, -1 about -y; of joints above the
             hip the sign of their axis' y.
         leg_mass: of the heavier leg [kg].
@@ -83,6 +85,7 @@ class Biped(Robot):
     walk: tuple[float, float] | None
     legs: tuple[tuple[int, ...], ...]
     leg_length: float
+    spread: Array
     joint_sign: Array
     leg_mass: float
     trunk_com: float
@@ -126,7 +129,7 @@ class Biped(Robot):
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
         straight = straight_legs(model, self._leg_joints, self._foot_ids)
-        self.leg_length, self._neutral = straight.length, straight.q
+        self.leg_length, self._neutral = straight.reach, straight.q
         check_size(path, self.mass, self.leg_length, foot_radius)
         self.joint_sign = np.sign(straight.axes[1, self.base_dof :])
         self.leg_mass = max(
@@ -137,6 +140,7 @@ class Biped(Robot):
         self.data["foot_radius"], self.data["leg_length"] = foot_radius, self.leg_length
         self._sources = sources(model, data, self._foot_ids, self._joint_limits)
         self._look()
+        self.spread = np.zeros((len(feet), 2))
         self._prepare()
 
     def _look(self) -> None:

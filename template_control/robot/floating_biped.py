@@ -26,7 +26,7 @@ from template_control.checks.ranges import Interval, Positive
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.legs import HINGES
-from template_control.robot.requirements import add_feet, check_floating
+from template_control.robot.requirements import add_feet, check_floating, feet_of_legs
 from template_control.robot.terms import FLOATING_DOF, UP, Jacobians, Trunk, gather_floating
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import (
@@ -126,9 +126,10 @@ class FloatingBaseBiped(Biped):
         path: the URDF file.
         urdf: its text.
         model: Pinocchio's of it.
-        feet: names of the two foot frames, left then right.
+        feet: names of the foot frames.
         foot_radius: of the foot spheres [m].
         walk: the robot's own gait, or None.
+        groups: the contacts of each template leg.
 
     Attributes:
         heading: angle from the world's x to the heading frame's, to the left positive [rad].
@@ -182,6 +183,9 @@ class FloatingBaseBiped(Biped):
         for i, (joint, angle) in enumerate(self.spare):
             now["spare_joint"][i], now["spare_angle"][i] = joint, angle
         self._frame[4] = now["hips"][1]  # of the trunk's origin
+        for leg, group in enumerate(self.groups):
+            contacts = list(group)
+            self.spread[contacts] = (self.space.contact[contacts] - self.space.foot[leg])[:, :2]
 
     @classmethod
     @checked
@@ -193,20 +197,23 @@ class FloatingBaseBiped(Biped):
         limits: JointLimits | None = None,
         walk: tuple[float, float] | None = None,
         *,
+        groups: Sequence[Sequence[int]] | None = None,
         locked: Mapping[str, float] | None = None,
         foot_offset: tuple[float, float, float] | None = None,
         lossless: bool = False,
     ) -> FloatingBaseBiped:
         """Load a URDF whose root link is the trunk: x forward, y left, z up.
 
-        Either leg ends in a hip and a knee about y; one joint or two may come before them.
+        Each leg ends in a hip and a knee about y; one joint or two may come before them.
 
         Args:
             path: the URDF file.
-            feet: the two foot links, left then right.
+            feet: the foot links; of a biped left then right, of a quadruped four.
             foot_radius: of spheres to be put into the feet [m]; None to keep the feet's own.
             limits: in place of the URDF's; None to keep those.
             walk: see :class:`~template_control.robot.biped.Biped`.
+            groups: the feet, by their places in ``feet``, of each of the two template legs; None:
+                one each of a biped, the diagonal pairs of a quadruped, with which it trots.
             locked: positions of joints that are held there [rad, m]; with a joint those that mimic
                 it.
             foot_offset: of the spheres' centres from the foot links' origins, in the links' axes
@@ -214,8 +221,8 @@ class FloatingBaseBiped(Biped):
             lossless: whether the joints' damping and friction are left out.
 
         Raises:
-            RobotError: if the file is missing, no URDF, no such biped, or lacks a foot; if a mass,
-                an inertia, a size or a limit is none.
+            RobotError: if the file is missing, no URDF, no such robot, or lacks a foot; if a mass,
+                an inertia, a size or a limit is none; if a foot is in no group, or in two.
         """
         path = Path(path)
         tree = read_urdf(path)
@@ -235,7 +242,8 @@ class FloatingBaseBiped(Biped):
         check_floating(path, model, feet)
         check_bodies(path, tree, model, _ROOT + 1)
         radius = add_feet(path, urdf, model, feet)
-        return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
+        legs = feet_of_legs(path, model, feet, groups)
+        return cls(path, urdf, model, tuple(feet), radius, walk, groups=legs)
 
     def update(self, q: Array, v: Array) -> None:
         """See :meth:`~template_control.robot.biped.Biped.update`.

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import atan2, hypot, pi
+from math import atan2, cos, hypot, pi, sqrt
 
 import numpy as np
 import pinocchio as pin
@@ -30,12 +30,15 @@ class StraightLegs:
 
     Attributes:
         q: (nq,) configuration; the angle of a hinge is the one next to the middle of its range.
-        length: from the hip's axis over the knee's to the foot, of the shorter leg [m].
+        length: from the hip's axis over the knee's to the foot, of the shortest leg [m].
+        reach: from the hip's axis to the foot, with a knee as straight as its range lets it be, of
+            the leg that reaches least [m].
         axes: (3, nv) directions of the joints' axes in the world, in ``q``.
     """
 
     q: Array
     length: float
+    reach: float
     axes: Array
 
 
@@ -52,18 +55,25 @@ def straight_legs(
         _turn_lateral(model, data, q, leg)
     axes = np.array(pin.computeJointJacobians(model, data, q)[3:])
     pin.updateFramePlacements(model, data)
-    lengths = []
+    lengths, reaches = [], []
     for (*_, hip, knee), foot in zip(legs, feet, strict=True):
         thigh = data.oMi[knee].translation - data.oMi[hip].translation
         shank = data.oMf[foot].translation - data.oMi[knee].translation
-        lengths.append(hypot(thigh[0], thigh[2]) + hypot(shank[0], shank[2]))
+        upper, lower = hypot(thigh[0], thigh[2]), hypot(shank[0], shank[2])
+        lengths.append(upper + lower)
         lean = atan2(-thigh[0], -thigh[2])
         bend = atan2(-shank[0], -shank[2]) - lean
         for joint, angle in ((hip, lean), (knee, bend)):
             sign = np.sign(axes[1, model.idx_vs[joint]])
             place = model.idx_qs[joint]
             q[place] = _in_range(model, joint, q[place] - sign * angle)
-    return StraightLegs(q, min(lengths), np.array(pin.computeJointJacobians(model, data, q)[3:]))
+        low, high = model.lowerPositionLimit[place], model.upperPositionLimit[place]
+        bend = float(max(low - q[place], q[place] - high, 0.0))  # the knee's, at the least
+        folded = sqrt(upper**2 + lower**2 + 2.0 * upper * lower * cos(bend))
+        reaches.append(folded if bend > 0.0 else lengths[-1])
+    return StraightLegs(
+        q, min(lengths), min(reaches), np.array(pin.computeJointJacobians(model, data, q)[3:])
+    )
 
 
 def middle(model: pin.Model, joint: int) -> float:

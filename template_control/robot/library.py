@@ -12,6 +12,7 @@ from template_control.checks.checked import checked
 from template_control.errors import RobotError
 from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.terms import LEGS
 
 _FILES = (".urdf", ".xacro")
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -26,6 +27,7 @@ class _Entry:
         about: one line.
         distribution: the Python package that brings the URDF; "" for ours.
         feet, sagittal_joints, foot_radius, walk: see :meth:`PlanarBiped.from_urdf`.
+        planar: whether it is held in its sagittal plane, unless it is to be free.
         free: whether it can walk free.
         limits: of a robot that walks free, in place of the URDF's; None to keep those.
     """
@@ -33,10 +35,11 @@ class _Entry:
     file: str
     about: str
     distribution: str = ""
-    feet: tuple[str, str] = ("left_foot", "right_foot")
+    feet: tuple[str, ...] = ("left_foot", "right_foot")
     sagittal_joints: tuple[str, ...] = ()
     foot_radius: float | None = None
     walk: tuple[float, float] | None = None
+    planar: bool = True
     free: bool = False
     limits: JointLimits | None = None
 
@@ -50,6 +53,8 @@ _BOLT_ACTUATOR = JointLimits(
     velocity=300.0 * 24.0 / 9.0 * np.pi / 30.0,
     ranges=((-1.0, 1.0), (-1.9, 1.9), (-3.4, 3.4)),
 )
+
+_CORNERS = ("FL", "FR", "RL", "RR")  # as Unitree names the legs of a quadruped
 
 _ENTRIES = {
     "five-link": _Entry("five_link.urdf", "light legs, as robots built for the SLIP have them"),
@@ -84,13 +89,28 @@ _ENTRIES = {
         sagittal_joints=("left_hip", "left_knee", "right_hip", "right_knee"),
         free=True,
     ),
+    "go2": _Entry(
+        "go2.urdf",
+        "Unitree's quadruped of example-robot-data, which trots",
+        distribution="example-robot-data",
+        feet=tuple(f"{corner}_foot" for corner in _CORNERS),
+        foot_radius=0.022,
+        planar=False,
+        free=True,
+    ),
 }
 
-ROBOTS: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
+SHIPPED: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
+"""Names of all robots, with a line about each."""
+
+ROBOTS: dict[str, str] = {name: SHIPPED[name] for name, e in _ENTRIES.items() if e.planar}
 """Names that :func:`load_robot` knows, with a line about each."""
 
 FLOATING_ROBOTS = tuple(name for name, entry in _ENTRIES.items() if entry.free)
 """Names that :func:`load_floating_robot` knows."""
+
+QUADRUPEDS = tuple(name for name, entry in _ENTRIES.items() if len(entry.feet) > LEGS)
+"""Those of them that have four legs."""
 
 
 @checked
@@ -101,7 +121,7 @@ def robot_path(name: str) -> Path:
         RobotError: if there is no such robot.
     """
     if name not in _ENTRIES:
-        raise RobotError(f"there is no robot {name!r}: give one of {list(ROBOTS)} or a URDF file")
+        raise RobotError(f"there is no robot {name!r}: give one of {list(SHIPPED)} or a URDF file")
     entry = _ENTRIES[name]
     if entry.distribution:
         candidates = _files(entry)
@@ -148,6 +168,11 @@ def load_robot(name: str | Path) -> PlanarBiped:
     if text not in _ENTRIES and (text.endswith(_FILES) or "/" in text):
         return PlanarBiped.from_urdf(text)
     path, entry = robot_path(text), _ENTRIES[text]
+    if not entry.planar:
+        raise RobotError(
+            f"robot {text!r} is no planar biped: run it free, with --floating-base or"
+            " load_floating_robot"
+        )
     return PlanarBiped.from_urdf(
         path,
         entry.feet,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from template_control.robot.legs import (
     leg_joints,
     straight_legs,
 )
-from template_control.robot.terms import FLOATING_DOF, PLANAR_DOF
+from template_control.robot.terms import FLOATING_DOF, LEGS, PLANAR_DOF
 
 Array = NDArray[np.float64]
 
@@ -32,9 +33,7 @@ _DENSITY = (0.1, 2e4)
 
 
 def _check_feet(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
-    """Check that two feet are named, and are there."""
-    if len(feet) != 2:
-        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
+    """Check that feet are there."""
     for foot in feet:
         if not model.existFrame(foot, pin.FrameType.BODY):
             links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
@@ -43,8 +42,9 @@ def _check_feet(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
 
 def _check_legs_apart(path: Path, feet: Sequence[str], legs: Sequence[Sequence[int]]) -> None:
     """Check that each foot has a leg of its own."""
-    if set(legs[0]) & set(legs[1]):
-        raise RobotError(f"{path}: feet {list(feet)} hang on the same leg: name one of each")
+    for (one, leg), (other, another) in combinations(zip(feet, legs, strict=True), 2):
+        if set(leg) & set(another):
+            raise RobotError(f"{path}: feet {[one, other]} hang on the same leg: name one of each")
 
 
 def check_planar(path: Path, model: pin.Model) -> None:
@@ -88,6 +88,8 @@ def check_planar(path: Path, model: pin.Model) -> None:
 
 def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
     """Check that each foot has a hip and a knee of its own, and the trunk turns at the hips."""
+    if len(feet) != LEGS:
+        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
     _check_feet(path, model, feet)
     legs = leg_joints(model, feet, PLANAR_DOF)
     _check_legs_apart(path, feet, legs)
@@ -120,7 +122,11 @@ def check_guide(path: Path, model: pin.Model) -> None:
 
 
 def check_floating(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
-    """Check that a robot with a free flyer is a biped whose legs can place their feet anywhere."""
+    """Check that a robot with a free flyer has legs that can place their feet anywhere."""
+    if len(feet) not in (LEGS, 2 * LEGS):
+        raise RobotError(
+            f"{len(feet)} feet were named for {path}: a biped has two, a quadruped four"
+        )
     _check_feet(path, model, feet)
     for joint, name in list(zip(model.joints, model.names, strict=True))[2:]:
         if joint.nq != 1 or joint.nv != 1:
@@ -134,11 +140,13 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
             f"{path}: the root link weighs nothing, and so does what is fixed to it: give the trunk"
             " an <inertial> with its mass"
         )
+    most = _MOST if len(legs) == LEGS else _LEAST
     for leg, foot in zip(legs, feet, strict=True):
-        if not _LEAST <= len(leg) <= _MOST:
+        if not _LEAST <= len(leg) <= most:
             raise RobotError(
-                f"{path}: {len(leg)} joints move foot {foot!r}: three or four are needed, the last"
-                " two of them hip and knee about the lateral axis"
+                f"{path}: {len(leg)} joints move foot {foot!r}:"
+                f" {'three or four' if most > _LEAST else 'three'} are needed, the last two of"
+                " them hip and knee about the lateral axis"
             )
     axes = straight_legs(model, legs, [foot_frame(model, foot) for foot in feet]).axes
     for leg, foot in zip(legs, feet, strict=True):
@@ -148,13 +156,47 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
                     f"{path}: joint {model.names[joint]!r} of foot {foot!r} does not turn about the"
                     " lateral axis y, as hip and knee must, the last two joints of a leg"
                 )
-    if len(legs[0]) + len(legs[1]) != model.nv - FLOATING_DOF:
-        others = [n for j, n in enumerate(model.names) if j > 1 and j not in (*legs[0], *legs[1])]
+    joints = [joint for leg in legs for joint in leg]
+    if len(joints) != model.nv - FLOATING_DOF:
+        others = [name for j, name in enumerate(model.names) if j > 1 and j not in joints]
         raise RobotError(
             f"{path}: joints {others} are in no leg: make them fixed, or name them in `locked`"
         )
     hints = {"effort": "its limit", "velocity": "its limit"}
-    _check_limits(path, model, (*legs[0], *legs[1]), hints)
+    _check_limits(path, model, joints, hints)
+
+
+def feet_of_legs(
+    path: Path, model: pin.Model, feet: Sequence[str], groups: Sequence[Sequence[int]] | None
+) -> tuple[tuple[int, ...], ...]:
+    """The feet of each template leg, by their places in ``feet``.
+
+    Those given, or where None are: one each of a biped, the diagonal pairs of a quadruped, that
+    with the left front foot first. A RobotError if given ones are not each foot once, in two groups
+    of as many.
+    """
+    if groups is not None:
+        found = tuple(tuple(group) for group in groups)
+        named = sorted(foot for group in found for foot in group)
+        if len(found) != LEGS or named != list(range(len(feet))) or len({*map(len, found)}) > 1:
+            raise RobotError(
+                f"{path}: groups are {[list(group) for group in found]}: give two of as many feet,"
+                f" each foot once, by the places 0 to {len(feet) - 1}"
+            )
+        return found
+    if len(feet) == LEGS:
+        return ((0,), (1,))
+    legs = leg_joints(model, feet, 1)
+    data, q = model.createData(), straight_legs(model, legs, [foot_frame(model, f) for f in feet]).q
+    pin.framesForwardKinematics(model, data, q)
+    x, y = np.array([data.oMf[foot_frame(model, foot)].translation[:2] for foot in feet]).T
+    first = np.flatnonzero((x > x.mean()) == (y > y.mean()))
+    other = np.flatnonzero((x > x.mean()) != (y > y.mean()))
+    if len(first) != len(other):
+        raise RobotError(
+            f"{path}: feet {list(feet)} are not at the corners of a rectangle: give groups"
+        )
+    return tuple(map(int, first)), tuple(map(int, other))
 
 
 def _check_limits(

@@ -10,8 +10,9 @@ from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.robot.library import ROBOTS, load_floating_robot, load_robot
+from template_control.robot.library import QUADRUPEDS, SHIPPED, load_floating_robot, load_robot
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.terms import LEGS
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class RobotSpec(Checked):
 
     Attributes:
         model: a shipped robot, or the path of a URDF.
-        feet: its foot links; None: left_foot and right_foot.
+        feet: its foot links, four of a quadruped; None: left_foot and right_foot.
         sagittal_joints: of a 3D URDF, hips and knees.
         foot_radius: of the spheres put into the feet of a 3D URDF [m].
         foot_offset: of their centres from the foot links' origins, in the links' axes [m].
@@ -34,7 +35,7 @@ class RobotSpec(Checked):
     """
 
     model: str = "five-link"
-    feet: tuple[str, str] | None = None
+    feet: tuple[str, ...] | None = None
     sagittal_joints: tuple[str, ...] = ()
     foot_radius: float | None = None
     locked: Mapping[str, float] = field(default_factory=dict)
@@ -43,6 +44,11 @@ class RobotSpec(Checked):
     foot_offset: tuple[float, float, float] | None = None
     gravity: Positive | None = None
     masses: Mapping[str, Positive] = field(default_factory=dict)
+
+    @property
+    def trots(self) -> bool:
+        """True if the robot is a quadruped, whose pairs of legs are the template's legs."""
+        return self.model in QUADRUPEDS or (self.feet is not None and len(self.feet) > LEGS)
 
     def load(self) -> Biped:
         """The robot.
@@ -74,7 +80,7 @@ class RobotSpec(Checked):
         given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
         if not given:
             return load_floating_robot(self.model) if self.free else load_robot(self.model)
-        if self.model in ROBOTS:
+        if self.model in SHIPPED:
             names = ", ".join(name.replace("_", " ") for name in given)
             raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")
         if self.free:

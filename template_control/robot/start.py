@@ -64,7 +64,8 @@ class FloatingBasePose(Checked):
         com: (3,) of the CoM [m].
         com_velocity: (3,) m/s; with the angular momentum about the CoM, as if it moved the CoM: m z
             times it is the momentum about the point on the ground below.
-        feet: (2, 3) lowest points of rear and front foot [m].
+        feet: (2, 3) lowest points of rear and front foot [m]; of several contacts the mean, from
+            which they are as far as where the legs hang down.
         feet_velocity: (2, 3) [m/s].
         rear: the foot that is the rear leg's.
         pitch: of the trunk [rad].
@@ -141,7 +142,7 @@ def state_at_vlo(
 
 @checked
 def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple[Array, Array]:
-    """State of a floating-base biped whose CoM and feet are in a pose.
+    """State of a floating-base robot whose CoM and feet are in a pose.
 
     Args:
         robot: the model; its last update is overwritten, and the robot faces along the world's x.
@@ -158,7 +159,7 @@ def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple
         robot, lambda q, _: _floating_configuration(robot, pose, q), (_LONGEST,), pose.com[2]
     )
     robot.update(q, np.zeros(robot.nv))
-    rows, feet = _rows(robot), [pose.rear, 1 - pose.rear]
+    rows = _rows(robot)
     weight = robot.mass * pose.com[2]
     if pose.in_flight:
         rows[3:6] = robot.space.momentum_jacobian
@@ -167,8 +168,7 @@ def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple
         rows[1] -= robot.space.momentum_jacobian[0] / weight
     wanted = np.zeros(len(rows))
     wanted[:3] = pose.com_velocity
-    for foot, velocity in zip(feet, pose.feet_velocity, strict=True):
-        wanted[6 + 3 * foot : 9 + 3 * foot] = velocity
+    wanted[6:] = _by_contact(robot, pose, pose.feet_velocity).ravel()
     v = _smallest(robot, rows, wanted)
     robot.update(q, v)
     return q, v
@@ -289,8 +289,8 @@ def _floating_configuration(
     """As :func:`_configuration`, of a floating-base robot."""
     q[:3] = pose.com[0], pose.com[1], 0.9 * pose.com[2]
     upright = pin.rpy.rpyToMatrix(0.0, pose.pitch, 0.0)
-    feet = np.empty((2, 3))
-    feet[[pose.rear, 1 - pose.rear]] = pose.feet
+    feet = _by_contact(robot, pose, pose.feet)
+    feet[:, :2] += robot.spread
 
     def error(_: Array) -> Array:
         turn = pin.log3(robot.rotation @ upright.T)
@@ -300,7 +300,7 @@ def _floating_configuration(
     def step(q: Array, error: Array) -> Array:
         rows, r = _rows(robot), robot.foot_radius
         # The lowest point's path, not that of the material point which touches there.
-        for foot in range(2):
+        for foot in range(len(robot.feet)):
             turning = _foot_turning(robot, q, foot)
             rows[6 + 3 * foot] += r * turning[1]
             rows[7 + 3 * foot] -= r * turning[0]
@@ -309,15 +309,23 @@ def _floating_configuration(
     return _newton(robot, q, error, step, _LONGEST, 100)
 
 
+def _by_contact(robot: FloatingBaseBiped, pose: FloatingBasePose, values: Array) -> Array:
+    """(n, 3) of each contact what rear and front foot have, ``values`` (2, 3)."""
+    found = np.empty((len(robot.feet), 3))
+    for leg, value in zip((pose.rear, 1 - pose.rear), values, strict=True):
+        found[list(robot.groups[leg])] = value
+    return found
+
+
 def _rows(robot: FloatingBaseBiped) -> Array:
-    """(12, nv) Jacobians of the CoM, the trunk's turning and both feet."""
+    """(6 + 3 n, nv) Jacobians of the CoM, the trunk's turning and all contacts."""
     s = robot.space
     feet = s.contact_jacobian.reshape(-1, robot.nv)
     return np.concatenate((s.com_jacobian, s.turning_jacobian, feet))
 
 
 def _foot_turning(robot: FloatingBaseBiped, q: Array, foot: int) -> Array:
-    """(3, nv) Jacobian of a foot's angular velocity, in the world's axes."""
+    """(3, nv) Jacobian of the angular velocity of a contact's sphere, in the world's axes."""
     data = robot.model.createData()
     frame = foot_frame(robot.model, robot.feet[foot])
     world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

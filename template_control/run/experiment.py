@@ -16,6 +16,7 @@ from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
+from template_control.embedding.free.trot import TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
     AheadOptions,
@@ -109,7 +110,7 @@ class Experiment(Checked):
     robot: RobotSpec | Biped | str = field(default_factory=RobotSpec)
     motion: GaitSpec | Scenario | Gait | Route | None = None
     planner: PlannerSpec | Planner | Planners | None = None
-    controller: EmbeddingOptions | FreeOptions | None = None
+    controller: EmbeddingOptions | FreeOptions | TrotOptions | None = None
     world: PlantOptions | MujocoOptions | IdealOptions | Plant = field(
         default_factory=default_plant
     )
@@ -158,7 +159,16 @@ class Experiment(Checked):
     @property
     def tuning(self) -> EmbeddingOptions:
         """The controller's, the given one or its kind's default."""
-        return self.controller or (FreeOptions() if self.free else EmbeddingOptions())
+        return self.controller or self._kind()
+
+    def _kind(self) -> EmbeddingOptions:
+        """Options of the robot's kind."""
+        if not isinstance(self.robot, RobotSpec):
+            assert isinstance(self.robot, Biped)
+            return default_options(self.robot)
+        if self.robot.trots:
+            return TrotOptions()
+        return FreeOptions() if self.free else EmbeddingOptions()
 
     @property
     def delay_ticks(self) -> int:
@@ -199,7 +209,7 @@ class Experiment(Checked):
             if base.motion is None:
                 base = replace(base, motion=base.resolved().motion)
             base = settings.changed(base, first)
-            if isinstance(base.controller, FreeOptions) != base.free:
+            if type(base.controller) is not type(base._kind()):
                 base = replace(base, controller=None)  # the other kind of robot's
         rest = {k: v for k, v in keys.items() if k not in first}
         own = "world.robot" not in rest and any(k.startswith("world.robot.") for k in rest)

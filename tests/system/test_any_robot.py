@@ -13,7 +13,7 @@ from template_control.embedding.planners.running import RunningPlanner
 from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import RobotError
 from template_control.robot.five_link import FiveLink, Link
-from template_control.robot.library import ROBOTS, load_robot, robot_path
+from template_control.robot.library import ROBOTS, SHIPPED, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
@@ -265,7 +265,7 @@ def test_links_without_mass_are_refused():
 def test_robots_command_lists_them(capsys):
     assert main(["robots", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
-    assert [row["robot"] for row in rows] == list(ROBOTS)
+    assert [row["robot"] for row in rows] == list(SHIPPED)
     assert rows[0]["template"]["rest_length"] == pytest.approx(1.0)
     assert main(["robots"]) == 0
     assert "62 % of its mass" in capsys.readouterr().out

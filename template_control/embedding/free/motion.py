@@ -146,6 +146,9 @@ class LateralMotion:
             ahead[:], side[:] = c * ahead + s * side, c * side - s * ahead
             ahead[0] += about[0]
             side[0] += about[1]
+            for contact in self.robot.groups[foot]:
+                lifted = self._feet.data["lifted"][0, contact, :2]
+                lifted[:] = lifted @ [[c, -s], [s, c]]
         away = self._stood - about
         self._stood[:] = away @ [[c, -s], [s, c]] + about
 

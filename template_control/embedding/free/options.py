@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from template_control.checks.ranges import Positive, Share
+from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import RUNNING_SWING, Clock, PhaseControl, Phases
 from template_control.embedding.planners.lqr import LqrOptions
@@ -114,7 +114,7 @@ class FreeOptions(EmbeddingOptions):
     catches: bool = tuned(False)
     lateral: LateralOptions = field(default_factory=LateralOptions)
     noise_filter: NoiseFilterOptions | None = field(default_factory=NoiseFilterOptions)
-    step_width: Positive = tuned(0.22, LENGTH)
+    step_width: NotNegative = tuned(0.22, LENGTH)
     stop_share: Share = tuned(0.0)
     stop_horizon: Positive = tuned(0.05, TIME)
 

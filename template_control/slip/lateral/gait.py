@@ -186,7 +186,7 @@ class LateralWish(Checked):
         turn: angle by which the heading turns to the left at each section [rad].
     """
 
-    width: Positive
+    width: NotNegative
     aside: float = 0.0
     turn: float = 0.0
 
