@@ -36,6 +36,10 @@ class FrameTerms(NamedTuple):
 class Robot(ABC):
     """Model of a robot, and its dynamics at the last :meth:`update`.
 
+    Args:
+        model: Pinocchio's.
+        contacts: number of points of it that may touch the ground.
+
     Attributes (constant):
         base_dof: unactuated degrees of freedom, the first ones.
         base_joints: Pinocchio's joints that they belong to.

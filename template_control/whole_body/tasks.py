@@ -150,13 +150,8 @@ class ComTask(CompiledTask):
 def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
     """Write the rows of a :class:`ComTask`, and ``lift`` of references; see :func:`write_rows`."""
     com, momentum = arrays[2], arrays[3]
-    kp, kd, nv, up, pitch = (
-        task.gains[0],
-        task.gains[1],
-        com.shape[1],
-        com.shape[0] - 1,
-        len(momentum) // 2,
-    )
+    kp, kd, nv = task.gains[0], task.gains[1], com.shape[1]
+    up, pitch = com.shape[0] - 1, len(momentum) // 2
     ref, now = want.com, want.com_now
     height, rise = now[1], r.com_velocity[UP]
     moment = r.mass * height
