@@ -63,7 +63,7 @@ def footholds(
     at = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
     # Before the first tick the ground has not pressed yet.
     if np.all(record.contact_force[at[1:]].any(axis=(1, 2))):
-        return np.asarray(record.foot[at, record.rear[at], 0])
+        return np.asarray(record.of_legs(record.foot)[at, record.rear[at], 0])
     # No foot stands at an apex: that which bore most in between.
     load = record.contact_force[:, :, 1]
     strides = [slice(a, b) for a, b in pairwise(at)]

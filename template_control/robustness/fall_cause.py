@@ -44,7 +44,7 @@ def fall_cause(record: Record) -> str:
 
 
 def _bears(record: Record) -> NDArray[np.bool_]:
-    """(T, 2) which feet are loaded."""
+    """(T, n) which feet are loaded."""
     weight = record.weight
     return np.asarray(record.contact_force[:, :, 1] > _BEARS * weight)
 
@@ -86,7 +86,7 @@ def _stretched(record: Record) -> NDArray[np.bool_]:
     legs = record.legs
     wrong = np.zeros(len(record.time), dtype=bool)
     for foot, (leg, bears) in enumerate(zip(legs, _bears(record).T, strict=True)):
-        hip, knee, tip = record.joint[:, leg[0]], record.joint[:, leg[1]], record.foot[:, foot]
+        hip, knee, tip = record.joint[:, leg[-2]], record.joint[:, leg[-1]], record.foot[:, foot]
         whole = np.linalg.norm(hip - knee, axis=1) + np.linalg.norm(knee - tip, axis=1)
         wrong |= bears & (np.linalg.norm(hip - tip, axis=1) > _STRAIGHT * whole)
     return wrong

@@ -219,8 +219,9 @@ def floating_summary(record: FloatingRecord) -> dict[str, Any]:
 
 
 def step_widths(record: FloatingRecord) -> Array:
-    """(n,) lateral distance between the feet in each double stance, left less right [m]."""
+    """(n,) lateral distance of the template legs' feet in each double stance, left first [m]."""
     begun = np.flatnonzero(np.diff(record.in_phase(Phase.DS).astype(np.int8)) == 1) + 1
-    apart = record.space_foot[begun, 0, :2] - record.space_foot[begun, 1, :2]
+    left, right = record.of_legs(record.space_foot)[begun, :, :2].swapaxes(0, 1)
+    apart = left - right
     angle = record.heading[begun]
     return np.asarray(np.cos(angle) * apart[:, 1] - np.sin(angle) * apart[:, 0])

@@ -35,7 +35,9 @@ from template_control.view.style import (
     WINDOW,
     Look,
     as_text,
+    feet_shown,
     finish,
+    legs_shown,
     mark_limits,
     mark_peaks,
     save_figure,
@@ -47,7 +49,6 @@ Array = NDArray[np.float64]
 Draw = Callable[[Any, Look], Figure]
 
 _LOOK = Look()
-_FEET = ("left foot", "right foot")
 _POSES = 0.06  # [s] from one pose of the stick diagram to the next
 _MOST_POSES = 40
 
@@ -69,12 +70,16 @@ def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
         hip = record.joint[row, record.legs[0][-2]]
         pitch = record.attitude[row, 1] if isinstance(record, FloatingRecord) else q[2]
         top = hip + height * np.array([np.sin(pitch), np.cos(pitch)])
-        axes.plot(*np.stack((hip, top)).T, color=TRUNK, linewidth=1.2, alpha=0.55, label="trunk")
-        for foot, leg in enumerate(record.legs):
-            points = np.vstack((record.joint[row, leg[-2:]], record.foot[row, foot]))
+        trunk = np.stack((hip, top))
+        if len(record.legs) > len(SIDES):
+            trunk = record.joint[row, [leg[-2] for leg in record.legs]]
+        axes.plot(*trunk.T, color=TRUNK, linewidth=1.2, alpha=0.55, label="trunk")
+        legs = zip(record.legs, feet_shown(record), record.foot[row], strict=True)
+        for leg, (name, color), foot in legs:
+            points = np.vstack((record.joint[row, leg[-2:]], foot))
             axes.plot(
-                *points.T, color=SIDES[foot], linewidth=1.0, alpha=0.65,
-                label=_FEET[foot].replace("foot", "leg"),
+                *points.T, color=color, linewidth=1.0, alpha=0.65,
+                label=name.replace("foot", "leg"),
             )  # fmt: skip
     template = record.template_com[w]
     axes.plot(*template.T, color=TEMPLATE, linewidth=1.0, linestyle="--", label="template's CoM")
@@ -108,15 +113,16 @@ def _of_joints(record: Record, values: Array, limits: Array, what: str, look: Lo
     """Values (T, nu) of the joints, a panel a leg, with their ``limits``."""
     quantity, unit = what.split("|")
     w = look.rows(record, WINDOW)
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    figure = Figure(figsize=(9.0, 2.5 * len(record.legs)), layout="constrained")
     panels = figure.subplots(len(record.legs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     names = [" / ".join(record.joints[i] for i in pair) for pair in zip(*record.legs, strict=True)]
-    for axes, leg, foot in zip(panels, record.legs, _FEET, strict=True):
+    for axes, leg, (foot, _) in zip(panels, record.legs, feet_shown(record), strict=True):
         for joint, color, name in zip(leg, (LEFT, RIGHT, COM, TRUNK), names, strict=False):
             axes.plot(record.time[w], values[w, joint], color=color, linewidth=0.9, label=name)
         mark_limits(axes, [float(limits[joint]) for joint in leg], unit)
         shade(axes, record, w)
-        axes.set_ylabel(f"{foot.split()[0]} leg\n{quantity} [{unit}]")
+        side = foot.removesuffix("foot").rstrip(" _")
+        axes.set_ylabel(f"{side} leg\n{quantity} [{unit}]")
     panels[-1].set_xlabel("time [s]")
     return finish(figure, panels, f"{as_text(record.robot_name)}: joint {quantity}s", look)
 
@@ -133,7 +139,7 @@ def joint_speeds(record: Record, look: Look = _LOOK) -> Figure:
 
 
 def ground_forces(record: Record, look: Look = _LOOK) -> Figure:
-    """Ground reaction forces of either foot with the template's leg forces; impacts by their size.
+    """Ground reaction forces of both template legs with the template's own; impacts by their size.
 
     A landing foot's first sample is its impulse over one physics step. The scale is that of the
     template's forces.
@@ -142,18 +148,18 @@ def ground_forces(record: Record, look: Look = _LOOK) -> Figure:
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
     time = record.time[w]
-    for axes, axis, name in zip(panels, (1, 0), ("vertical", "horizontal"), strict=True):
+    for axes, axis, way in zip(panels, (1, 0), ("vertical", "horizontal"), strict=True):
         template = record.template_force[w, :, axis]
         span = 1.25 * np.abs(template).max() + 1.0
         axes.set_ylim(-0.05 * span if axis == 1 else -span, span)
-        for foot, color in enumerate(SIDES):
-            force = record.contact_force[w, foot, axis]
-            axes.plot(time, force, color=color, linewidth=0.9, label=_FEET[foot])
-            leg = np.where(record.rear[w] == foot, template[:, 0], template[:, 1])
+        for side, (name, color) in enumerate(legs_shown(record)):
+            force = record.contact_force[w][:, list(record.groups[side]), axis].sum(axis=1)
+            axes.plot(time, force, color=color, linewidth=0.9, label=name)
+            leg = np.where(record.rear[w] == side, template[:, 0], template[:, 1])
             axes.plot(time, leg, "--", color=TEMPLATE, linewidth=0.9, label="template's legs")
             mark_peaks(axes, time, force, color)
         shade(axes, record, w)
-        axes.set_ylabel(f"{name} force [N]")
+        axes.set_ylabel(f"{way} force [N]")
     panels[-1].set_xlabel("time [s]")
     return finish(figure, panels, f"{as_text(record.robot_name)}: ground reaction forces", look)
 
@@ -249,7 +255,7 @@ def from_above(record: FloatingRecord, look: Look = _LOOK) -> Figure:
     figure = Figure(figsize=(9.0, height), layout="constrained")
     axes = figure.subplots()
     axes.plot(path[:, 0], path[:, 1], color=COM, linewidth=0.8, label="CoM")
-    for foot, (name, color) in enumerate(zip(_FEET, SIDES, strict=True)):
+    for foot, (name, color) in enumerate(feet_shown(record)):
         places, times = footholds(record, foot)
         seen = places[(times >= time[0]) & (times <= time[-1])]
         axes.plot(seen[:, 0], seen[:, 1], ".", color=color, markersize=4.0, label=name)
@@ -264,7 +270,7 @@ def lateral_portrait(record: FloatingRecord, look: Look = _LOOK) -> Figure:
     figure = Figure(figsize=(6.0, 5.0), layout="constrained")
     axes = figure.subplots()
     sway, single, rear = record.sway[w], record.in_phase(Phase.SS)[w], record.rear[w]
-    for foot, (name, color) in enumerate(zip(_FEET, SIDES, strict=True)):
+    for foot, (name, color) in enumerate(legs_shown(record)):
         shown = np.where((single & (rear == foot))[:, None], sway, np.nan)
         axes.plot(1e3 * shown[:, 0], shown[:, 1], color=color, linewidth=0.8, label=f"on {name}")
     axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)

@@ -157,7 +157,7 @@ def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Pa
 def _footholds(record: Record) -> Array:
     """x of every place where a foot landed [m]."""
     found = []
-    for foot in range(2):
+    for foot in range(len(record.feet)):
         stands = record.contact_force[:, foot, 1] > 0.0
         landed = np.flatnonzero(stands[1:] & ~stands[:-1]) + 1
         # A landing rattles for some milliseconds.

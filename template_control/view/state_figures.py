@@ -65,7 +65,7 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
     figure = Figure(figsize=(9.0, 4.4), layout="constrained")
     upright, forward = figure.subplots(1, 2)
     samples = np.arange(len(record.time))
-    toe = record.foot[samples, record.rear, 0]
+    toe = record.of_legs(record.foot)[samples, record.rear, 0]
     target, last = record.section_target[-1], in_words(_sections(record)[-1].name)
     rows = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
     panels: tuple[tuple[Axes, int, Array, tuple[float, float]], ...] = (

@@ -25,18 +25,42 @@ Array = NDArray[np.float64]
 
 LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
 SIDES = (LEFT, RIGHT)
-"""Of the left and of the right foot, and of the rear and of the front leg."""
+"""Of the left and of the right foot or of the template's legs, of the rear and of the front one."""
 WINDOW = 2.2  # [s], about four steps
 TRANSITIONS: dict[str, str] = {
     StrideKind.WALK_TO_RUN: "walk to run",
     StrideKind.RUN_TO_WALK: "run to walk",
 }
 """Strides from gait to gait, in words."""
+_FEET = ("left foot", "right foot")
 _SINGLE, _TRANSITION = "single stance", "transition"
 _GREY, _GREEN = "0.92", 0.15  # of the shading; the green's share of COM
 _MOST_POINTS = 20_000  # of a line that shows a whole run
 _ROOMY = 1.6  # of the data: a limit further away would leave the panel empty
 DPI = 110
+
+
+def feet_shown(record: Record) -> list[tuple[str, str]]:
+    """Name and colour of each foot: of a biped left and right, of others by link and template leg.
+
+    Args:
+        record: the run.
+    """
+    if len(record.feet) == len(SIDES):
+        return list(zip(_FEET, SIDES, strict=True))
+    colors = {foot: SIDES[leg] for leg, group in enumerate(record.groups) for foot in group}
+    return [(as_text(name), colors[foot]) for foot, name in enumerate(record.feet)]
+
+
+def legs_shown(record: Record) -> list[tuple[str, str]]:
+    """Name and colour of the foot of each template leg.
+
+    Args:
+        record: the run.
+    """
+    names = [name for name, _ in feet_shown(record)]
+    pairs = [" and ".join(names[foot] for foot in group) for group in record.groups]
+    return list(zip(pairs, SIDES, strict=True))
 
 
 def moment(value: float | None, default: float, last: float) -> float:

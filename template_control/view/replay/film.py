@@ -28,11 +28,10 @@ from template_control.view.replay.playback import (
 )
 from template_control.view.replay.robot_visuals import model_of
 from template_control.view.replay.scene import in_space, smoothed
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, as_text
+from template_control.view.style import COM, SIDES, TEMPLATE, TRUNK, as_text, feet_shown, legs_shown
 
 Array = NDArray[np.float64]
 
-_LEGS = (LEFT, RIGHT)
 _WIDTH = 2.6  # of the picture, in rest lengths
 _HIGH = 0.75 * _WIDTH  # of the picture
 _BELOW = 0.08, 0.22  # share of the picture's height under the ground, planar and in space
@@ -58,14 +57,14 @@ FROM_THE_SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 class Stage:
     """The picture of a run, whose artists each frame moves.
 
-    ``camera`` (2, 3) leads from the world to the picture; ``legs`` are the lines of the left and
-    the right one, down to the foot; ``body`` has the places of joints and trunk in the frame that
+    ``camera`` (2, 3) leads from the world to the picture; ``legs`` are the lines of each, down to
+    the foot; ``body`` has the places of joints and trunk in the frame that
     is shown.
     """
 
     def __init__(self, playback: Playback) -> None:
         record = playback.record
-        self.playback, self._space = playback, in_space(record, np.zeros(2))
+        self.playback, self._space = playback, in_space(record, np.zeros(len(record.feet)))
         self.body = _Body(record)
         self._length = length = record.template.rest_length
         flat = not isinstance(record, FloatingRecord)
@@ -84,24 +83,29 @@ class Stage:
             return axes.plot([], [], marker, zorder=zorder, **look)[0]
 
         self._trail = line("", 2, color=COM, linewidth=1.2)
-        self._marks = [line("^", 2, color=c, markersize=5) for c in _LEGS]
-        # The left leg is behind the trunk, the right one before it.
+        shown = feet_shown(record)
+        self._marks = [line("^", 2, color=c, markersize=5) for _, c in shown]
+        # The left legs are behind the trunk, the right ones before it.
         thick: dict[str, Any] = {"linewidth": 4, "solid_capstyle": "round"}
-        self.legs = [line("", z, color=c, **thick) for c, z in zip(_LEGS, (2, 4), strict=True)]
+        self.legs = [
+            line("", 2 if left else 4, color=c, **thick)
+            for (_, c), left in zip(shown, self.body.left, strict=True)
+        ]
         width = 7 if flat else 3
         self._trunk = Polygon(
             np.zeros((4, 2)), color=TRUNK, linewidth=width, alpha=0.55, zorder=3, joinstyle="round"
         )
         axes.add_patch(self._trunk)
-        self._springs = [line("", 5, color=TEMPLATE, linewidth=1.1) for _ in _LEGS]
+        self._springs = [line("", 5, color=TEMPLATE, linewidth=1.1) for _ in SIDES]
         self._com = line("o", 6, color=COM, markersize=7, label="CoM")
         self._template = line("o", 7, color=TEMPLATE, markersize=3, label="template")
         self._forces = axes.quiver(
-            *np.zeros((4, 2)), color=_LEGS, angles="xy", scale_units="xy", scale=1.0, width=0.007,
-            zorder=8,
+            *np.zeros((4, len(shown))), color=[c for _, c in shown], angles="xy",
+            scale_units="xy", scale=1.0, width=0.007, zorder=8,
         )  # fmt: skip
-        for color, name in zip(_LEGS, ("left", "right"), strict=True):
-            line("", 0, color=color, linewidth=4, label=f"{name} leg, its ground force")
+        for name, color in legs_shown(record):
+            legs = name.replace(" foot", " leg")
+            line("", 0, color=color, linewidth=4, label=f"{legs}, its ground force")
         axes.legend(loc="upper left", fontsize=7, frameon=False)
         self._time = axes.set_title(" ", fontsize=9, loc="right")
         axes.set_title(as_text(record.robot_name), fontsize=9, loc="left")
@@ -175,6 +179,11 @@ class _Body:
         self._joints = [[self._model.getJointId(name) for name in leg] for leg in names]
         self._trunk = self._model.parents[self._joints[0][0]]
         self._top = np.array([0.0, 0.0, 2.0 * record.trunk_com])
+        self.place(pin.neutral(self._model))
+        hips = self._hips()
+        self.left = (hips[:, 1] > hips[:, 1].mean()).tolist()
+        away = hips - hips.mean(axis=0)
+        self._around = np.argsort(np.arctan2(away[:, 1], away[:, 0]))
 
     def place(self, q: Array) -> None:
         pin.forwardKinematics(self._model, self._data, q)
@@ -183,9 +192,15 @@ class _Body:
         """(joints, 3) from the trunk on [m]."""
         return np.array([self._data.oMi[joint].translation for joint in self._joints[foot]])
 
+    def _hips(self) -> Array:
+        return np.array([self.leg(foot)[0] for foot in range(len(self._joints))])
+
     def trunk(self) -> Array:
-        """(4, 3) corners between the hips and twice the height of its centre of mass [m]."""
-        left, right = (self.leg(foot)[0] for foot in (0, 1))
+        """(4, 3) corners [m]: four hips, or those of two and twice as high as its CoM."""
+        hips = self._hips()
+        if len(hips) > len(SIDES):
+            return hips[self._around]
+        left, right = hips
         up = self._data.oMi[self._trunk].rotation @ self._top
         return np.array([left, right, right + up, left + up])
 

@@ -82,7 +82,7 @@ def playback(
 
 
 def carrying(record: Record) -> NDArray[np.bool_]:
-    """(T, 2) whether the ground carries the left and the right foot."""
+    """(T, n) whether the ground carries each foot."""
     return np.asarray(record.contact_force[:, :, 1] > _CARRYING * record.weight)
 
 
@@ -92,9 +92,8 @@ def template_legs(record: Record) -> tuple[Array, NDArray[np.bool_]]:
     Their toes (T, 2, 2) [m], and (T, 2) whether each leg pushes.
     """
     samples = np.arange(len(record.time))
-    toes = np.stack(
-        (record.foot[samples, record.rear], record.foot[samples, 1 - record.rear]), axis=1
-    )
+    feet = record.of_legs(record.foot)
+    toes = np.stack((feet[samples, record.rear], feet[samples, 1 - record.rear]), axis=1)
     return toes, np.linalg.norm(record.template_force, axis=2) > _CARRYING * record.weight
 
 
@@ -118,7 +117,7 @@ def coil(shape: Array, begin: Array, end: Array) -> Array:
 
 
 def force_arrows(record: Record) -> Array:
-    """(T, 2, 2) the ground's force on each foot as an arrow, zero where it does not carry [m].
+    """(T, n, 2) the ground's force on each foot as an arrow, zero where it does not carry [m].
 
     The weight is 0.4 rest lengths long. An arrow longer than two weights, at an impact, is
     cut to that.

@@ -61,10 +61,12 @@ def _page(frames: Playback) -> str:
     """Page of a replay, with its legend."""
     from template_control.view.replay.scene import scene_commands
     from template_control.view.replay.viewer import page_of
+    from template_control.view.style import legs_shown
 
     record = frames.record
     title = f"{record.robot_name}, gait {record.gait_name}, {record.steps} steps"
-    return page_of(title + ", fell" if record.fell else title, scene_commands(frames))
+    title += ", fell" if record.fell else ""
+    return page_of(title, scene_commands(frames), legs_shown(record))
 
 
 @checked

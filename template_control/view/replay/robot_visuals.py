@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from template_control.errors import RecordError
 from template_control.robot.legs import foot_frame
 from template_control.run.record import FloatingRecord, Record
-from template_control.view.style import LEFT, RIGHT, TRUNK
+from template_control.view.style import TRUNK, feet_shown
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def sticks(record: Record, model: pin.Model) -> list[pin.GeometryObject]:
     radius = _STICK * float(record.template.rest_length)
     joints = [[model.getJointId(record.joints[i]) for i in leg] for leg in record.legs]
     made = []
-    for leg, foot, color in zip(joints, record.feet, (LEFT, RIGHT), strict=True):
+    for leg, foot, (_, color) in zip(joints, record.feet, feet_shown(record), strict=True):
         ends = [model.jointPlacements[joint].translation for joint in leg[1:]]
         frame = model.getFrameId(foot, pin.FrameType.BODY)
         ends.append(model.frames[frame].placement.translation)
@@ -98,7 +98,7 @@ def sticks(record: Record, model: pin.Model) -> list[pin.GeometryObject]:
             for joint, end in zip(leg, ends, strict=True)
         ]
     hips = [model.jointPlacements[leg[0]].translation for leg in joints]
-    middle = 0.5 * (hips[0] + hips[1])
+    middle = np.mean(hips, axis=0)
     top = middle + np.array([0.0, 0.0, 2.0 * float(record.trunk_com)])
     made.append(_stick(model, model.parents[joints[0][0]], middle, top, 2.0 * radius, TRUNK))
     return [stick for stick in made if stick is not None]
@@ -146,7 +146,7 @@ def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[A
 
 
 def foot_sides(model: pin.Model, feet: Sequence[str]) -> Array:
-    """(2,) y of each foot frame from the sagittal plane, to the left positive [m]."""
+    """(n,) y of each foot frame from the sagittal plane, to the left positive [m]."""
     data = model.createData()
     pin.framesForwardKinematics(model, data, pin.neutral(model))
     return np.array([data.oMf[foot_frame(model, foot)].translation[1] for foot in feet])

@@ -30,7 +30,7 @@ from template_control.view.replay.playback import (
     template_legs,
 )
 from template_control.view.replay.robot_visuals import Robot, foot_sides, load_visuals, placements
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
+from template_control.view.style import COM, TEMPLATE, feet_shown
 
 Array = NDArray[np.float64]
 
@@ -88,8 +88,8 @@ class Space:
         com: (T, 3) of the robot.
         template: (T, 3) the template's CoM.
         toes: (T, 2, 3) of the template's rear and front leg.
-        foot: (T, 2, 3) left and right.
-        arrow: (T, 2, 3) the ground's force on each foot, drawn.
+        foot: (T, n, 3) of each.
+        arrow: (T, n, 3) the ground's force on each foot, drawn.
         stood: for each foot (n, 3) where it stood, and (n,) since when [s].
     """
 
@@ -98,13 +98,13 @@ class Space:
     toes: Array
     foot: Array
     arrow: Array
-    stood: tuple[tuple[Array, Array], tuple[Array, Array]]
+    stood: tuple[tuple[Array, Array], ...]
 
 
 def in_space(record: Record, sides: Array) -> Space:
     """A run in three directions.
 
-    ``sides`` (2,) is how far to the left a planar robot's feet are [m]; not used for a free one.
+    ``sides`` (n,) is how far to the left a planar robot's feet are [m]; not used for a free one.
     """
     if isinstance(record, FloatingRecord):
         return _free(record)
@@ -122,7 +122,7 @@ def in_space(record: Record, sides: Array) -> Space:
         toes=raised(toes),
         foot=raised(record.foot) + sides[:, None] * aside,
         arrow=raised(force_arrows(record)),
-        stood=(stood[0], stood[1]),
+        stood=tuple(stood),
     )
 
 
@@ -131,19 +131,17 @@ def _free(record: FloatingRecord) -> Space:
     ahead = np.stack((np.cos(record.heading), np.sin(record.heading)), axis=1)
     template = record.space_com + np.column_stack((away[:, :1] * ahead, away[:, 1]))
     samples = np.arange(len(record.time))
-    toes = np.stack(
-        (record.space_foot[samples, record.rear], record.space_foot[samples, 1 - record.rear]),
-        axis=1,
-    )
+    feet = record.of_legs(record.space_foot)
+    toes = np.stack((feet[samples, record.rear], feet[samples, 1 - record.rear]), axis=1)
     found = footholds(record)
     stood = []
-    for foot in range(2):
+    for foot in range(len(record.feet)):
         since = np.array([f.time for f in found if f.foot == foot])
         rows = np.searchsorted(record.time, since + _LANDED)
         stood.append((record.space_foot[np.minimum(rows, len(samples) - 1), foot], since))
     arrow = arrows_of(record.space_force, record)
     arrow[~carrying(record)] = 0.0
-    return Space(record.space_com, template, toes, record.space_foot, arrow, (stood[0], stood[1]))
+    return Space(record.space_com, template, toes, record.space_foot, arrow, tuple(stood))
 
 
 def raised(points: Array) -> Array:
@@ -385,8 +383,8 @@ def _forces(scene: _Scene, playback: Playback, space: Space, length: float) -> N
     upright = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     shaft[:3, :3] = head[:3, :3] = upright
     shaft[2, 3], head[2, 3] = 0.425, 0.925
-    for foot, (name, color) in enumerate((("left", LEFT), ("right", RIGHT))):
-        path = f"/meshcat/ground_force/{name}"
+    for foot, (name, color) in enumerate(feet_shown(record)):
+        path = f"/meshcat/ground_force/{name.removesuffix(' foot')}"
         radius = 0.013 * length
         cone = mg.Cylinder(0.15, radiusTop=0.0, radiusBottom=3.0 * radius)
         for part, geometry, offset in (
@@ -406,7 +404,7 @@ def _forces(scene: _Scene, playback: Playback, space: Space, length: float) -> N
 
 def _footholds(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
     record, rows = playback.record, playback.rows
-    for foot, (name, color) in enumerate((("left", LEFT), ("right", RIGHT))):
+    for foot, (name, color) in enumerate(feet_shown(record)):
         places, since = space.stood[foot]
         shown = since <= record.time[rows[-1]]
         if not shown.any():
@@ -415,4 +413,4 @@ def _footholds(scene: _Scene, playback: Playback, space: Space, length: float) -
         vertices, faces = plates(centres, (0.05 * length, 0.1 * length))
         frame = np.searchsorted(record.time[rows], since[shown]).astype(float)
         mesh = _Gradual(vertices, faces, np.repeat(frame, 4))
-        scene.reveal(f"/meshcat/footholds/{name}", mesh, color)
+        scene.reveal(f"/meshcat/footholds/{name.removesuffix(' foot')}", mesh, color)

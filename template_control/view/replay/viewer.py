@@ -19,7 +19,7 @@ import meshcat
 import umsgpack
 
 from template_control.errors import RecordError
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
+from template_control.view.style import COM, TEMPLATE
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 
@@ -67,17 +67,20 @@ if (time !== null) {
 _LEGEND = (
     (COM, "CoM and its trail"),
     (TEMPLATE, "template: CoM and loaded legs"),
-    (LEFT, "left foot: ground force, footholds"),
-    (RIGHT, "right foot: ground force, footholds"),
 )
 
 
-def page_of(title: str, commands: list[Any]) -> str:
-    """Meshcat's viewer as one HTML page, with the commands of :func:`.scene.scene_commands`."""
+def page_of(title: str, commands: list[Any], legs: Sequence[tuple[str, str]]) -> str:
+    """Meshcat's viewer as one HTML page, with the commands of :func:`.scene.scene_commands`.
+
+    ``legs`` are names and colours, as of :func:`.style.legs_shown`.
+    """
+    feet = [(color, f"{name}: ground force, footholds") for name, color in legs]
+    signs = (f'<b style="color: {c}">&#9632;</b> {text}' for c, text in (*_LEGEND, *feet))
     packed = (base64.b64encode(umsgpack.packb(c.lower())).decode() for c in commands)
     return _PAGE.substitute(
         title=html.escape(title),
-        legend="<br>".join(f'<b style="color: {c}">&#9632;</b> {text}' for c, text in _LEGEND),
+        legend="<br>".join(signs),
         viewer=_VIEWER.read_text(encoding="utf-8"),
         commands=",\n".join(f'"{text}"' for text in packed),
     )
