@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rich import table
 from rich.console import Console
+from rich.table import Table
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -29,12 +29,33 @@ def plain_console(stderr: bool = False) -> Console:
     return console
 
 
-class Table(table.Table):
-    """A table that folds a word rather than leave its end out, however narrow the terminal is."""
+def table(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1, **look: Any
+) -> Table:
+    """A table, its first ``left`` columns aligned to the left; ``look`` is of rich's ``Table``.
 
-    def add_column(self, *arguments: Any, **options: Any) -> None:
-        """As :meth:`rich.table.Table.add_column`."""
-        super().add_column(*arguments, **{"overflow": "fold", **options})
+    It folds a word rather than leave its end out, however narrow the terminal is.
+    """
+    made = Table(title=title, **look)
+    for i, column in enumerate(columns):
+        made.add_column(column, justify="left" if i < left else "right", overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def figures_table(title: str, rows: Iterable[tuple[str, str]]) -> Table:
+    """A table of figures, each with its name."""
+    return table(title, ("", ""), rows, show_header=False)
+
+
+def show(*tables: Table, lines: Iterable[str] = ()) -> None:
+    """Print tables and, below them, lines on standard output."""
+    console = plain_console()
+    for shown in tables:
+        console.print(shown)
+    for line in lines:
+        console.print(line, highlight=False)
 
 
 def bar(console: Console, note: str = "", **options: Any) -> Progress:

@@ -1,4 +1,4 @@
-"""Types of the values that a user types: numbers in a range, and paths, for ``add_argument``."""
+"""Options that commands share, and the types of values: numbers in a range, and paths."""
 
 from __future__ import annotations
 
@@ -37,6 +37,18 @@ def path(text: str) -> Path:
     if not text.strip():
         raise argparse.ArgumentTypeError("is empty: give a path, such as . for this folder")
     return Path(text)
+
+
+def add_json(parser: Any, what: str = "the table as JSON") -> None:
+    """Add ``--json``, which prints ``what`` alone."""
+    words = f"print {what}, and nothing else, on stdout"
+    parser.add_argument("--json", action="store_true", help=words)
+
+
+def add_folder(parser: argparse.ArgumentParser, folder: str, about: str) -> None:
+    """Add ``--output``, by default ``folder``, and ``--no-figures``."""
+    parser.add_argument("--output", type=path, default=Path(folder), help=about)
+    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
 
 
 def _read(text: str, hint: Any) -> Any:

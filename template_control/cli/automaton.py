@@ -9,18 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.table import Table
 
 from template_control.checks import option_types as values
 from template_control.errors import ParameterError, RecordError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Outcome, Reset, Slot
+from template_control.slip.automaton.vocabulary import Outcome, Reset
 from template_control.storage import Files
-from template_control.terminal import Table
+from template_control.terminal import table
 from template_control.view.automaton_figure import GAIT_NAMES, automaton_figure, gaits, words
 from template_control.view.style import save_figure
 
 _SUFFIXES = (".png", ".svg", ".pdf")
+_COLUMNS = ("node", "phase", "rear leg", "front leg", "guard -> successor (reset)", "fails")
 _PIPE_WIDTH = 140  # columns where there is no terminal to ask
 
 
@@ -39,11 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=f"file of the figure ({', '.join(_SUFFIXES)}); its folder is made if need be",
     )
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help="print the automaton as one JSON object, and nothing else, on stdout",
-    )
+    values.add_json(parser, "the automaton as one JSON object")
     parser.add_argument("--no-figure", action="store_true", help="do not draw the figure")
 
 
@@ -63,8 +61,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _print(figure: Path | None) -> None:
     console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
-    for table in tables(AUTOMATON):
-        console.print(table)
+    for shown in tables(AUTOMATON):
+        console.print(shown)
     if figure is not None:
         console.print(f"figure: {figure}", markup=False, soft_wrap=True)
 
@@ -103,66 +101,46 @@ def describe(automaton: Automaton) -> dict[str, Any]:
 
 
 def _describe_node(node: Node) -> dict[str, Any]:
-    return {
-        "name": node.name,
-        "gait": node.gait,
-        "phase": node.phase.name,
-        "rear": None if node.rear is None else node.rear.name,
-        "front": None if node.front is None else node.front.name,
-        "edges": [_describe_edge(edge) for edge in node.edges],
-    }
+    rear, front = (None if slot is None else slot.name for slot in (node.rear, node.front))
+    head = {"name": node.name, "gait": node.gait, "phase": node.phase.name}
+    edges = [_describe_edge(edge) for edge in node.edges]
+    return {**head, "rear": rear, "front": front, "edges": edges}
 
 
 def _describe_edge(edge: Edge) -> dict[str, Any]:
+    end: dict[str, Any] = {"target": edge.target}
     if isinstance(edge.target, Outcome):
         end = {"failure": edge.target.name, "reason": edge.target.reason}
-    else:
-        end = {"target": edge.target}
-    return {
-        "event": edge.event.name,
-        "guard": edge.guard,
-        **end,
-        "reset": edge.reset.name,
-        "section": edge.section,
-    }
+    guard = {"event": edge.event.name, "guard": edge.guard}
+    return {**guard, **end, "reset": edge.reset.name, "section": edge.section}
 
 
 def tables(automaton: Automaton) -> list[Table]:
     """One table a gait, its nodes in order of first arrival."""
     found = []
     for gait, names in gaits(automaton).items():
-        table = Table(title=GAIT_NAMES.get(gait, f"gait {gait}"), show_lines=True)
-        table.title_justify = "left"
-        for heading in ("node", "phase", "rear leg", "front leg"):
-            table.add_column(heading)
-        table.add_column("guard -> successor (reset)")
-        table.add_column("fails")
-        for name in names:
-            node = automaton.node(name)
-            ways = [e for e in node.edges if not isinstance(e.target, Outcome)]
-            failures = [
-                f"{words(e.event)}: {e.target.reason}"
-                for e in node.edges
-                if isinstance(e.target, Outcome)
-            ]
-            table.add_row(
-                node.name,
-                node.phase.name,
-                _slot(node.rear),
-                _slot(node.front),
-                "\n".join(_way(edge) for edge in ways),
-                "\n".join(failures),
-            )
-        found.append(table)
+        title, rows = GAIT_NAMES.get(gait, f"gait {gait}"), map(_row, map(automaton.node, names))
+        look: dict[str, Any] = {"show_lines": True, "title_justify": "left"}
+        found.append(table(title, _COLUMNS, rows, left=len(_COLUMNS), **look))
     return found
 
 
-def _slot(slot: Slot | None) -> str:
-    return "-" if slot is None else slot.name.lower()
+def _row(node: Node) -> list[str]:
+    ways, failures = (
+        [_way(edge) for edge in node.edges if isinstance(edge.target, Outcome) is fails]
+        for fails in (False, True)
+    )
+    legs = ["-" if slot is None else slot.name.lower() for slot in (node.rear, node.front)]
+    return [node.name, node.phase.name, *legs, "\n".join(ways), "\n".join(failures)]
 
 
 def _way(edge: Edge) -> str:
-    """``"G_t^w touchdown -> DS_sc^w (place front)"``; a section says it ends the stride."""
+    """``"G_t^w touchdown -> DS_sc^w (place front)"``; a section says it ends the stride.
+
+    A failure says why.
+    """
+    if isinstance(edge.target, Outcome):
+        return f"{words(edge.event)}: {edge.target.reason}"
     notes = [words(edge.reset)] if edge.reset is not Reset.NONE else []
     notes += ["ends the stride"] if edge.section else []
     tail = f" ({', '.join(notes)})" if notes else ""

@@ -6,10 +6,10 @@ import argparse
 import json
 import math
 import sys
+from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,25 +33,26 @@ from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.branch import QUANTITIES, BranchPoint
 from template_control.slip.gaits.family_search import (
     FamilyCost,
+    Figures,
     Member,
     SearchEffort,
     family_data,
     search_family,
 )
+from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.gaits.gait_branch import ControlledFamily, Family
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.storage import Files, writing
-from template_control.terminal import Table, plain_console
+from template_control.terminal import show, table
 from template_control.view.stability_figures import UNITS, branch_figure, speed_family_figure
 from template_control.view.style import save_figure
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class _Defaults:
+class _Defaults(NamedTuple):
     start: dict[str, float]
     fixed: dict[str, float]
     limits: tuple[float, float]
@@ -59,8 +60,7 @@ class _Defaults:
     target: float
 
 
-@dataclass(frozen=True)
-class _Wanted:
+class _Wanted(NamedTuple):
     gait: str
     fixed: dict[str, float]
     start: dict[str, float]
@@ -94,10 +94,7 @@ _COLUMNS = {
 }
 _STRIDES = {"walk": StrideKind.WALK, "run": StrideKind.RUN}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER)}
-_TYPED = {
-    **dict.fromkeys(QUANTITIES, Positive),
-    "angle": Degrees,
-}
+_TYPED = {**dict.fromkeys(QUANTITIES, Positive), "angle": Degrees}
 _TABLE_ROWS = 14
 _MOST_ROUNDS = 100
 
@@ -159,13 +156,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=0.004,
         help="largest arclength step",
     )
-    parser.add_argument(
-        "--output", type=values.path, default=Path("runs/gaits"), help="folder for the figure"
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print the branch as JSON, and nothing else, on stdout"
-    )
-    parser.add_argument("--no-figures", action="store_true", help="do not draw the figure")
+    values.add_folder(parser, "runs/gaits", "folder for the figure")
+    values.add_json(parser, "the branch as JSON")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -290,26 +282,23 @@ def _data(point: BranchPoint) -> dict[str, Any]:
 
 
 def _print(points: list[BranchPoint], gait: str, over: str, paths: list[Path]) -> None:
-    table = Table(title=f"branch of {gait} gaits, {len(points)} points", box=SIMPLE_HEAD)
     controlled = points[0].target is not None
-    if controlled:
-        table.add_column(f"target {_COLUMNS[over]}", justify="right")
-    for name in QUANTITIES:
-        table.add_column(_COLUMNS[name], justify="right")
-    table.add_column("|eig.|" if controlled else "eigenvalues", justify="right")
-    table.add_column("stability")
-    every = max(1, len(points) // _TABLE_ROWS)
+    columns = [f"target {_COLUMNS[over]}"] if controlled else []
+    columns += [_COLUMNS[name] for name in QUANTITIES]
+    columns += ["|eig.|" if controlled else "eigenvalues", "stability"]
+    every, rows = max(1, len(points) // _TABLE_ROWS), []
     for i, point in enumerate(points):
         if i % every and point.special is None:
             continue
-        values = (_number(name, point.quantity(name)) for name in QUANTITIES)
-        text = point.special.name.lower() if point.special else point.kind.value
         target = [_number(over, point.quantity("target"))] if controlled else []
-        table.add_row(*target, *values, _eigenvalues(point), text)
-    console = plain_console()
-    console.print(table)
-    for path in paths:
-        console.print(f"figure: {path}", highlight=False)
+        values = [_number(name, point.quantity(name)) for name in QUANTITIES]
+        text = point.special.name.lower() if point.special else point.kind.value
+        rows.append([*target, *values, _eigenvalues(point), text])
+    found = table(
+        f"branch of {gait} gaits, {len(points)} points", columns, rows, left=0, box=SIMPLE_HEAD
+    )
+    found.columns[-1].justify = "left"
+    show(found, lines=(f"figure: {path}" for path in paths))
 
 
 def _number(name: str, value: float) -> str:
@@ -339,73 +328,65 @@ def make_family(folder: Path | None, as_json: bool, effort: SearchEffort) -> int
     weights, files = FamilyCost(), Files()
     chains = search_family(weights, effort, lambda text: print(text, file=sys.stderr))
     data = family_data(chains, weights)
-    paths: list[Path] = []
+    paths: list[Path | None] = []
     if folder is not None:
         text = json.dumps(data, indent=1) + "\n"
         figure = speed_family_figure(*_curves(chains))
-        for written in (
+        paths = [
             files.write(lambda: storage.write_text(folder / "walking.json", text)),
             files.write(lambda: save_figure(figure, folder / "by_speed.png")),
-        ):
-            paths += [] if written is None else [written]
+        ]
     if as_json:
         print(json.dumps(data))
     else:
-        _print_family(chains, paths)
+        _print_family(chains, [path for path in paths if path is not None])
     files.raise_pending()
     return 0
 
 
 def _curves(chains: Chains) -> tuple[dict[str, list[Array]], dict[str, dict[str, list[Array]]]]:
-    gaits = [[member.gait for member in chain] for chain in chains]
-    figures = [[member.figures for member in chain] for chain in chains]
+    def of(value: Callable[[WalkingGait, Figures], float]) -> list[Array]:
+        return [np.array([value(*member) for member in chain]) for chain in chains]
+
     quantities = {
-        "mean speed [m/s]": [np.array([g.mean_speed for g in chain]) for chain in gaits],
-        "leg stiffness [kN/m]": [
-            np.array([1e-3 * g.parameters.leg_stiffness for g in chain]) for chain in gaits
-        ],
-        "touchdown angle [deg]": [
-            np.degrees([g.controls[Slot.TOUCHDOWN_ANGLE] for g in chain]) for chain in gaits
-        ],
-        "height at VLO [m]": [np.array([g.vlo[1] for g in chain]) for chain in gaits],
-        "step length [m]": [np.array([g.step_length for g in chain]) for chain in gaits],
-        "step duration [s]": [np.array([g.step_duration for g in chain]) for chain in gaits],
-        "least singular value of B": [np.array([f.authority for f in chain]) for chain in figures],
-        "share of double stance": [np.array([f.double_stance for f in chain]) for chain in figures],
+        "mean speed [m/s]": of(lambda g, _: g.mean_speed),
+        "leg stiffness [kN/m]": of(lambda g, _: 1e-3 * g.parameters.leg_stiffness),
+        "touchdown angle [deg]": of(lambda g, _: _degrees(g)),
+        "height at VLO [m]": of(lambda g, _: g.vlo[1]),
+        "step length [m]": of(lambda g, _: g.step_length),
+        "step duration [s]": of(lambda g, _: g.step_duration),
+        "least singular value of B": of(lambda _, f: f.authority),
+        "share of double stance": of(lambda _, f: f.double_stance),
     }
-    pairs = {
-        "largest |eigenvalue|": {
-            "passive": [np.array([f.passive for f in chain]) for chain in figures],
-            "three controls": [np.array([f.without for f in chain]) for chain in figures],
-            "with push-off": [np.array([f.closed for f in chain]) for chain in figures],
-        },
+    eigenvalues = {
+        "passive": of(lambda _, f: f.passive),
+        "three controls": of(lambda _, f: f.without),
+        "with push-off": of(lambda _, f: f.closed),
     }
-    return quantities, pairs
+    return quantities, {"largest |eigenvalue|": eigenvalues}
+
+
+def _degrees(gait: WalkingGait) -> float:
+    return math.degrees(gait.controls[Slot.TOUCHDOWN_ANGLE])
 
 
 def _print_family(chains: Chains, paths: list[Path]) -> None:
-    table = Table(
-        title="walking gaits by speed, for 80 kg and l0 = 1 m; largest eigenvalues", box=SIMPLE_HEAD
-    )
-    heads = ("m/s", "k kN/m", "alpha", "y m", "step m", "step s")
-    for head in (*heads, "passive", "3 u", "4 u"):
-        table.add_column(head, justify="right")
-    wanted = 0.0
+    columns = ("m/s", "k kN/m", "alpha", "y m", "step m", "step s", "passive", "3 u", "4 u")
+    rows, wanted = [], 0.0
     for gait, f in (member for chain in chains for member in chain):
         if gait.mean_speed < wanted:
             continue
         wanted = _TABLE_STEP * (np.floor(gait.mean_speed / _TABLE_STEP) + 1.0)
-        cells = (
+        row = (
             f"{gait.mean_speed:.3f}",
             f"{1e-3 * gait.parameters.leg_stiffness:.2f}",
-            f"{np.degrees(gait.controls[Slot.TOUCHDOWN_ANGLE]):.2f}",
+            f"{_degrees(gait):.2f}",
             f"{gait.vlo[1]:.4f}",
             f"{gait.step_length:.3f}",
             f"{gait.step_duration:.3f}",
             *(f"{size:.2f}" for size in (f.passive, f.without, f.closed)),
         )
-        table.add_row(*cells)
-    console = plain_console()
-    console.print(table)
-    for path in paths:
-        console.print(f"written: {path}", highlight=False)
+        rows.append(row)
+    title = "walking gaits by speed, for 80 kg and l0 = 1 m; largest eigenvalues"
+    found = table(title, columns, rows, left=0, box=SIMPLE_HEAD)
+    show(found, lines=(f"written: {path}" for path in paths))

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from template_control.cli.report import (
-    failures_text,
-    nearest_text,
-    speed_text,
-)
+from template_control.cli.report import failures_text, nearest_text, speed_text
 from template_control.run.record import Record
 from template_control.run.summary import OTHERS, STRIDES, summarise
 from template_control.slip.scenario.run import ScenarioRecord
-from template_control.terminal import Table, plain_console
+from template_control.terminal import show, table
 
 NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (
     "robot", "fell", "fall_reason", "duration", "speed_error_rms", "accepted_speed",
     "nearest_speed_taken", "joint_torque", "joint_speed", "saturated_share", "qp_failures",
-    "qp_failed_share",
-    "real_time_factor",
+    "qp_failed_share", "real_time_factor",
 )  # fmt: skip
 
 
@@ -51,33 +47,32 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
 
 def print_route_table(figures: dict[str, Any]) -> None:
     """The figures of :func:`summarise_route` as a table on standard output."""
-    table = Table(title=f"{figures['robot']} and its template")
-    for name in ("", "robot", "template"):
-        table.add_column(name, justify="right" if name else "left")
+    show(table(f"{figures['robot']} and its template", ("", "robot", "template"), _rows(figures)))
+
+
+def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, ...]]:
     other = figures["template"]
     words = {True: "as planned", False: "no"}
     ended = figures["fall_reason"] or words[figures["completed"]]
-    table.add_row("completed", ended, words[other["completed"]])
-    for name, key, unit in (
-        ("top speed at a section", "top_speed", "m/s"),
-        ("speed less the wanted, RMS", "speed_error_rms", "m/s"),
+    yield "completed", ended, words[other["completed"]]
+    for name, key in (
+        ("top speed at a section", "top_speed"),
+        ("speed less the wanted, RMS", "speed_error_rms"),
     ):
-        values = (figures[key], other[key])
-        table.add_row(name, *("" if x is None else f"{x:.3f} {unit}" for x in values))
+        yield name, *("" if x is None else f"{x:.3f} m/s" for x in (figures[key], other[key]))
     accepted = figures["accepted_speed"]
     if accepted["strides"]:
-        table.add_row("change of speed reduced", nearest_text(accepted))
-        table.add_row("speed less the accepted, RMS", f"{accepted['error_rms']:.3f} m/s")
+        yield "change of speed reduced", nearest_text(accepted)
+        yield "speed less the accepted, RMS", f"{accepted['error_rms']:.3f} m/s"
     nearest = figures["nearest_speed_taken"]
     if nearest["strides"]:
-        table.add_row("nearest speed taken", nearest_text(nearest))
-    table.add_row("duration", f"{figures['duration']:.2f} s")
+        yield "nearest speed taken", nearest_text(nearest)
+    yield "duration", f"{figures['duration']:.2f} s"
     for name, count in figures["strides"].items():
-        table.add_row(f"strides, {name}", f"{count}")
+        yield f"strides, {name}", f"{count}"
     for joint, torque in figures["joint_torque"].items():
         speed = speed_text(figures["joint_speed"][joint])
-        table.add_row(f"{joint}, peak", f"{torque['peak']:.0f} of {torque['limit']:g} N m, {speed}")
-    table.add_row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
-    table.add_row("QP failures", failures_text(figures))
-    table.add_row("record", figures["record"] or "not saved")
-    plain_console().print(table)
+        yield f"{joint}, peak", f"{torque['peak']:.0f} of {torque['limit']:g} N m, {speed}"
+    yield "ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %"
+    yield "QP failures", failures_text(figures)
+    yield "record", figures["record"] or "not saved"

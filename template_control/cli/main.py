@@ -9,9 +9,9 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
-from typing import Any, NamedTuple, NoReturn
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, NoReturn
 
 from template_control.cli.interrupts import (
     INTERRUPTED,
@@ -22,72 +22,48 @@ from template_control.cli.interrupts import (
     on_signals,
     stopped,
 )
+from template_control.cli.notices import notice, printed
 from template_control.errors import ParameterError, TemplateControlError
 
-
-class _Command(NamedTuple):
-    """A command of the command line, with one line about it.
-
-    ``module`` has its ``add_options(parser)`` and its ``run(options)``; after a colon it names the
-    object of the module that has them.
-    """
-
-    module: str
-    about: str
-
-
+# By name the module with its ``add_options(parser)`` and ``run(options)``, after a colon the object
+# of the module that has them; and one line about it.
 _COMMANDS = {
-    "walk": _Command(
-        "template_control.cli.motion:WALK",
+    "walk": (
+        "cli.motion:WALK",
         "walk a robot that follows the SLIP template, headless, and report",
     ),
-    "run": _Command(
-        "template_control.cli.motion:RUN",
-        "run a robot that follows the SLIP template, headless, and report",
-    ),
-    "go": _Command(
-        "template_control.cli.motion:GO",
+    "run": ("cli.motion:RUN", "run a robot that follows the SLIP template, headless, and report"),
+    "go": (
+        "cli.motion:GO",
         "take a robot through a scenario of gaits and speeds, the template beside it",
     ),
-    "robots": _Command(
-        "template_control.cli.robots",
-        "list the shipped robots, with the template scaled to each",
-    ),
-    "replay": _Command(
-        "template_control.cli.replay",
-        "show a recorded run in the browser, or write it as a page or a film",
-    ),
-    "plots": _Command("template_control.cli.plots", "draw the figures of a recorded run"),
-    "robustness": _Command(
-        "template_control.cli.robustness",
+    "robots": ("cli.robots", "list the shipped robots, with the template scaled to each"),
+    "replay": ("cli.replay", "show a recorded run in the browser, or write it as a page or a film"),
+    "plots": ("cli.plots", "draw the figures of a recorded run"),
+    "robustness": (
+        "cli.robustness",
         "raise disturbances until a robot's walk breaks, and tell how much it takes",
     ),
-    "campaign": _Command(
-        "template_control.cli.campaign",
+    "campaign": (
+        "cli.campaign",
         "disturb a robot by everything at once, many times, and tell how sure its gait is",
     ),
-    "slip": _Command(
-        "template_control.cli.slip",
-        "simulate the SLIP template through a scenario of gaits and speeds",
-    ),
-    "gaits": _Command(
-        "template_control.cli.gaits",
-        "follow a branch of periodic gaits and tell its stability",
-    ),
-    "automaton": _Command(
-        "template_control.cli.automaton",
+    "slip": ("cli.slip", "simulate the SLIP template through a scenario of gaits and speeds"),
+    "gaits": ("cli.gaits", "follow a branch of periodic gaits and tell its stability"),
+    "automaton": (
+        "cli.automaton",
         "show the hybrid automaton that simulator, planners and robot controller read",
     ),
-    "keys": _Command(
-        "template_control.cli.keys",
+    "keys": (
+        "cli.keys",
         "list all keys of an experiment's file, each of which is an option of walk, run and go",
     ),
-    "warm-up": _Command(
-        "template_control.cli.warm_up",
+    "warm-up": (
+        "cli.warm_up",
         "compile once what all commands call; each compiles what it needs without it",
     ),
-    "reproduce": _Command(
-        "template_control.paper.command",
+    "reproduce": (
+        "paper.command",
         "reproduce a table or figure of the paper, ours beside the paper's",
     ),
 }
@@ -143,12 +119,12 @@ def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     # Before the command there are only options without a value.
     wanted = next((word for word in arguments if not word.startswith("-")), None)
-    for name, command in _COMMANDS.items():
-        sub_parser = commands.add_parser(name, help=command.about)
+    for name, (place, about) in _COMMANDS.items():
+        sub_parser = commands.add_parser(name, help=about)
         if name == wanted:
-            module, _, name = command.module.partition(":")
-            found: Any = importlib.import_module(module)
-            found = getattr(found, name) if name else found
+            module, _, part = place.partition(":")
+            found: Any = importlib.import_module(f"template_control.{module}")
+            found = getattr(found, part) if part else found
             found.add_options(sub_parser)
             sub_parser.set_defaults(run=found.run)
     return parser
@@ -193,7 +169,7 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
         options = build_parser(arguments).parse_args(arguments)
         if output is not None:
             on_signals(interrupt)
-        with _robot_notices():
+        with printed(logging.getLogger("template_control.robot")):  # such as missing meshes
             status = int(options.run(options))
         sys.stdout.flush()
         return status
@@ -217,29 +193,9 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
         return _told(f"cannot write to standard output: {output.failure.strerror}", _USER_ERROR)
 
 
-class _Notices(logging.Handler):
-    """Prints a warning of the library as a line of the command."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        with suppress(OSError):
-            print(f"template-control: {record.getMessage()}", file=sys.stderr, flush=True)
-
-
-@contextmanager
-def _robot_notices() -> Iterator[None]:
-    """Print what is said of a robot's file, such as meshes that are missing."""
-    handler, log = _Notices(logging.WARNING), logging.getLogger("template_control.robot")
-    log.addHandler(handler)
-    try:
-        yield
-    finally:
-        log.removeHandler(handler)
-
-
 def _told(line: str, status: int) -> int:
     """The status, once the line is on stderr."""
-    with suppress(OSError):
-        print(f"template-control: {line}", file=sys.stderr, flush=True)
+    notice(line)
     return status
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import logging
-import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +12,7 @@ from typing import Any, NoReturn
 
 from template_control.checks import option_types as values
 from template_control.cli.interrupts import stopped
+from template_control.cli.notices import notice, printed
 from template_control.cli.plots import TEMPLATE, add_figure_options, draw
 from template_control.errors import TemplateControlError
 from template_control.plant.c_library import stdout_to_stderr
@@ -23,22 +22,17 @@ from template_control.run.record import Record, RunInterrupted, one_line, record
 from template_control.run.simulation import simulate
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
-from template_control.terminal import Table, plain_console, progress_bar
+from template_control.terminal import figures_table, progress_bar, show
 
 
 def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
     """Add ``--output`` (by default ``folder``), ``--json``, and which figures are drawn."""
-    parser.add_argument(
-        "--output",
-        type=values.path,
-        default=Path(folder),
-        help=f"folder for run.npz, run.toml and figures, {folder} if not given; a run that is"
-        " there is replaced, and the command says so",
+    about = (
+        f"folder for run.npz, run.toml and figures, {folder} if not given; a run that is"
+        " there is replaced, and the command says so"
     )
-    parser.add_argument(
-        "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
-    )
-    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+    values.add_folder(parser, folder, about)
+    values.add_json(parser)
     add_figure_options(parser)
 
 
@@ -50,10 +44,7 @@ def output_folder(folder: Path) -> Iterator[Path]:
     """
     with writing(folder):
         if (folder / "run.npz").exists():
-            print(
-                f"template-control: the run in {folder} will be replaced; --output keeps both",
-                file=sys.stderr,
-            )
+            notice(f"the run in {folder} will be replaced; --output keeps both")
         yield folder
 
 
@@ -74,9 +65,7 @@ class Kept:
         self.files.raise_pending()
         if not self.record.interrupted:
             return False
-        print(
-            f"template-control: interrupted: the run up to here is in {self.path}", file=sys.stderr
-        )
+        notice(f"interrupted: the run up to here is in {self.path}")
         return True
 
 
@@ -100,10 +89,7 @@ def run_and_keep(
     total = prepared.steps or (None if ends else STEPS)
     with output_folder(options.output) as folder, stdout_to_stderr():
         try:
-            with (
-                progress_bar(doing, total) as advance,
-                _failures_told(),
-            ):
+            with progress_bar(doing, total) as advance, printed(failures.LOG):
                 record = simulate(prepared, advance)
         except RunInterrupted as stop:
             record = stop.record
@@ -119,24 +105,6 @@ def run_and_keep(
         if not (options.no_figures or record.interrupted):
             files.write(lambda: draw(options, record, folder, template))
     return Kept(record, None if path is None else str(path), files)
-
-
-class _Lines(logging.Handler):
-    """Prints each message on a line of standard error."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        print(f"template-control: {record.getMessage()}", file=sys.stderr)
-
-
-@contextmanager
-def _failures_told() -> Iterator[None]:
-    """Report on the terminal, at once, that a run's QP fails."""
-    lines = _Lines(logging.WARNING)
-    failures.LOG.addHandler(lines)
-    try:
-        yield
-    finally:
-        failures.LOG.removeHandler(lines)
 
 
 def _give_up(error: Exception, experiment: Experiment, folder: Path) -> NoReturn:
@@ -164,102 +132,86 @@ _MEAN = 50  # strides at most whose section states the summary averages
 
 def print_table(figures: dict[str, Any]) -> None:
     """The summary, from :func:`~template_control.run.summary.summarise`, as a table on stdout."""
-    table = Table(title=f"{figures['robot']}, gait {figures['gait']}", show_header=False)
-    table.add_column()
-    table.add_column(justify="right")
+    title = f"{figures['robot']}, gait {figures['gait']}"
+    show(figures_table(title, _rows(figures)))
 
-    def row(name: str, text: str) -> None:
-        table.add_row(name, text)
 
-    row("steps", f"{figures['steps']}")
+def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """The rows of a summary's table."""
+    yield "steps", f"{figures['steps']}"
     if len(figures["strides"]) > 1:
         for name, count in figures["strides"].items():
-            row(f"steps, {name}", f"{count}")
-    row("falls", "0" if not figures["fell"] else f"1: {figures['fall_reason']}")
-    row("duration", f"{figures['duration']:.2f} s")
-    row("mean speed", f"{figures['mean_speed']:.3f} m/s")
+            yield f"steps, {name}", f"{count}"
+    yield "falls", "0" if not figures["fell"] else f"1: {figures['fall_reason']}"
+    yield "duration", f"{figures['duration']:.2f} s"
+    yield "mean speed", f"{figures['mean_speed']:.3f} m/s"
+    last = f"last {min(figures['steps'], _MEAN)} steps"
     for section in ("VLO", "apex"):
-        for name, key in (
-            ("target", "target"),
-            (f"last {min(figures['steps'], _MEAN)} steps", "mean_last_50"),
-        ):
+        for name, key in (("target", "target"), (last, "mean_last_50")):
             z = figures.get(f"{section.lower()}_{key}")
             if z is not None:
-                row(f"{section}, {name}", _state(z))
+                yield f"{section}, {name}", _state(z)
     if figures["speed_error_rms"] is not None:
-        row("speed at the sections less the target, RMS", f"{figures['speed_error_rms']:.4f} m/s")
+        yield "speed at the sections less the target, RMS", f"{figures['speed_error_rms']:.4f} m/s"
     accepted = figures["accepted_speed"]
     if accepted["strides"]:
-        row("change of speed reduced", nearest_text(accepted))
-        row("speed at the sections less the accepted, RMS", f"{accepted['error_rms']:.4f} m/s")
+        yield "change of speed reduced", nearest_text(accepted)
+        yield "speed at the sections less the accepted, RMS", f"{accepted['error_rms']:.4f} m/s"
     nearest = figures["nearest_speed_taken"]
     if nearest["strides"]:
-        row("nearest speed taken for the wanted one", nearest_text(nearest))
+        yield "nearest speed taken for the wanted one", nearest_text(nearest)
     rms, worst = figures["com_error_rms"], figures["com_error_max"]
     for axis in ("x", "y"):
-        row(
-            f"CoM error in {axis}, RMS / max",
-            f"{1e3 * rms[axis]:.2f} / {1e3 * worst[axis]:.2f} mm",
-        )
+        errors = f"{1e3 * rms[axis]:.2f} / {1e3 * worst[axis]:.2f} mm"
+        yield f"CoM error in {axis}, RMS / max", errors
     if "attitude_rms" in figures:
-        floating_rows(figures, row)
+        yield from floating_rows(figures)
     for joint, torque in figures["joint_torque"].items():
-        row(
-            f"{joint} torque, peak / RMS of limit",
-            f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g} N m",
-        )
+        sizes = f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g} N m"
+        yield f"{joint} torque, peak / RMS of limit", sizes
     for joint, speed in figures["joint_speed"].items():
-        row(f"{joint} speed, peak", speed_text(speed))
+        yield f"{joint} speed, peak", speed_text(speed)
     share = figures["flight_share"]
     if share["template"]:
         flight = figures["com_error_flight_rms"]
-        row(
-            "CoM error in flight, RMS x / y",
-            f"{1e3 * flight['x']:.2f} / {1e3 * flight['y']:.2f} mm",
-        )
-        row(
-            "flight, robot / template",
-            f"{share['robot']:.3f} / {share['template']:.3f} of the time",
-        )
-    row("duty factor", f"{figures['duty_factor']:.3f}")
+        errors = f"{1e3 * flight['x']:.2f} / {1e3 * flight['y']:.2f} mm"
+        yield "CoM error in flight, RMS x / y", errors
+        shares = f"{share['robot']:.3f} / {share['template']:.3f} of the time"
+        yield "flight, robot / template", shares
+    yield "duty factor", f"{figures['duty_factor']:.3f}"
     if figures["cost_of_transport"] is not None:
-        row("cost of transport", f"{figures['cost_of_transport']:.3f}")
-    row("ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %")
-    row("QP failures", failures_text(figures))
-    row("steps off the planner's own law", f"{figures['steps_not_nominal']}")
+        yield "cost of transport", f"{figures['cost_of_transport']:.3f}"
+    yield "ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %"
+    yield "QP failures", failures_text(figures)
+    yield "steps off the planner's own law", f"{figures['steps_not_nominal']}"
     for name, key in (
         ("control tick", "control_tick_seconds"),
         ("ProxQP, where a limit acts", "qp_solve_seconds"),
         ("plan", "plan_seconds"),
     ):
         t = figures[key]
-        row(f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us")
-    row("ticks in which a limit acts", f"{100 * figures['qp_solve_seconds']['share']:.1f} %")
-    row("real-time factor", f"{figures['real_time_factor']:.1f}")
-    row("record", figures["record"] or "not saved")
-    plain_console().print(table)
+        yield f"{name}, median / p99", f"{1e6 * t['median']:.0f} / {1e6 * t['p99']:.0f} us"
+    yield "ticks in which a limit acts", f"{100 * figures['qp_solve_seconds']['share']:.1f} %"
+    yield "real-time factor", f"{figures['real_time_factor']:.1f}"
+    yield "record", figures["record"] or "not saved"
 
 
-def floating_rows(figures: dict[str, Any], row: Callable[[str, str], None]) -> None:
-    """The rows of a robot that nothing holds; ``row`` adds one."""
+def floating_rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """The rows that only a floating-base robot's table has."""
     rms, most = figures["attitude_rms"], figures["attitude_max"]
     for angle in rms:
-        row(f"{angle}, RMS / max", f"{rms[angle]:.4f} / {most[angle]:.4f} rad")
-    row("heading turned by", f"{figures['turned']:.3f} rad")
-    row("drift of the mean yaw in 100 steps", f"{figures['mean_yaw_drift']:+.4f} rad")
+        yield f"{angle}, RMS / max", f"{rms[angle]:.4f} / {most[angle]:.4f} rad"
+    yield "heading turned by", f"{figures['turned']:.3f} rad"
+    yield "drift of the mean yaw in 100 steps", f"{figures['mean_yaw_drift']:+.4f} rad"
     width = figures["step_width"]
     if width is not None:
-        row(
-            "step width, mean / deviation / least",
-            f"{width['mean']:.3f} / {width['deviation']:.3f} / {width['least']:.3f} m",
-        )
+        widths = f"{width['mean']:.3f} / {width['deviation']:.3f} / {width['least']:.3f} m"
+        yield "step width, mean / deviation / least", widths
     for joint, angle in figures.get("joint_angle", {}).items():  # earlier versions did not keep it
         past = angle["least"] < angle["lower"] or angle["most"] > angle["upper"]
-        row(
-            f"{joint} angle",
-            f"{angle['least']:+.2f} to {angle['most']:+.2f} of {angle['lower']:g} to"
-            f" {angle['upper']:g} rad" + past_limit(past),
-        )
+        reached = f"{angle['least']:+.2f} to {angle['most']:+.2f}"
+        limits = f"{angle['lower']:g} to {angle['upper']:g} rad"
+        yield f"{joint} angle", f"{reached} of {limits}{past_limit(past)}"
 
 
 def speed_text(speed: dict[str, float]) -> str:

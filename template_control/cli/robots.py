@@ -8,19 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from template_control.checks import option_types as values
 from template_control.embedding.robot_template import default_gait
 from template_control.robot.legs import HINGES
 from template_control.robot.library import ROBOTS, SHIPPED, load_floating_robot, load_robot
 from template_control.slip.automaton.vocabulary import Slot
-from template_control.terminal import Table, plain_console
+from template_control.terminal import show, table
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's description and options."""
     parser.description = "The shipped robots: mass, legs, limits, scaled template and default gait."
-    parser.add_argument(
-        "--json", action="store_true", help="print the list as JSON, and nothing else, on stdout"
-    )
+    values.add_json(parser, "the list as JSON")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -29,27 +28,23 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(rows))
         return 0
-    table = Table(title="robots")
     columns = ("robot", "mass", "leg", "hip, knee limit", "l0", "k0", "default gait")
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="left" if i == 0 else "right")
-    for row in rows:
-        hip, knee = row["hip_knee_torque"]
-        gait = row["gait"]
-        table.add_row(
-            row["robot"],
-            f"{row['mass']:.4g} kg",
-            f"{row['leg_length']:.3g} m",
-            f"{hip:g}, {knee:g} N m",
-            f"{row['template']['rest_length']:.3f} m",
-            f"{row['template']['leg_stiffness'] / 1e3:.3g} kN/m",
-            f"{gait['touchdown_angle_deg']:.0f} deg, {gait['mean_speed']:.2f} m/s",
-        )
-    console = plain_console()
-    console.print(table)
-    for row in rows:
-        console.print(f"- {row['robot']}: {row['about']}", highlight=False)
+    lines = (f"- {row['robot']}: {row['about']}" for row in rows)
+    show(table("robots", columns, map(_row, rows)), lines=lines)
     return 0
+
+
+def _row(robot: dict[str, Any]) -> tuple[str, ...]:
+    gait, template, (hip, knee) = robot["gait"], robot["template"], robot["hip_knee_torque"]
+    return (
+        robot["robot"],
+        f"{robot['mass']:.4g} kg",
+        f"{robot['leg_length']:.3g} m",
+        f"{hip:g}, {knee:g} N m",
+        f"{template['rest_length']:.3f} m",
+        f"{template['leg_stiffness'] / 1e3:.3g} kN/m",
+        f"{gait['touchdown_angle_deg']:.0f} deg, {gait['mean_speed']:.2f} m/s",
+    )
 
 
 def _describe(name: str) -> dict[str, Any]:

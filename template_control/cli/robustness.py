@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import json
-from pathlib import Path
 from typing import Any
 
-from template_control.checks import option_types as values
 from template_control.cli.experiment_options import add_flags, experiment_from
 from template_control.cli.flags import SUBJECT
-from template_control.cli.trial_options import (
-    add_printed,
-    add_workers,
-    draw,
-    folder_of,
-    kept,
-)
-from template_control.plant.c_library import stdout_to_stderr
+from template_control.cli.trial_options import Report, add_trial_options, folder_of, report_trials
 from template_control.robustness.disturbances import AFTER, ALL
 from template_control.robustness.findings import Finding, Robustness
 from template_control.robustness.severity_sweep import SETTLED, measure
 from template_control.run.experiment import Experiment
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait
-from template_control.storage import Files, writing
-from template_control.sweep.executor import workers
-from template_control.terminal import Table, plain_console
+from template_control.storage import writing
 from template_control.view.trial_figures import robustness_figure
 
 _NAMES = tuple(d.name for d in ALL)
@@ -64,14 +52,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="two levels of two trials each, to see that it works"
     )
-    add_workers(parser)
-    parser.add_argument(
-        "--output",
-        type=values.path,
-        help="folder for the trials and the figure; by default runs/robustness/ROBOT, with -free"
-        " of a floating base, the gait's name if it is no walk, and the engine's if it is another",
+    about = (
+        "folder for the trials and the figure; by default runs/robustness/ROBOT, with -free"
+        " of a floating base, the gait's name if it is no walk, and the engine's if it is another"
     )
-    add_printed(parser)
+    add_trial_options(parser, about)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -79,26 +64,29 @@ def run(options: argparse.Namespace) -> int:
     experiment = experiment_from(options, Experiment())
     where = experiment.prepare()  # before a folder is made for it
     with writing(folder_of(options, experiment, "runs/robustness", where.robot.name)) as folder:
-        return _measure(options, experiment, folder)
+        return report_trials(
+            options,
+            folder,
+            lambda pool: measure(experiment, options.disturbance, folder, pool, options.quick),
+            lambda found, _: report(found),
+        )
 
 
-def _measure(options: argparse.Namespace, experiment: Experiment, folder: Path) -> int:
-    """Measure, with trials and figure in ``folder``."""
-    try:
-        with workers(options.workers) as pool, stdout_to_stderr():
-            found = measure(experiment, options.disturbance, folder, pool, options.quick)
-    except KeyboardInterrupt:
-        return kept(folder)
-    files = Files()
-    figure = files.write(lambda: draw(lambda: robustness_figure(found), folder / "robustness.png"))
-    if options.json:
-        print(json.dumps({**data(found), "figure": None if figure is None else str(figure)}))
-    elif options.markdown:
-        print(markdown(found))
-    else:
-        _print_table(found, figure)
-    files.raise_pending()
-    return 0
+def report(found: Robustness) -> Report:
+    """Report of the findings."""
+    title = (
+        f"{found.robot} at {_speed(found.gait):.3f} m/s in {found.plant}; undisturbed it is"
+        f" {100 * found.speed_error:+.2f} % in speed and {100 * found.height_error:+.2f} % in"
+        " height from its gait"
+    )
+    return Report(
+        title,
+        _COLUMNS,
+        [_row(finding) for finding in found.findings],
+        data(found),
+        lambda: robustness_figure(found),
+        "robustness.png",
+    )
 
 
 def data(found: Robustness) -> dict[str, Any]:
@@ -142,66 +130,30 @@ def _speed(gait: Gait) -> float:
     return gait.step_length / gait.step_duration
 
 
-def _row(finding: Finding) -> tuple[str, ...]:
-    d, last = finding.disturbance, finding.levels[-1]
+def _row(finding: Finding) -> list[str]:
+    d, levels, limit = finding.disturbance, finding.levels, finding.template
+    all_good = finding.breaking_point
+
+    def up_to(level: float | None) -> str:
+        return f"not {d.shown(levels[0].level)}" if level is None else d.shown(level)
 
     def point(level: float | None) -> str:
-        return _up_to(finding, level) + (" or more" if level == last.level else "")
+        return up_to(level) + (" or more" if level == levels[-1].level else "")
 
-    after = next((x for x in finding.levels if x.rate < 1.0), None)
-    beyond = "" if after is None else f"{d.shown(after.level)}: {_told(after.fell, after.off_gait)}"
-    all_good, half, standing = map(
-        point, (finding.breaking_point, finding.half_point, finding.standing_point)
-    )
-    return d.title, str(d.trials), all_good, _sure(finding), half, standing, _limit(finding), beyond
-
-
-def _sure(finding: Finding) -> str:
-    """Share of trials that would succeed at the breaking point's level, with 95 % confidence."""
-    for level in finding.levels:
-        if level.level == finding.breaking_point:
-            return f"{100 * level.interval[0]:.0f} to {100 * level.interval[1]:.0f} %"
-    return ""
-
-
-def _limit(finding: Finding) -> str:
-    """The template's own limit."""
-    most = finding.template
-    return "" if most is None else _up_to(finding, most or None)
-
-
-def _up_to(finding: Finding, level: float | None) -> str:
-    """A level of the finding; without one, that it is not even the mildest."""
-    shown = finding.disturbance.shown
-    return f"not {shown(finding.levels[0].level)}" if level is None else shown(level)
-
-
-def _told(fell: int, off_gait: int) -> str:
-    parts = [f"{n} {what}" for n, what in ((fell, "fell"), (off_gait, "off its gait")) if n]
-    return ", ".join(parts)
-
-
-def _title(found: Robustness) -> str:
-    return (
-        f"{found.robot} at {_speed(found.gait):.3f} m/s in {found.plant}; undisturbed it is"
-        f" {100 * found.speed_error:+.2f} % in speed and {100 * found.height_error:+.2f} % in"
-        " height from its gait"
-    )
-
-
-def markdown(found: Robustness) -> str:
-    """The table as Markdown."""
-    rows = [_COLUMNS, tuple("---" for _ in _COLUMNS), *map(_row, found.findings)]
-    return "\n".join([_title(found) + ":", "", *("| " + " | ".join(r) + " |" for r in rows)])
-
-
-def _print_table(found: Robustness, figure: Path | None) -> None:
-    table = Table(title=_title(found))
-    for column in _COLUMNS:
-        table.add_column(column)
-    for finding in found.findings:
-        table.add_row(*_row(finding))
-    console = plain_console()
-    console.print(table)
-    if figure is not None:
-        console.print(f"figure: {figure}", highlight=False)
+    # The share of trials that would succeed where all did.
+    sure = next((level.interval for level in levels if level.level == all_good), None)
+    beyond, after = "", next((level for level in levels if level.rate < 1.0), None)
+    if after is not None:
+        counts = ((after.fell, "fell"), (after.off_gait, "off its gait"))
+        told = ", ".join(f"{n} {what}" for n, what in counts if n)
+        beyond = f"{d.shown(after.level)}: {told}"
+    return [
+        d.title,
+        str(d.trials),
+        point(all_good),
+        "" if sure is None else f"{100 * sure[0]:.0f} to {100 * sure[1]:.0f} %",
+        point(finding.half_point),
+        point(finding.standing_point),
+        "" if limit is None else up_to(limit or None),
+        beyond,
+    ]

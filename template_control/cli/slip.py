@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,19 +15,14 @@ from template_control import view
 from template_control.checks import option_types as values
 from template_control.cli.go import NO_STANDS
 from template_control.cli.report import output_folder
-from template_control.slip.automaton.vocabulary import MapKind, StrideKind
+from template_control.run.summary import STRIDES
+from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import Files
-from template_control.terminal import Table, plain_console
+from template_control.terminal import figures_table, plain_console, show
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}
-_NAMES = {
-    StrideKind.WALK: "walking",
-    StrideKind.WALK_TO_RUN: "walk to run",
-    StrideKind.RUN: "running",
-    StrideKind.RUN_TO_WALK: "run to walk",
-}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -46,16 +41,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=tuple(_MAPS),
         help="return map the controllers compute with, instead of the scenario's",
     )
-    parser.add_argument(
-        "--output",
-        type=values.path,
-        default=Path("runs/slip"),
-        help="folder for run.npz and figures",
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print the table as JSON, and nothing else, on stdout"
-    )
-    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+    values.add_folder(parser, "runs/slip", "folder for run.npz and figures")
+    values.add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -78,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(figures))
     else:
-        _print(figures)
+        show(figures_table(f"{figures['scenario']}, {figures['map']} map", _rows(figures)))
     files.raise_pending()
     return 0 if record.completed else 1
 
@@ -92,7 +79,7 @@ def summarise_scenario(record: ScenarioRecord) -> dict[str, Any]:
         "map": record.metadata["map"],
         "completed": record.completed,
         "failure": record.metadata["failure"] or None,
-        "strides": {name: counts.get(kind, 0) for kind, name in _NAMES.items()},
+        "strides": {name: counts.get(kind, 0) for kind, name in STRIDES.items()},
         "duration": float(record.section_time[-1]),
         "distance": float(record.state[-1, 0] - record.state[0, 0]) if len(record.time) else 0.0,
         "speed_error_rms": float(np.sqrt(np.mean(error**2))) if error.size else None,
@@ -103,24 +90,16 @@ def summarise_scenario(record: ScenarioRecord) -> dict[str, Any]:
     }
 
 
-def _print(figures: dict[str, Any]) -> None:
-    table = Table(title=f"{figures['scenario']}, {figures['map']} map", show_header=False)
-    table.add_column()
-    table.add_column(justify="right")
-    table.add_row("ended", "as planned" if figures["completed"] else figures["failure"])
+def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "ended", "as planned" if figures["completed"] else figures["failure"]
     for name, count in figures["strides"].items():
-        table.add_row(f"strides, {name}", f"{count}")
-    table.add_row("duration", f"{figures['duration']:.2f} s")
-    table.add_row("distance", f"{figures['distance']:.2f} m")
-    if figures["speed_error_rms"] is not None:
-        table.add_row(
-            "speed error at sections, RMS / max",
-            f"{figures['speed_error_rms']:.3g} / {figures['speed_error_max']:.3g} m/s",
-        )
-        table.add_row("controller, median", f"{1e3 * figures['solve_seconds_median']:.2f} ms")
-    table.add_row("targets not met on the map", f"{figures['not_reached']}")
-    table.add_row(
-        "last section dx/dt, y, dy/dt", "  ".join(f"{z:.4f}" for z in figures["last_section"])
-    )
-    table.add_row("record", figures["record"] or "not saved")
-    plain_console().print(table)
+        yield f"strides, {name}", f"{count}"
+    yield "duration", f"{figures['duration']:.2f} s"
+    yield "distance", f"{figures['distance']:.2f} m"
+    rms, most = figures["speed_error_rms"], figures["speed_error_max"]
+    if rms is not None:
+        yield "speed error at sections, RMS / max", f"{rms:.3g} / {most:.3g} m/s"
+        yield "controller, median", f"{1e3 * figures['solve_seconds_median']:.2f} ms"
+    yield "targets not met on the map", f"{figures['not_reached']}"
+    yield "last section dx/dt, y, dy/dt", "  ".join(f"{z:.4f}" for z in figures["last_section"])
+    yield "record", figures["record"] or "not saved"

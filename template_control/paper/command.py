@@ -11,7 +11,7 @@ from template_control.checks import option_types as values
 from template_control.errors import ParameterError
 from template_control.paper.reproduction import LONG, REPRODUCTIONS, Reproduction
 from template_control.storage import Files, writing
-from template_control.terminal import Table, plain_console
+from template_control.terminal import plain_console, show, table
 from template_control.view.style import save_figure
 
 _ON_A_ROBOT = "fig10"
@@ -27,13 +27,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME|URDF",
         help="of fig10: Example I on this robot, such as runner, its template beside it",
     )
-    parser.add_argument(
-        "--output", type=values.path, default=Path("runs/reproduce"), help="folder for the figures"
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print the numbers as JSON, and nothing else, on stdout"
-    )
-    parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
+    values.add_folder(parser, "runs/reproduce", "folder for the figures")
+    values.add_json(parser, "the numbers as JSON")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -57,7 +52,8 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps({"name": options.name, **result.data, "figures": [str(p) for p in paths]}))
     else:
-        _print(result, paths)
+        lines = [*(f"- {note}" for note in result.notes), *(f"figure: {path}" for path in paths)]
+        show(table(result.title, result.columns, result.rows), lines=lines)
     files.raise_pending()
     return 0
 
@@ -80,17 +76,3 @@ def _on(robot: str) -> Reproduction:
 
 def _save(result: Reproduction, folder: Path) -> list[Path]:
     return [save_figure(figure, folder / f"{name}.png") for name, figure in result.figures.items()]
-
-
-def _print(result: Reproduction, paths: list[Path]) -> None:
-    console = plain_console()
-    table = Table(title=result.title)
-    for i, column in enumerate(result.columns):
-        table.add_column(column, justify="left" if i < 1 else "right")
-    for row in result.rows:
-        table.add_row(*row)
-    console.print(table)
-    for note in result.notes:
-        console.print(f"- {note}", highlight=False)
-    for path in paths:
-        console.print(f"figure: {path}", highlight=False)

@@ -158,8 +158,7 @@ def test_a_joint_past_its_limit_is_told():
             "knee": {"least": 0.1, "most": 1.0, "lower": 0.0, "upper": 2.0},
         },
     }
-    rows = {}
-    floating_rows(figures, rows.__setitem__)
+    rows = dict(floating_rows(figures))
     assert rows["hip angle"] == "-0.50 to +0.20 of -0.4 to 0.4 rad, past its limit"
     assert rows["knee angle"] == "+0.10 to +1.00 of 0 to 2 rad"
 

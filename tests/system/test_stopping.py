@@ -151,8 +151,8 @@ def run(_):
     time.sleep(60.0)
 stub = types.ModuleType("stub")
 stub.add_options, stub.run = lambda parser: None, run
-sys.modules["stub"] = stub
-main._COMMANDS["walk"] = main._Command("stub", "")
+sys.modules["template_control.stub"] = stub
+main._COMMANDS["walk"] = ("stub", "")
 sys.argv = ["template-control", "walk"]
 sys.exit(main.main())
 """

@@ -321,7 +321,7 @@ def test_figure_shows_every_disturbance(cheap):
 
 
 def test_markdown_says_where_it_breaks(cheap):
-    text = command.markdown(cheap(["heavier", "lighter", "step-up"]))
+    text = command.report(cheap(["heavier", "lighter", "step-up"])).markdown()
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ")]
     most, sure = "8 cm or more", "57 to 100 %"  # Wilson's interval of 5 of 5
     assert rows[2] == ["| step up", "5", "2 cm", sure, most, most, "", "3 cm: 2 off its gait |"]
