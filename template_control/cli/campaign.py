@@ -122,16 +122,17 @@ def report(found: Campaign, files: Files, folder: Path) -> Report:
         for t in wrong[:_LISTED]
     ]
     more = len(wrong) - _LISTED
+    title = f"{e.robot_name}, {gait.name}{speed}, in {plant_name(e.world)}"
     return Report(
-        f"{e.robot_name}, {gait.name}{speed}, in {plant_name(e.world)}: {len(found.trials)} trials",
+        f"{title}: {len(found.trials)} trials",
         _COLUMNS,
         rows,
-        data(found, falls),
-        lambda: campaign_figure(found),
-        "campaign.png",
-        ("", f"The falls began with: {causes}.") if causes else (),
-        ("what went wrong", _DETAILS, details) if details else None,
-        f"and {more} more, each with its file beside these" if more > 0 else "",
+        data=data(found, falls),
+        figure=lambda: campaign_figure(found),
+        name="campaign.png",
+        lines=("", f"The falls began with: {causes}.") if causes else (),
+        details=("what went wrong", _DETAILS, details) if details else None,
+        note=f"and {more} more, each with its file beside these" if more > 0 else "",
     )
 
 

@@ -83,9 +83,9 @@ def report(found: Robustness) -> Report:
         title,
         _COLUMNS,
         [_row(finding) for finding in found.findings],
-        data(found),
-        lambda: robustness_figure(found),
-        "robustness.png",
+        data=data(found),
+        figure=lambda: robustness_figure(found),
+        name="robustness.png",
     )
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from math import pi
 from typing import Any
@@ -145,84 +144,9 @@ PUSH_SECONDS = 0.1
 _TIME_STEP = PlantOptions().time_step
 
 
-def _plain(_: SlipParameters) -> float:
-    return 1.0
-
-
-def _length(parameters: SlipParameters) -> float:
-    return Scale.of(parameters).length
-
-
-def _time(parameters: SlipParameters) -> float:
-    return Scale.of(parameters).time
-
-
 def impulse_unit(parameters: SlipParameters) -> float:
     """Factor of an impulse on the reference template: M sqrt(g l0) over that template's."""
     return parameters.mass / REFERENCE.mass * Scale.of(parameters).speed
-
-
-def _scale(where: PreparedExperiment) -> Scale:
-    return Scale.of(where.gait.parameters)
-
-
-def pushed(
-    where: PreparedExperiment, level: float, trial: int, direction: float = 0.0
-) -> PreparedExperiment:
-    """An experiment with a push of ``level`` [N s], in a phase of the step by the trial's number.
-
-    ``direction`` is from forward to the left [rad], of a floating-base robot.
-    """
-    push = Push(level, BEGIN, trial / PHASES, PUSH_SECONDS * _scale(where).time, direction)
-    return replace(where, steps=BEGIN + 1 + AFTER, pushes=(push,))
-
-
-def _kicked(where: PreparedExperiment, level: float) -> NDArray[np.float64]:
-    return np.array([level / where.gait.parameters.mass, 0.0, 0.0])
-
-
-def _kicked_back(where: PreparedExperiment, level: float) -> NDArray[np.float64]:
-    return _kicked(where, -level)
-
-
-def _pushed_back(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
-    return pushed(where, -level, trial)
-
-
-def _stepped(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
-    start = perturbed_start(where.gait, trial)
-    before, beyond = footholds(where, start, _SOON + 1)[-2:]
-    step = GroundStep(level, float(before + _EDGES[trial] * (beyond - before)))
-    world = replace(engine(where), ground_step=step)
-    return replace(where, steps=_SOON + 1 + AFTER, world=world, start=start)
-
-
-def _stepped_down(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
-    return _stepped(where, -level, trial)
-
-
-def _lasting(where: PreparedExperiment, trial: int, **changes: Any) -> PreparedExperiment:
-    return replace(where, steps=AFTER, start=perturbed_start(where.gait, trial), **changes)
-
-
-def _slippery(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
-    return _lasting(where, trial, world=replace(engine(where), friction=level))
-
-
-def _other_mass(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
-    return _lasting(where, trial, world=replace(engine(where), mass_scale=1.0 + level))
-
-
-def _weak(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
-    return _lasting(where, trial, controller=replace(where.tuning, torque_scale=level))
-
-
-def _noisy(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
-    return _lasting(where, trial, sensors=SensorOptions(noise=level, seed=trial))
-
-
-def _late(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
-    return _lasting(where, trial, delay=level)
 
 
 def _ladder(step: float, count: int, start: float = 0.0) -> tuple[float, ...]:
@@ -230,92 +154,107 @@ def _ladder(step: float, count: int, start: float = 0.0) -> tuple[float, ...]:
     return tuple(float(x) for x in np.round(start + step * np.arange(1, count + 1), 10))
 
 
-PUSHES = _ladder(5.0, 30)
-"""Impulses of pushes on the reference template [N s]."""
-
-NEWTON_SECONDS = Unit("N s")
-
+_IMPULSES = _ladder(5.0, 30)
 _HEIGHTS = (0.005, *_ladder(0.01, 8))
+_NEWTON_SECONDS, _CENTIMETRES, _PER_CENT = Unit("N s"), Unit("cm", 100.0), Unit("%", 100.0)
 
-_CENTIMETRES = Unit("cm", 100.0)
-_PER_CENT, _PER_CENT_LESS = Unit("%", 100.0), Unit("%", -100.0)
 
-# Name, title, unit, levels, trials, size, experiment.
+def _push(name: str, title: str, sign: float = 1.0, direction: float = 0.0) -> Disturbance:
+    """A push, in a phase of the step by the trial's number.
+
+    ``direction`` is from forward to the left [rad], of a floating-base robot.
+    """
+
+    def pushed(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
+        seconds = PUSH_SECONDS * Scale.of(where.gait.parameters).time
+        push = Push(sign * level, BEGIN, trial / PHASES, seconds, direction)
+        return replace(where, steps=BEGIN + 1 + AFTER, pushes=(push,))
+
+    def kick(where: PreparedExperiment, level: float) -> NDArray[np.float64]:
+        return np.array([sign * level / where.gait.parameters.mass, 0.0, 0.0])
+
+    levels, kicks = (_IMPULSES, PHASES, impulse_unit), None if direction else kick
+    return Disturbance(name, title, _NEWTON_SECONDS, *levels, pushed, passing=True, kick=kicks)
+
+
+def _step(name: str, title: str, sign: float) -> Disturbance:
+    """A step of the ground, its edge between two footholds by the trial's number."""
+
+    def stepped(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
+        start = perturbed_start(where.gait, trial)
+        before, beyond = footholds(where, start, _SOON + 1)[-2:]
+        edge = float(before + _EDGES[trial] * (beyond - before))
+        world = replace(engine(where), ground_step=GroundStep(sign * level, edge))
+        return replace(where, steps=_SOON + 1 + AFTER, world=world, start=start)
+
+    def size(parameters: SlipParameters) -> float:
+        return Scale.of(parameters).length
+
+    levels = _HEIGHTS, len(_EDGES), size
+    return Disturbance(name, title, _CENTIMETRES, *levels, stepped, passing=True)
+
+
+def _lasting(
+    name: str,
+    title: str,
+    unit: Unit,
+    levels: tuple[float, ...],
+    changes: Callable[[PreparedExperiment, float, int], dict[str, Any]],
+    size: Callable[[SlipParameters], float] = lambda _: 1.0,
+    grain: float = 0.0,
+) -> Disturbance:
+    """What lasts from a start off the gait on: fields of the experiment that it changes."""
+
+    def disturbed(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
+        start = perturbed_start(where.gait, trial)
+        return replace(where, steps=AFTER, start=start, **changes(where, level, trial))
+
+    return Disturbance(name, title, unit, levels, _STARTS, size, disturbed, grain=grain)
+
+
+def _slippery(where: PreparedExperiment, level: float, _: int) -> dict[str, Any]:
+    return {"world": replace(engine(where), friction=level)}
+
+
+def _other_mass(where: PreparedExperiment, level: float, _: int) -> dict[str, Any]:
+    return {"world": replace(engine(where), mass_scale=1.0 + level)}
+
+
+def _weak(where: PreparedExperiment, level: float, _: int) -> dict[str, Any]:
+    return {"controller": replace(where.tuning, torque_scale=level)}
+
+
+def _noisy(_: PreparedExperiment, level: float, trial: int) -> dict[str, Any]:
+    return {"sensors": SensorOptions(noise=level, seed=trial)}
+
+
+def _late(_: PreparedExperiment, level: float, __: int) -> dict[str, Any]:
+    return {"delay": level}
+
+
+def _time(parameters: SlipParameters) -> float:
+    return Scale.of(parameters).time
+
+
 DISTURBANCES: tuple[Disturbance, ...] = (
-    Disturbance(
-        "push-forward",
-        "push forward",
-        NEWTON_SECONDS,
-        PUSHES,
-        PHASES,
-        impulse_unit,
-        pushed,
-        passing=True,
-        kick=_kicked,
-    ),
-    Disturbance(
-        "push-backward",
-        "push backward",
-        NEWTON_SECONDS,
-        PUSHES,
-        PHASES,
-        impulse_unit,
-        _pushed_back,
-        passing=True,
-        kick=_kicked_back,
-    ),
-    Disturbance(
-        "step-up", "step up", _CENTIMETRES, _HEIGHTS, len(_EDGES), _length, _stepped, passing=True
-    ),
-    Disturbance(
-        "step-down",
-        "step down",
-        _CENTIMETRES,
-        _HEIGHTS,
-        len(_EDGES),
-        _length,
-        _stepped_down,
-        passing=True,
-    ),
-    Disturbance(
-        "friction", "friction", Unit(""), _ladder(-0.05, 13, 0.7), _STARTS, _plain, _slippery
-    ),
-    Disturbance("heavier", "heavier", _PER_CENT, _ladder(0.1, 15), _STARTS, _plain, _other_mass),
-    Disturbance(
-        "lighter", "lighter", _PER_CENT_LESS, _ladder(-0.1, 9), _STARTS, _plain, _other_mass
-    ),
-    Disturbance(
-        "torque", "torque limits", _PER_CENT, _ladder(-0.05, 19, 1.0), _STARTS, _plain, _weak
-    ),
-    Disturbance(
-        "noise", "sensor noise", Unit("mrad", 1e3), _ladder(5e-4, 20), _STARTS, _plain, _noisy
-    ),
-    Disturbance(
-        "delay",
-        "control delay",
-        Unit("ms", 1e3),
-        _ladder(2e-3, 25),
-        _STARTS,
-        _time,
-        _late,
-        grain=_TIME_STEP,
+    _push("push-forward", "push forward"),
+    _push("push-backward", "push backward", -1.0),
+    _step("step-up", "step up", 1.0),
+    _step("step-down", "step down", -1.0),
+    _lasting("friction", "friction", Unit(""), _ladder(-0.05, 13, 0.7), _slippery),
+    _lasting("heavier", "heavier", _PER_CENT, _ladder(0.1, 15), _other_mass),
+    _lasting("lighter", "lighter", Unit("%", -100.0), _ladder(-0.1, 9), _other_mass),
+    _lasting("torque", "torque limits", _PER_CENT, _ladder(-0.05, 19, 1.0), _weak),
+    _lasting("noise", "sensor noise", Unit("mrad", 1e3), _ladder(5e-4, 20), _noisy),
+    _lasting(
+        "delay", "control delay", Unit("ms", 1e3), _ladder(2e-3, 25), _late, _time, _TIME_STEP
     ),
 )
 """All that are measured, in the order they are shown in."""
 
-
-LATERAL_PUSHES: tuple[Disturbance, ...] = tuple(
-    Disturbance(
-        f"push-{side}",
-        f"push to the {side}",
-        NEWTON_SECONDS,
-        PUSHES,
-        PHASES,
-        impulse_unit,
-        partial(pushed, direction=direction),
-        passing=True,
-    )
-    for side, direction in (("left", 0.5 * pi), ("right", -0.5 * pi))
+LATERAL_PUSHES: tuple[Disturbance, ...] = (
+    _push("push-left", "push to the left", direction=0.5 * pi),
+    _push("push-right", "push to the right", direction=-0.5 * pi),
 )
 """In the step they come in the left foot stands, and then the right one."""
 

@@ -12,11 +12,7 @@ WORDS = [f"column-{i} of a table with long words" for i in range(12)]
 
 
 def table():
-    found = terminal.Table(title="a table")
-    for word in WORDS:
-        found.add_column(word)
-    found.add_row(*WORDS)
-    return found
+    return terminal.table("a table", WORDS, [WORDS])
 
 
 def test_in_a_pipe_no_line_is_wrapped(capsys, monkeypatch):
