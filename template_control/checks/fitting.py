@@ -88,9 +88,6 @@ def words_for(hint: Any) -> str:
     return f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"
 
 
-_ANY_NUMBER = Range()
-
-
 class Refused(Exception):
     """A value does not fit; its text says what would."""
 
@@ -174,62 +171,40 @@ def _rising(value: Any, fit: Callable[[Any], Any]) -> Any:
 
 
 def _number(value: Any, within: Range, whole: bool = False) -> Any:
-    what = "whole number" if whole else "number"
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    kinds: tuple[type, ...] = (int, np.integer)
-    if not whole:
-        kinds = (*kinds, float, np.floating)
+    kinds = (int, np.integer) if whole else (int, np.integer, float, np.floating)
     fits = isinstance(value, kinds) and not isinstance(value, bool | np.bool_)
-    if not fits:
-        raise Refused(within.words(what))
     try:
-        number = int(value) if whole else float(value)
+        number = (int if whole else float)(value) if fits else math.nan
     except OverflowError:
-        raise Refused(within.words(what)) from None
+        number = math.nan
     if not within.holds(number):
-        raise Refused(within.words(what))
+        raise Refused(within.words("whole number" if whole else "number"))
     # A member of an enumeration stays one.
     kept = isinstance(value, Enum) or type(value) is type(number)
     return value if kept else number
-
-
-def _truth(value: Any) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise Refused("True or False")
-    return bool(value)
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise Refused("a text")
-    return value
-
-
-def _path(value: Any) -> Path:
-    if not isinstance(value, Path):
-        raise Refused("a path")
-    return value
-
-
-def _none(value: Any) -> None:
-    if value is not None:
-        raise Refused("None")
 
 
 def _as_is(value: Any) -> Any:
     return value
 
 
+def _member(value: Any, of: tuple[type, ...], words: str) -> Any:
+    if not isinstance(value, of):
+        raise Refused(words)
+    return bool(value) if isinstance(value, np.bool_) else value
+
+
 _SIMPLE: dict[Any, Callable[[Any], Any]] = {
     Any: _as_is,
     object: _as_is,
-    float: lambda value: _number(value, _ANY_NUMBER),
-    int: lambda value: _number(value, _ANY_NUMBER, whole=True),
-    bool: _truth,
-    str: _text,
-    Path: _path,
-    type(None): _none,
+    float: partial(_number, within=Range()),
+    int: partial(_number, within=Range(), whole=True),
+    bool: partial(_member, of=(bool, np.bool_), words="True or False"),
+    str: partial(_member, of=(str,), words="a text"),
+    Path: partial(_member, of=(Path,), words="a path"),
+    type(None): partial(_member, of=(type(None),), words="None"),
     ArrayLike: lambda value: _array(value, np.float64),
 }
 
@@ -237,16 +212,13 @@ _SIMPLE: dict[Any, Callable[[Any], Any]] = {
 def _one_of(value: Any, hints: tuple[Any, ...]) -> Any:
     if value is None and type(None) in hints:
         return None
-    others = [hint for hint in hints if hint is not type(None)]
-    reasons = []
-    for hint in others:
+    reasons: dict[str, None] = {}  # that of None is the last
+    for hint in sorted(hints, key=lambda hint: hint is type(None)):
         try:
             return _fit(value, hint)
         except Refused as refused:
-            reasons.append(str(refused))
-    if type(None) in hints:
-        reasons.append("None")
-    raise Refused(" or ".join(dict.fromkeys(reasons)))
+            reasons[str(refused)] = None
+    raise Refused(" or ".join(reasons))
 
 
 def _items(value: Any, hint: Any) -> list[Any]:
@@ -285,15 +257,13 @@ def _mapping(value: Any, hint: Any) -> Any:
     key_hint, value_hint = get_args(hint)
     found = {}
     for key, entry in value.items():
+        where = "each key "
         try:
             fitted = _fit(key, key_hint)
-        except Refused as refused:
-            raise Refused(f"{words_for(hint)}; each key {refused}") from None
-        try:
+            where = f"{key} is {shown(entry)}, which should be "
             found[fitted] = _fit(entry, value_hint)
         except Refused as refused:
-            text = f"{key} is {shown(entry)}, which should be {refused}"
-            raise Refused(f"{words_for(hint)}; {text}") from None
+            raise Refused(f"{words_for(hint)}; {where}{refused}") from None
     same = all(found.get(key) is entry for key, entry in value.items())
     return value if same else found
 
