@@ -18,6 +18,7 @@ from template_control.checks.ranges import Count
 from template_control.errors import ParameterError
 from template_control.run.record import FloatingRecord, Record
 from template_control.slip.automaton.vocabulary import Event, Phase
+from template_control.view.replay.playback import stances
 from template_control.view.state_figures import (
     energies,
     phase_portrait,
@@ -238,10 +239,7 @@ def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
     Returns:
         (n, 2) x and y in the world [m]; (n,) times [s].
     """
-    stands = record.space_force[:, foot, 2] > 0.02 * record.weight
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], stands.astype(np.int8), [0]))))
-    spans = [(a, b) for a, b in edges.reshape(-1, 2) if record.time[b - 1] - record.time[a] > 0.05]
-    middle = np.array([(a + b) // 2 for a, b in spans], dtype=np.int64)
+    middle = np.array([(a + b) // 2 for a, b in stances(record)[foot]], dtype=np.int64)
     return record.space_foot[middle, foot, :2], record.time[middle]
 
 

@@ -17,7 +17,8 @@ from template_control.run.summary import STANDING
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.figures import Format, figure_style
-from template_control.view.state_figures import template_energies
+from template_control.view.replay.playback import stances
+from template_control.view.state_figures import leg_stiffness, template_energies
 from template_control.view.style import (
     COM,
     DPI,
@@ -154,30 +155,6 @@ def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Pa
     return [save_figure(figure, Path(folder) / f"{name}.png") for name, figure in figures.items()]
 
 
-def _footholds(record: Record) -> Array:
-    """x of every place where a foot landed [m]."""
-    found = []
-    for foot in range(len(record.feet)):
-        stands = record.contact_force[:, foot, 1] > 0.0
-        landed = np.flatnonzero(stands[1:] & ~stands[:-1]) + 1
-        # A landing rattles for some milliseconds.
-        apart = np.diff(record.time[landed], prepend=-np.inf) > 0.1
-        found.append(record.foot[landed[apart], foot, 0])
-    return np.concatenate(found)
-
-
-def _stiffnesses(record: Record) -> Array:
-    """(T, 2) of the template's rear and front leg [N/m], NaN where it carries nothing."""
-    stride = np.maximum(np.searchsorted(record.section_time, record.time, side="right") - 1, 0)
-    out = np.full((len(record.time), 2), np.nan)
-    for index in np.unique(record.node):
-        on = record.node == index
-        for leg, slot in enumerate(record.stiffness_slots[index]):
-            if slot is not None:
-                out[on, leg] = record.section_controls[stride[on], slot]
-    return out
-
-
 def _template_begins(record: Record) -> tuple[float, float]:
     """Time [s] and place [m] of the robot's first stride that the template makes, too."""
     kinds = record.kinds_of_stride
@@ -220,11 +197,12 @@ def route_figure(record: Record, template: ScenarioRecord, look: Look = _LOOK) -
         linewidth=0.8, label="the template alone",
     )  # fmt: skip
     first, *_, last = record.com[w, 0].tolist()
-    holds = _footholds(record)
+    spans = enumerate(stances(record))
+    holds = np.array([record.foot[first, foot, 0] for foot, of in spans for first, _ in of])
     _mark_footholds(path, holds[(holds >= first) & (holds <= last)])
     path.set(xlabel="x [m]", ylabel="CoM y [m]", xlim=(first, last))
     for leg, (name, color) in enumerate((("rear", LEFT), ("front", RIGHT))):
-        values = 1e-3 * _stiffnesses(record)[:, leg]
+        values = 1e-3 * leg_stiffness(record)[:, leg]
         stiffness.plot(record.time, values, color=color, linewidth=1.0, label=f"{name} leg")
     stiffness.set_ylabel("template's leg\nstiffness [kN/m]")
     for joint, name in enumerate(record.joints):

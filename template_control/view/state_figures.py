@@ -132,24 +132,30 @@ def tracking_errors(record: Record, look: Look = _LOOK) -> Figure:
     return finish(figure, panels, f"{as_text(record.robot_name)}: CoM error", look)
 
 
+def leg_stiffness(record: Record) -> Array:
+    """(T, 2) stiffness of the template's rear and front leg [N/m], NaN where it carries nothing.
+
+    It is what the automaton gives to the leg in the node, and the planner chose for the step.
+    """
+    step = np.maximum(np.searchsorted(record.section_time, record.time, side="right") - 1, 0)
+    found = np.full((len(record.time), 2), np.nan)
+    for index in np.unique(record.node):
+        on = record.node == index
+        for leg, slot in enumerate(record.stiffness_slots[index]):
+            if slot is not None:
+                found[on, leg] = record.section_controls[step[on], slot]
+    return found
+
+
 def template_energies(record: Record) -> dict[str, Array]:
     """The template's energies along the run, each (T,) [J]: kinetic, gravity, spring, total.
 
-    A leg's spring energy is F^2 / (2 k) of its recorded force, with the stiffness that the
-    automaton gives to the leg in the node and that the planner chose for the step.
+    A leg's spring energy is F^2 / (2 k) of its recorded force.
     """
-    p = record.template
-    step = np.maximum(np.searchsorted(record.section_time, record.time, side="right") - 1, 0)
-    stiffness = np.zeros((len(record.time), 2))
-    for index in np.unique(record.node):
-        slots = record.stiffness_slots[index]
-        on = record.node == index
-        for leg, slot in enumerate(slots):
-            # A template that touches down before the robot's foot does has both legs loaded
-            # in the robot's single stance.
-            used = slots[0] if slot is None else slot
-            if used is not None:
-                stiffness[on, leg] = record.section_controls[step[on], used]
+    p, stiffness = record.template, leg_stiffness(record)
+    # A template that touches down before the robot's foot does has both legs loaded in the robot's
+    # single stance: the front one then has the rear one's stiffness.
+    stiffness = np.nan_to_num(np.where(np.isnan(stiffness), stiffness[:, :1], stiffness))
     force_squared = np.sum(record.template_force**2, axis=2)
     stored = np.divide(
         force_squared, 2.0 * stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0

@@ -20,12 +20,7 @@ from numpy.typing import NDArray
 from template_control.errors import RecordError
 from template_control.run.record import FloatingRecord, Record
 from template_control.storage import atomic_path
-from template_control.view.replay.playback import (
-    Playback,
-    coil,
-    spring,
-    template_legs,
-)
+from template_control.view.replay.playback import Playback, coil, pushing, spring
 from template_control.view.replay.robot_visuals import model_of
 from template_control.view.replay.scene import in_space, smoothed
 from template_control.view.style import COM, SIDES, TEMPLATE, TRUNK, as_text, feet_shown, legs_shown
@@ -70,7 +65,7 @@ class Stage:
         flat = not isinstance(record, FloatingRecord)
         self.camera = FROM_THE_SIDE if flat else IN_SPACE
         self._below = _BELOW[0 if flat else 1]
-        _, self._loaded = template_legs(record)
+        self._loaded = pushing(record)
         self._spring = spring(0.03 * length)
         self.figure = Figure(figsize=(6.4, 4.4), layout="constrained")
         FigureCanvasAgg(self.figure)

@@ -1,4 +1,4 @@
-"""Contents of a replay, frame by frame: samples, template legs, forces, footholds."""
+"""Contents of a replay, frame by frame: samples, stances, forces, springs."""
 
 from __future__ import annotations
 
@@ -39,15 +39,6 @@ class Playback:
     clock: Array
 
 
-@dataclass(frozen=True)
-class Foothold:
-    """A place x [m] that a foot, 0 left or 1 right, stood on from a ``time`` on [s]."""
-
-    foot: int
-    x: float
-    time: float
-
-
 def playback(
     record: Record,
     *,
@@ -86,15 +77,19 @@ def carrying(record: Record) -> NDArray[np.bool_]:
     return np.asarray(record.contact_force[:, :, 1] > _CARRYING * record.weight)
 
 
-def template_legs(record: Record) -> tuple[Array, NDArray[np.bool_]]:
-    """The template's rear and front leg, which run from its CoM to the robot's feet.
+def stances(record: Record) -> list[list[tuple[int, int]]]:
+    """For each foot the first sample of each of its stances, and the one after the last."""
+    found = []
+    for on in carrying(record).T:
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], on, [False])).astype(np.int8)))
+        pairs = edges.reshape(-1, 2).tolist()
+        found.append([(a, b) for a, b in pairs if record.time[b - 1] - record.time[a] >= _STANCE])
+    return found
 
-    Their toes (T, 2, 2) [m], and (T, 2) whether each leg pushes.
-    """
-    samples = np.arange(len(record.time))
-    feet = record.of_legs(record.foot)
-    toes = np.stack((feet[samples, record.rear], feet[samples, 1 - record.rear]), axis=1)
-    return toes, np.linalg.norm(record.template_force, axis=2) > _CARRYING * record.weight
+
+def pushing(record: Record) -> NDArray[np.bool_]:
+    """(T, 2) whether the template's rear and its front leg push."""
+    return np.asarray(np.linalg.norm(record.template_force, axis=2) > _CARRYING * record.weight)
 
 
 def spring(radius: float) -> Array:
@@ -116,32 +111,13 @@ def coil(shape: Array, begin: Array, end: Array) -> Array:
     return np.asarray(begin[:, None] + np.stack((normal, span), axis=1) @ shape.T)
 
 
-def force_arrows(record: Record) -> Array:
-    """(T, n, 2) the ground's force on each foot as an arrow, zero where it does not carry [m].
+def force_arrows(force: Array, record: Record) -> Array:
+    """The ground's force on each foot (T, feet, 2 or 3) [N] as an arrow [m], 0 without contact.
 
     The weight is 0.4 rest lengths long. An arrow longer than two weights, at an impact, is
     cut to that.
     """
-    arrow = arrows_of(record.contact_force, record)
-    arrow[~carrying(record)] = 0.0
-    return arrow
-
-
-def arrows_of(force: Array, record: Record) -> Array:
-    """Forces (..., 2) or (..., 3) [N] as arrows, see :func:`force_arrows`."""
-    arrow = force / record.weight
+    arrow = np.where(carrying(record)[..., None], force / record.weight, 0.0)
     size = np.linalg.norm(arrow, axis=-1, keepdims=True)
     arrow = arrow * np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))
     return np.asarray(0.4 * record.template.rest_length * arrow)
-
-
-def footholds(record: Record) -> list[Foothold]:
-    """Footholds by time."""
-    found = []
-    for foot, on in enumerate(carrying(record).T):
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], on, [False])).astype(np.int8)))
-        for first, after in edges.reshape(-1, 2):
-            if record.time[after - 1] - record.time[first] >= _STANCE:
-                x = float(np.median(record.foot[first:after, foot, 0]))
-                found.append(Foothold(foot, x, float(record.time[first])))
-    return sorted(found, key=lambda foothold: foothold.time)

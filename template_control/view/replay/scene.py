@@ -22,12 +22,11 @@ from template_control.plant.terrain import Terrain
 from template_control.run.record import FloatingRecord, Record
 from template_control.view.replay.playback import (
     Playback,
-    arrows_of,
     carrying,
-    footholds,
     force_arrows,
+    pushing,
     spring,
-    template_legs,
+    stances,
 )
 from template_control.view.replay.robot_visuals import Robot, foot_sides, load_visuals, placements
 from template_control.view.style import COM, TEMPLATE, feet_shown
@@ -98,50 +97,35 @@ class Space:
     toes: Array
     foot: Array
     arrow: Array
-    stood: tuple[tuple[Array, Array], ...]
+    stood: list[tuple[Array, Array]]
 
 
 def in_space(record: Record, sides: Array) -> Space:
     """A run in three directions.
 
-    ``sides`` (n,) is how far to the left a planar robot's feet are [m]; not used for a free one.
+    ``sides`` (feet,) is how far to the left a planar robot's feet are [m].
     """
     if isinstance(record, FloatingRecord):
-        return _free(record)
-    ground, aside = record.ground, np.array([0.0, 1.0, 0.0])
-    found = footholds(record)
-    stood = []
-    for foot, side in enumerate(sides.tolist()):
-        own = [f for f in found if f.foot == foot]
-        places = [[f.x, side, ground.height_at(f.x)] for f in own]
-        stood.append((np.array(places).reshape(-1, 3), np.array([f.time for f in own])))
-    toes, _ = template_legs(record)
-    return Space(
-        com=raised(record.com),
-        template=raised(record.template_com),
-        toes=raised(toes),
-        foot=raised(record.foot) + sides[:, None] * aside,
-        arrow=raised(force_arrows(record)),
-        stood=tuple(stood),
-    )
-
-
-def _free(record: FloatingRecord) -> Space:
-    away = record.template_com - record.com
-    ahead = np.stack((np.cos(record.heading), np.sin(record.heading)), axis=1)
-    template = record.space_com + np.column_stack((away[:, :1] * ahead, away[:, 1]))
+        away = record.template_com - record.com
+        ahead = np.stack((np.cos(record.heading), np.sin(record.heading)), axis=1)
+        com, foot, force = record.space_com, record.space_foot, record.space_force
+        template = com + np.column_stack((away[:, :1] * ahead, away[:, 1]))
+        toes = foot
+    else:
+        points = (record.com, record.template_com, record.foot, record.contact_force)
+        com, template, toes, force = map(raised, points)
+        foot = toes + sides[:, None] * np.array([0.0, 1.0, 0.0])
     samples = np.arange(len(record.time))
-    feet = record.of_legs(record.space_foot)
-    toes = np.stack((feet[samples, record.rear], feet[samples, 1 - record.rear]), axis=1)
-    found = footholds(record)
+    of_legs = record.of_legs(toes)
+    legs = [of_legs[samples, leg] for leg in (record.rear, 1 - record.rear)]
     stood = []
-    for foot in range(len(record.feet)):
-        since = np.array([f.time for f in found if f.foot == foot])
-        rows = np.searchsorted(record.time, since + _LANDED)
-        stood.append((record.space_foot[np.minimum(rows, len(samples) - 1), foot], since))
-    arrow = arrows_of(record.space_force, record)
-    arrow[~carrying(record)] = 0.0
-    return Space(record.space_com, template, toes, record.space_foot, arrow, tuple(stood))
+    for i, spans in enumerate(stances(record)):
+        since = record.time[[first for first, _ in spans]]
+        rows = np.minimum(np.searchsorted(record.time, since + _LANDED), len(samples) - 1)
+        places = foot[rows, i]
+        places[:, 2] = [record.ground.height_at(x) for x in places[:, 0].tolist()]
+        stood.append((places, since))
+    return Space(com, template, np.stack(legs, axis=1), foot, force_arrows(force, record), stood)
 
 
 def raised(points: Array) -> Array:
@@ -237,6 +221,14 @@ class _Scene:
         keys = np.flatnonzero(np.diff(visible, prepend=~visible[:1]))
         keys = np.unique(np.append(keys, len(visible) - 1))
         self._track(path, _Track("visible", "bool", self.clock[keys], visible[keys].tolist()))
+
+    def stretch(self, path: str, begin: Array, span: Array, visible: NDArray[np.bool_]) -> None:
+        """Let what stands from 0 to 1 on the vertical reach along ``span`` from ``begin``."""
+        self.animate(path, "position", "vector3", begin)
+        self.animate(path, "quaternion", "quaternion", turned_to(span))
+        size = np.insert(np.ones((len(span), 2)), 2, np.linalg.norm(span, axis=1), axis=1)
+        self.animate(path, "scale", "vector3", size)
+        self.show(path, visible)
 
     def reveal(self, path: str, mesh: _Gradual, color: str, **properties: Any) -> None:
         """Let a mesh appear as its frames come."""
@@ -362,18 +354,11 @@ def _template(scene: _Scene, playback: Playback, space: Space, length: float) ->
     nearer[1, 3] = -0.03 * length
     scene.place("/meshcat/template/com/dot", nearer)
     scene.animate("/meshcat/template/com", "position", "vector3", com)
-    _, loaded = template_legs(record)
-    coil = _ribbon(raised(spring(0.03 * length)), 0.01 * length)
+    coil, loaded = _ribbon(raised(spring(0.03 * length)), 0.01 * length), pushing(record)[rows]
     for leg, name in enumerate(("rear_leg", "front_leg")):
         path = f"/meshcat/template/{name}"
-        direction = space.toes[rows, leg] - com
         scene.add(path, coil, _overlay(TEMPLATE))
-        scene.animate(path, "position", "vector3", com)
-        scene.animate(path, "quaternion", "quaternion", turned_to(direction))
-        size = np.ones((len(rows), 3))
-        size[:, 2] = np.linalg.norm(direction, axis=1)
-        scene.animate(path, "scale", "vector3", size)
-        scene.show(path, loaded[rows, leg])
+        scene.stretch(path, com, space.toes[rows, leg] - com, loaded[:, leg])
 
 
 def _forces(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
@@ -393,13 +378,7 @@ def _forces(scene: _Scene, playback: Playback, space: Space, length: float) -> N
         ):
             scene.add(f"{path}/{part}", geometry, _overlay(color))
             scene.place(f"{path}/{part}", offset)
-        arrow = space.arrow[rows, foot]
-        scene.animate(path, "position", "vector3", space.foot[rows, foot])
-        scene.animate(path, "quaternion", "quaternion", turned_to(arrow))
-        size = np.ones((len(rows), 3))
-        size[:, 2] = np.linalg.norm(arrow, axis=1)
-        scene.animate(path, "scale", "vector3", size)
-        scene.show(path, on[rows, foot])
+        scene.stretch(path, space.foot[rows, foot], space.arrow[rows, foot], on[rows, foot])
 
 
 def _footholds(scene: _Scene, playback: Playback, space: Space, length: float) -> None:

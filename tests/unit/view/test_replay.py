@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.view.replay.playback import (
-    footholds,
-    force_arrows,
-    playback,
-    spring,
-    template_legs,
-)
+from template_control.view.replay.playback import force_arrows, playback, pushing, spring
 from template_control.view.replay.robot_visuals import load_visuals, placements
-from template_control.view.replay.scene import scene_commands
+from template_control.view.replay.scene import in_space, scene_commands
 
 FOOT_RADIUS = 0.01
 
@@ -122,7 +116,7 @@ def test_the_scene_moves_with_the_run(record):
     assert np.allclose(com[:, [0, 2]], record.com[rows], atol=1e-6)
     foot = found["/meshcat/robot/right_foot_0", ".position"][1].reshape(-1, 3)
     assert np.allclose(foot[:, 0], record.foot[rows, 1, 0], atol=1e-6)
-    toes, loaded = template_legs(record)
+    loaded, toes = pushing(record), in_space(record, np.zeros(2)).toes[..., [0, 2]]
     for leg, name in enumerate(("rear_leg", "front_leg")):
         path = f"/meshcat/template/{name}"
         times, shown = found[path, ".visible"]
@@ -136,8 +130,8 @@ def test_the_scene_moves_with_the_run(record):
 
 
 def test_arrows_follow_the_force_only_where_a_foot_carries(record):
-    arrows = force_arrows(record)
     force = record.contact_force
+    arrows = force_arrows(force, record)
     idle = force[:, :, 1] <= 0.0
     assert np.all(arrows[idle] == 0.0)
     carries = force[:, :, 1] > 100.0
@@ -151,13 +145,16 @@ def test_arrows_follow_the_force_only_where_a_foot_carries(record):
 
 
 def test_footholds_are_where_feet_stood(record):
-    found = footholds(record)
-    assert [f.foot for f in found] == [i % 2 for i in range(len(found))]
+    of_feet = enumerate(in_space(record, np.zeros(2)).stood)
+    found = [(t, i, *x) for i, feet in of_feet for x, t in zip(*feet, strict=True)]
+    found.sort()
+    assert [foot for _, foot, *_ in found] == [i % 2 for i in range(len(found))]
     assert len(found) in (record.steps + 1, record.steps + 2)
-    for foothold in found:
-        row = np.searchsorted(record.time, foothold.time)
-        assert record.foot[row, foothold.foot, 1] == pytest.approx(0.0, abs=5e-3)
-        assert record.foot[row, foothold.foot, 0] == pytest.approx(foothold.x, abs=0.01)
+    for time, foot, x, _, height in found:
+        row = np.searchsorted(record.time, time)
+        assert height == 0.0
+        assert record.foot[row, foot, 1] == pytest.approx(0.0, abs=5e-3)
+        assert record.foot[row, foot, 0] == pytest.approx(x, abs=0.01)
 
 
 def test_foothold_plates_appear_when_their_foot_has_landed(record):
@@ -170,11 +167,10 @@ def test_foothold_plates_appear_when_their_foot_has_landed(record):
             for key, value in geometry["data"]["attributes"].items()
         }
         corners = attributes["position"].reshape(-1, 4, 3)
-        stood = [f for f in footholds(record) if f.foot == foot]
-        assert np.allclose(corners.mean(axis=1)[:, 0], [f.x for f in stood], atol=1e-6)
+        places, landed = in_space(record, np.array([0.1, -0.1])).stood[foot]
+        assert np.allclose(corners.mean(axis=1)[:, 0], places[:, 0], atol=1e-6)
         assert np.allclose(corners.mean(axis=1)[:, 1], (0.1, -0.1)[foot])  # where its leg is
         frame = attributes["lineDistance"].reshape(-1, 4)[:, 0].astype(int)
-        landed = np.array([f.time for f in stood])
         assert np.all(record.time[frames.rows[frame]] >= landed)
         assert np.all(record.time[frames.rows[np.maximum(frame - 1, 0)]] <= landed)
 
