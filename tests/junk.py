@@ -121,7 +121,7 @@ def targets(folder):
         embedding.FrictionOptions,
         embedding.AheadOptions,
         embedding.ModifiedOptions, embedding.ReplanOptions,
-        embedding.RunningOptions, embedding.StandingOptions, slip.PaceOptions,
+        embedding.RunningOptions, embedding.StandingOptions,
         embedding.SwingOptions, run.FallOptions,
         estimation.ImuOptions, sweep.SweepOptions, whole_body.ComTask, whole_body.FootTask,
         whole_body.MomentumTask, whole_body.PostureTask, whole_body.QpOptions,

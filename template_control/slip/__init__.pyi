@@ -86,6 +86,5 @@ from .scenario.scenario import Scenario as Scenario
 from .scenario.scenario import Segment as Segment
 from .scenario.scenario import example_one as example_one
 from .scenario.scenario import load_scenario as load_scenario
-from .scenario.scenario_route import PaceOptions as PaceOptions
 from .scenario.scenario_route import ScenarioRoute as ScenarioRoute
 from .similarity import Scale as Scale

@@ -263,8 +263,7 @@ class LateralPlanner:
     def touch_down(self, lasted: float) -> None:
         """Learn the duration of single stance from a touchdown so long after the section [s]."""
         if np.isfinite(self._due) and self._due > 0.0:
-            options = self.options.learning
-            self.lessons[self._kind] = self.learnt.after_stance(lasted, self._due, options)
+            self.lessons[self._kind] = self.learnt.after_stance(lasted, self._due)
         self._landed, self._due = self.placed, np.inf
         self.data["placed"] = 0
 

@@ -41,16 +41,12 @@ class LateralLearningOptions(Checked):
             learnt.
         offset_bound: largest offsets of y and dy/dt [m, m/s].
         surprise_bound: a larger surprise counts as this much: a push is no offset [m, m/s].
-        stretch_gain: share of a stance's surprise that enters the stretch.
-        stretch_bounds: of the stretch. A stance that is longer or shorter was disturbed.
     """
 
     gain: Share = tuned(0.2)
     one_sided: Share = tuned(0.0)
     offset_bound: tuple[NotNegative, NotNegative] = tuned((0.04, 0.15), LENGTH, SPEED)
     surprise_bound: tuple[NotNegative, NotNegative] = tuned((0.02, 0.08), LENGTH, SPEED)
-    stretch_gain: Share = tuned(0.2)
-    stretch_bounds: Interval = tuned((0.9, 1.2))
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,9 @@ from template_control.warm_up import Part
 
 Array = NDArray[np.float64]
 
+_STRETCH_GAIN = 0.2  # share of a stance's surprise that enters the stretch
+_STRETCHES = 0.9, 1.2  # of single stance; one that is longer or shorter was disturbed
+
 
 def _nothing() -> Array:
     return np.zeros((len(Side), 2))
@@ -70,20 +73,16 @@ class LateralLearnt:
         offset[stance.other.row] -= (1.0 - options.one_sided) * lesson
         return replace(self, offset=np.clip(offset, -bound, bound))
 
-    def after_stance(
-        self, lasted: float, planned: float, options: LateralLearningOptions
-    ) -> LateralLearnt:
+    def after_stance(self, lasted: float, planned: float) -> LateralLearnt:
         """After a piece of single stance, such as that from a section to the touchdown.
 
         Args:
             lasted: its duration [s].
             planned: its duration on the path, without a stretch [s]; more than 0.
-            options: how fast, and how much.
         """
-        low, high = options.stretch_bounds
+        low, high = _STRETCHES
         seen = min(max(lasted / planned, low), high)
-        stretch = self.stretch + options.stretch_gain * (seen - self.stretch)
-        return replace(self, stretch=stretch)
+        return replace(self, stretch=self.stretch + _STRETCH_GAIN * (seen - self.stretch))
 
 
 _FOOTHOLDS, _NEXT = 2, 2 + NEXT  # columns of a motion

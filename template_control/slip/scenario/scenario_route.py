@@ -8,34 +8,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import NotNegative
+from template_control.checks.checked import checked
 from template_control.slip.automaton.vocabulary import StrideKind, WalkingStride
 from template_control.slip.maps.section import APEX, REST, VLO, Section
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segment
-from template_control.slip.similarity import tuned
-
-
-@dataclass(frozen=True)
-class PaceOptions(Checked):
-    """Speeds at which a walk of a scenario that stands takes a stride of its own for a change.
-
-    All are speeds at VLO over sqrt(g l0).
-
-    Attributes:
-        stoppable: from which one step leads to rest.
-        slowed: to which a faster walk is slowed down first, so that its last step can be short.
-        behind: difference from the wanted speed that the walking planner is left to make good: a
-            stride of its own throws a robot that has reached its speed off it.
-    """
-
-    stoppable: NotNegative = tuned(0.16)
-    slowed: NotNegative = tuned(0.11)
-    behind: NotNegative = tuned(0.03)
-
 
 Array = NDArray[np.float64]
+
+# A change of speed of a scenario that stands takes a stride of its own; dx/dt at VLO / sqrt(g l0):
+_STOPPABLE = 0.16  # from which one step leads to rest
+_SLOWED = 0.11  # to which a faster walk is slowed down first, so that its last step can be short
+# Difference from the wanted speed that the walking planner is left to make good: a stride of its
+# own throws a robot that has reached its speed off it.
+_BEHIND = 0.03
 
 _STRIDES: dict[tuple[Section, Gait], str] = {
     (VLO, "walk"): StrideKind.WALK,
@@ -146,7 +132,6 @@ class ScenarioRoute:
     Args:
         scenario: the profile.
         apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
-        paces: when a walk changes its speed by a stride of its own.
         vlo_height: y wanted at VLO [m] by dx/dt there [m/s]; None: the scenario's.
         walks: kind of its walking steps, "wp" with push-off.
     """
@@ -156,14 +141,12 @@ class ScenarioRoute:
         self,
         scenario: Scenario,
         apex_height: Callable[[float], float] | None = None,
-        paces: PaceOptions | None = None,
         vlo_height: Callable[[float], float] | None = None,
         walks: WalkingStride = StrideKind.WALK,
     ) -> None:
         self.scenario = scenario
         self.walks = walks
         self._vlo_height = vlo_height or (lambda speed: scenario.vlo[0])
-        self.paces = paces or PaceOptions()
         self._apex_height = apex_height or (lambda speed: scenario.apex_height)
         self.parameters = scenario.parameters
         stands = scenario.segments[0].gait == STAND
@@ -224,7 +207,7 @@ class ScenarioRoute:
         ahead = took if aims else 0.0
         speed = here.wanted(segment, now + ahead)
         if segment.gait == STAND:
-            speed = self.paces.slowed * self._unit if kind == StrideKind.CHANGE_SPEED else 0.0
+            speed = _SLOWED * self._unit if kind == StrideKind.CHANGE_SPEED else 0.0
         runs = segment.gait == "run"
         target = (
             (speed, self._apex_height(speed))
@@ -247,11 +230,11 @@ class ScenarioRoute:
         """The stride at VLO with ``speed``: one to another speed comes first where it must."""
         segment = self.scenario.segments[here.index]
         if segment.gait == STAND:
-            slow = speed <= self.paces.stoppable * self._unit
+            slow = speed <= _STOPPABLE * self._unit
             return replace(here, walking=False), kind if slow else StrideKind.CHANGE_SPEED
         if not self.scenario.stands:
             return here, kind
-        if abs(speed - here.wanted(segment, now)) <= self.paces.behind * self._unit:
+        if abs(speed - here.wanted(segment, now)) <= _BEHIND * self._unit:
             return replace(here, walking=True), kind
         return here, StrideKind.CHANGE_SPEED
 

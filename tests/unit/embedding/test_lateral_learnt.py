@@ -57,5 +57,5 @@ def test_a_lesson_leaves_what_was_known_as_it_is():
 def test_the_stretch_of_single_stance(lasted, stretch):
     learnt = LateralLearnt()
     for _ in range(60):
-        learnt = learnt.after_stance(lasted, 0.1, OPTIONS)
+        learnt = learnt.after_stance(lasted, 0.1)
     assert np.isclose(learnt.stretch, stretch, atol=1e-5)
