@@ -31,8 +31,6 @@ from template_control.errors import ParameterError, TemplateControlError
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_POSITIONAL = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-
 
 class Checked:
     """Base of frozen dataclasses whose fields are checked when one is made.
@@ -100,15 +98,10 @@ def _fields(kind: Any) -> tuple[tuple[str, Any, Callable[[Any], Any]], ...]:
 def checked(function: Callable[P, T]) -> Callable[P, T]:
     """Let a function check its arguments against its annotations.
 
-    What does not fit is a :class:`~.errors.ParameterError`; a wrong number of arguments stays a
-    TypeError.
+    The function has neither ``*args`` nor ``**kwargs``. What does not fit is a
+    :class:`~.errors.ParameterError`; a wrong number of arguments stays a TypeError.
     """
-    parameters = inspect.signature(function).parameters.values()
-    positional = [p.name for p in parameters if p.kind in _POSITIONAL]
-    rest, named = (
-        next((p.name for p in parameters if p.kind is kind), None)
-        for kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    )
+    names = list(inspect.signature(function).parameters)
     owner, _, name = function.__qualname__.rpartition(".")
     called = owner if name == "__init__" else name
 
@@ -119,19 +112,17 @@ def checked(function: Callable[P, T]) -> Callable[P, T]:
         holder = SimpleNamespace(__annotations__=wanted)
         return get_type_hints(holder, function.__globals__, include_extras=True)
 
-    def fitting(key: str, value: Any, declared: str | None) -> Any:
-        found = hints()
-        if declared not in found:  # self; or one too many, which Python reports
+    def fitting(key: str, value: Any) -> Any:
+        known = hints()
+        if key not in known:  # self; or one too many, which Python reports
             return value
-        return check(f"{called}: {key}", value, found[declared])
+        return check(f"{called}: {key}", value, known[key])
 
     @wraps(function)
     def with_checks(*args: P.args, **kwargs: P.kwargs) -> T:
         # Not by Signature.bind, which takes as long as the check.
-        keys = chain(positional, repeat(rest))
-        good = [fitting(str(k), v, k) for k, v in zip(keys, args, strict=False)]
-        known = hints()
-        also = {k: fitting(k, v, k if k in known else named) for k, v in kwargs.items()}
-        return function(*good, **also)
+        keys = chain(names, repeat(""))
+        named: dict[str, Any] = {k: fitting(k, v) for k, v in kwargs.items()}
+        return function(*map(fitting, keys, args), **named)
 
     return with_checks

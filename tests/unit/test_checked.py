@@ -81,15 +81,19 @@ def test_arrays_and_numpy_s_numbers_are_welcome():
 
 def test_a_function_checks_its_arguments():
     @checked
-    def twice(x: Positive, *others: Count, **named: float) -> Any:
-        return 2 * x, others, named
+    def twice(x: Positive, other: Count = 1, *, named: float = 0.0) -> Any:
+        return 2 * x, other, named
 
-    assert twice(np.float64(2.0), 1, a=0) == (4.0, (1,), {"a": 0.0})
-    for wrong, word in (((-1,), "twice: x is -1"), ((1, 0), "others is 0")):
+    assert twice(np.float64(2.0), 1, named=0) == (4.0, 1, 0.0)
+    for wrong, word in (((-1,), "twice: x is -1"), ((1, 0), "other is 0")):
         with pytest.raises(ParameterError, match=word):
             twice(*wrong)
-    with pytest.raises(ParameterError, match="twice: b is 'b'"):
-        twice(1.0, b="b")
+    with pytest.raises(ParameterError, match="twice: named is 'b'"):
+        twice(1.0, named="b")
+    with pytest.raises(TypeError, match="takes from 1 to 2 positional arguments but 3"):
+        twice(1.0, 2, 3)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'more'"):
+        twice(1.0, more=3)
     with pytest.raises(TypeError, match=r"twice\(\) missing 1 required"):
         twice()
 
