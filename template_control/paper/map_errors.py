@@ -176,12 +176,7 @@ def stride_figure(
     for i, (name, x, y) in enumerate(events):
         axes.plot(x, y, "o", color="black", markersize=3.5, zorder=3)
         axes.annotate(
-            name,
-            (x, y),
-            xytext=(0, 9 + 12 * (i % 2)),
-            textcoords="offset points",
-            ha="center",
-            fontsize=8,
+            name, (x, y), (0, 9 + 12 * (i % 2)), textcoords="offset points", ha="center", fontsize=8
         )
     axes.axhline(0.0, color="0.4", linewidth=0.8)
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title, ylim=(-0.03, 1.3))

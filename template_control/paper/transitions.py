@@ -49,56 +49,44 @@ def walk_to_run(target: Array) -> dict[MapKind, StepSolution]:
     return {kind: WalkToRun(P, kind).solve(WRT_STATE, target, WRT_CONTROLS) for kind in _MAPS}
 
 
-def _rwt_row(name: str, u: Array, reached: str) -> tuple[str, ...]:
-    return (
-        "RWT",
-        name,
-        f"{np.degrees(u[Slot.TOUCHDOWN_ANGLE]):.2f}",
-        f"{u[Slot.K_SC] / 1e3:.2f}",
-        f"{u[Slot.K_SD] / 1e3:.2f}",
-        reached,
-    )
+_STRIDES = {
+    "RWT": (StrideKind.RUN_TO_WALK, RWT_STATE, (Slot.K_SC, Slot.K_SD)),
+    "WRT": (StrideKind.WALK_TO_RUN, WRT_STATE, (Slot.K_SC_WR, Slot.K_SD_WR)),
+}
 
 
-def _wrt_row(name: str, u: Array, reached: str) -> tuple[str, ...]:
-    return (
-        "WRT",
-        name,
-        f"{np.degrees(u[Slot.TOUCHDOWN_ANGLE]):.2f}",
-        f"{u[Slot.K_SC_WR] / 1e3:.2f}",
-        f"{u[Slot.K_SD_WR] / 1e3:.2f}",
-        reached,
-    )
-
-
-def _ends(stride: str, z: Array, u: Array) -> tuple[str, list[float]]:
-    """Final state of the exact stride, as text and as numbers."""
-    mapped = ReturnMap(P, stride)(z, u)
-    return "  ".join(f"{value:.4f}" for value in mapped.state), mapped.state.tolist()
+def _row(stride: str, by: str, u: Array, end: Array | None) -> tuple[str, ...]:
+    alpha, slots = np.degrees(u[Slot.TOUCHDOWN_ANGLE]), _STRIDES[stride][2]
+    reached = "see the notes" if end is None else "  ".join(f"{value:.4f}" for value in end)
+    return (stride, by, f"{alpha:.2f}", *(f"{u[slot] / 1e3:.2f}" for slot in slots), reached)
 
 
 def table4() -> Reproduction:
     """Table IV: controls of both transitions from the published states."""
-    rows, data = [], {}
-    text, end = _ends(StrideKind.RUN_TO_WALK, RWT_STATE, RWT_CONTROLS)
-    rows.append(_rwt_row("Table IV", RWT_CONTROLS, text))
-    data["rwt"] = {"published": {"controls": RWT_CONTROLS.tolist(), "exact_end": end}}
+    rows: list[tuple[str, ...]] = []
+    data: dict[str, dict[str, Any]] = {"rwt": {}, "wrt": {}}
+
+    def add(stride: str, u: Array, solution: StepSolution | None = None, name: str = "") -> Array:
+        """Add a row; the exact stride's end with the controls."""
+        kind, start, _ = _STRIDES[stride]
+        end = ReturnMap(P, kind)(start, u).state
+        rows.append(_row(stride, f"{name} map" if name else "Table IV", u, end))
+        found = {"controls": u.tolist(), "exact_end": end.tolist()}
+        if solution is not None:
+            found = _solution(solution, end.tolist())
+        data[stride.lower()][name or "published"] = found
+        return end
+
+    add("RWT", RWT_CONTROLS)
     for kind, solution in run_to_walk().items():
-        text, end = _ends(StrideKind.RUN_TO_WALK, RWT_STATE, solution.controls)
-        rows.append(_rwt_row(f"{kind.name.lower()} map", solution.controls, text))
-        data["rwt"][kind.name.lower()] = _solution(solution, end)
-    text, end = _ends(StrideKind.WALK_TO_RUN, WRT_STATE, WRT_CONTROLS)
-    rows.append(_wrt_row("Table IV", WRT_CONTROLS, text))
-    data["wrt"] = {"published": {"controls": WRT_CONTROLS.tolist(), "exact_end": end}}
-    target = np.array([end[0], APEX_HEIGHT])
+        add("RWT", solution.controls, solution, kind.name.lower())
+    target = np.array([add("WRT", WRT_CONTROLS)[0], APEX_HEIGHT])
     for kind, solution in walk_to_run(target).items():
-        text, end = _ends(StrideKind.WALK_TO_RUN, WRT_STATE, solution.controls)
-        rows.append(_wrt_row(f"{kind.name.lower()} map", solution.controls, text))
-        data["wrt"][kind.name.lower()] = _solution(solution, end)
+        add("WRT", solution.controls, solution, kind.name.lower())
     simplified = WalkToRun(P, MapKind.PAPER, simplified=True).solve(
         WRT_STATE, WRT_REFERENCE, WRT_CONTROLS
     )
-    rows.append(_wrt_row("simplified, z_a* of Table IV", simplified.controls, "see the notes"))
+    rows.append(_row("WRT", "simplified, z_a* of Table IV", simplified.controls, None))
     data["wrt"]["simplified"] = _solution(simplified, [])
     return Reproduction(
         title="Table IV: controls of the transition strides",

@@ -77,13 +77,9 @@ def _speed(axes: Axes, record: ScenarioRecord) -> None:
     shade(axes, record, _WHOLE)
     axes.plot(record.time, record.state[:, 2], color=COM, linewidth=1.0, label="CoM")
     axes.plot(
-        record.section_time[1:],
-        record.wanted_speed,
-        "--",
-        color=TRUNK,
-        linewidth=1.0,
+        record.section_time[1:], record.wanted_speed, "--", color=TRUNK, linewidth=1.0,
         label="wanted at the next section",
-    )
+    )  # fmt: skip
     axes.set(xlabel="time [s]", ylabel="dx/dt [m/s]")
 
 

@@ -109,14 +109,9 @@ def basin_figure(
     image = None
     for axes, energy, fall, good in zip(panels, energies, steps, converges, strict=False):
         image = axes.imshow(
-            np.where(good, np.nan, fall),
-            origin="lower",
-            extent=extent,
-            aspect="auto",
-            cmap="Greys",
-            vmin=0,
-            vmax=1.3 * steps.max(),
-        )
+            np.where(good, np.nan, fall), origin="lower", extent=extent, aspect="auto",
+            cmap="Greys", vmin=0, vmax=1.3 * steps.max(),
+        )  # fmt: skip
         axes.contourf(
             heights, angles, good.astype(float), levels=[0.5, 1.5], colors=["#2a6196"], alpha=0.85
         )

@@ -76,16 +76,11 @@ def _share_panel(axes: Axes, values: NDArray[np.float64], trials: Sequence[Trial
                 count = int(np.sum(np.array(good)[part]))
                 share = count / len(part)
                 low, high = wilson_interval(count, len(part))
+                sure = 100.0 * np.array([[share - low], [high - share]])
                 axes.errorbar(
-                    values[part].mean() + shift * width,
-                    100.0 * share,
-                    100.0 * np.array([[share - low], [high - share]]),
-                    fmt="o",
-                    color=color,
-                    markersize=3.5,
-                    linewidth=1.2,
-                    label=label,
-                )
+                    values[part].mean() + shift * width, 100.0 * share, sure, fmt="o", color=color,
+                    markersize=3.5, linewidth=1.2, label=label,
+                )  # fmt: skip
                 label = "_"
     axes.tick_params(labelsize=8)
 
