@@ -80,6 +80,12 @@ def test_stance_feet_do_not_slide(record):
     assert step[single[1:] & single[:-1]].max() < 1e-4
 
 
+def test_the_trunk_is_held_where_the_options_say(gait):
+    leant = walk(gait, steps=2, controller=EmbeddingOptions(trunk_pitch=0.1))
+    assert leant.q[0, 2] == pytest.approx(0.1, abs=1e-6)
+    assert leant.q[:, 2].mean() == pytest.approx(0.1, abs=0.02)
+
+
 def test_the_node_sequence_is_the_automatons(record):
     names = np.array(record.nodes)[record.node]
     changes = names[np.concatenate(([True], names[1:] != names[:-1]))]

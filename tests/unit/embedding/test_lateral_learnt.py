@@ -1,12 +1,14 @@
 """What is learnt of a robot's sideways motion from step to step."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from template_control.slip import LateralLearningOptions, LateralLearnt, Side
 
-OPTIONS = LateralLearningOptions()
-ONE_SIDED = LateralLearningOptions(one_sided=1.0)
+OPTIONS = LateralLearningOptions(offset_bound=(0.03, 0.1), surprise_bound=(0.025, 0.1))
+ONE_SIDED = replace(OPTIONS, one_sided=1.0)
 
 
 def taught(truth, options, steps=120):

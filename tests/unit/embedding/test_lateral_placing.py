@@ -219,7 +219,8 @@ def test_a_learnt_offset_keeps_the_wished_width():
 def test_a_tick_compiles_nothing_anew():
     ready(KERNELS)
     known = [len(f.signatures) for f in (place, transition)]
-    options = LateralOptions(step_cost=1, reach=1)  # whole numbers are taken too
+    # Whole numbers are taken too.
+    options = LateralOptions(step_cost=1, reach=1, state_cost=(1, 0), hold=0)
     cycle, two = lateral_cycle(LATERAL, LateralWish(1)), np.zeros(2)
     place(PATH, lateral_aim(LATERAL, cycle, Side.LEFT, LateralLearnt(), options), 0.0, two, two)
     assert [len(f.signatures) for f in (place, transition)] == known

@@ -13,7 +13,7 @@ from template_control.embedding.learners.momentum import (
     uncontrolled,
 )
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
-from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Cause, Context, RestContext
 from template_control.embedding.replanning import (
     AGILITY,
@@ -47,6 +47,32 @@ def test_planner_leaves_the_gait_alone(planner, gait):
     assert decision.nominal
     np.testing.assert_allclose(decision.predicted, gait.vlo, atol=4e-3)
     assert decision.controls[Slot.TOUCHDOWN_ANGLE] == pytest.approx(np.radians(66.0), abs=4e-3)
+
+
+def test_dear_controls_are_changed_less_and_dear_states_more(gait):
+    z = gait.vlo + [0.02, 0.003, -0.03]
+
+    def change(**costs):
+        decision = LqrPlanner(gait, LqrOptions(**costs)).decide(Context(z))
+        return abs(decision.controls - gait.controls)[Slot.TOUCHDOWN_ANGLE]
+
+    assert change(control_cost=(5e3, 2e3, 2e3)) < 0.5 * change()
+    assert change(state_cost=(1e3, 1e4, 1e3)) > change()
+
+
+def test_the_modified_planner_keeps_its_bounds(gait):
+    alpha, z = gait.controls[Slot.TOUCHDOWN_ANGLE], gait.vlo + [0.3, 0.0, 0.0]
+    angles = [
+        ModifiedPlanner(gait, ModifiedOptions(**bounds)).decide(Context(z)).controls[0]
+        for bounds in ({}, {"angle_range": (-0.01, 0.01)}, {"top_margin": 0.2})
+    ]
+    assert abs(angles[0] - alpha) > 0.02
+    assert abs(angles[1] - alpha) <= 0.01 + 1e-12
+    assert angles[2] <= np.arcsin(z[1] / P.rest_length) - 0.2 + 1e-12
+    near = Context(gait.vlo + [0.02, 0.0, 0.0])
+    for tolerance in (1e-6, 0.05):
+        planner = ModifiedPlanner(gait, ModifiedOptions(tolerance=tolerance))
+        assert planner.decide(near).nominal == (tolerance > 1e-3)
 
 
 def test_prediction_is_the_exact_map(planner, gait):

@@ -35,7 +35,7 @@ def test_quintic_arrives():
 
 
 def test_a_swing_steps_along_the_quintics_of_its_parts():
-    options = SwingOptions(descent=0.1)
+    options = SwingOptions(descent=0.1, horizon=0.015)
     here = np.array([0.1, -0.4, 3.0]), np.array([0.02, 0.2, -1.0])
     parts = {
         (0.0, 0.30): (options.clearance, 0.0, 0.5 * 0.30),  # it rises,
@@ -87,7 +87,7 @@ def test_swing_stays_within_reach_of_the_hip():
 
 
 def test_swing_falls_to_ground_that_comes_late():
-    options = SwingOptions()
+    options = SwingOptions(drop_acceleration=7.0)
     swing = SwingFoot(options)
     swing.start(np.array([0.6, 0.0]), np.array([0.1, -0.2]))
     for _ in range(50):
@@ -111,7 +111,7 @@ def test_a_foot_is_high_while_it_travels():
 
 
 def test_a_foot_that_meets_a_wall_goes_up_along_it_and_on_above_it():
-    options = SwingOptions()
+    options = SwingOptions(lift_speed=1.5, margin=0.03)
     swing = SwingFoot(options)
     swing.start(np.array([-0.6, 0.0]), np.zeros(2))
     for i in range(100):

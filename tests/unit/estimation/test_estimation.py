@@ -121,6 +121,22 @@ def test_a_foot_lands_where_the_state_says():
     np.testing.assert_allclose(base.state[5:7], place, atol=1e-6)
 
 
+def test_a_standing_foot_holds_against_a_biased_accelerometer_as_far_as_it_is_believed():
+    robot = tc.load_robot("five-link")
+    q, contact = np.array([0.0, 0.95, 0.0, -0.3, 0.6, 0.3, 0.0]), np.array([True, False])
+
+    def drift(**noise):
+        base = BaseFilter(robot, BaseFilterOptions(**noise))
+        base.reset(q, np.zeros(robot.nv))
+        for _ in range(200):
+            base.correct(q[3:], contact)
+            base.predict(0.0, np.array([0.5, robot.gravity]), DT)
+        return abs(base.state[3])
+
+    assert drift(force_noise=1.0) < drift() < drift(force_noise=0.01)
+    assert drift(foot_noise=5e-5) < drift() < drift(foot_noise=5e-3)
+
+
 def _rolled(robot, q):
     leg = list(robot.legs[0])
     return robot.foot_radius * (q[2] + robot.joint_sign[leg] @ q[3:][leg])

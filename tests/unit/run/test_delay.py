@@ -19,7 +19,7 @@ class Bodies:
         noise: of the measured speeds, standard deviation [rad/s].
     """
 
-    def __init__(self, delay, noise=0.0):
+    def __init__(self, delay, noise=0.0, then=None):
         rng = np.random.default_rng(4)
         ticks = 1500
         # Swings of some hertz, as large as those of a leg.
@@ -27,7 +27,9 @@ class Bodies:
         self.expected = 80.0 * np.sin(
             2.0 * np.pi * 2.5 * DT * np.arange(ticks)[:, None] + phases
         ) + rng.normal(0.0, 2.0, (ticks, 7))
-        acting = np.vstack((np.repeat(self.expected[:1], delay, axis=0), self.expected))[:ticks]
+        late = np.full(ticks, delay)
+        late[ticks // 2 :] = delay if then is None else then
+        acting = self.expected[np.maximum(np.arange(ticks) - late, 0)]
         self.v = np.vstack((np.zeros(7), DT * np.cumsum(acting, axis=0)))
         steps = DT * self.v[:-1] + 0.5 * DT * DT * acting
         self.q = np.vstack((np.zeros(7), np.cumsum(steps, axis=0)))
@@ -51,6 +53,16 @@ def follow(bodies, robot, options=None):
 def test_every_delay_is_found(robot, late, noise):
     _, believed = follow(Bodies(late, noise), robot)
     assert set(believed[400:]) == {late}
+
+
+def test_a_short_memory_sooner_believes_in_another_delay(robot):
+    after = {}
+    for memory in (0.1, 0.5):
+        bodies = Bodies(2, then=6)
+        _, believed = follow(bodies, robot, DelayOptions(memory=memory))
+        after[memory] = believed.index(6) - bodies.ticks // 2
+        assert set(believed[bodies.ticks // 2 + after[memory] :]) == {6}
+    assert 0 < 2 * after[0.1] < after[0.5]
 
 
 @pytest.mark.parametrize("late", [1, 3, 7])
