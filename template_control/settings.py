@@ -22,6 +22,7 @@ import numpy as np
 import tomli_w
 
 from template_control.checks.checked import is_default
+from template_control.checks.fitting import unaliased
 from template_control.errors import ParameterError, TemplateControlError
 
 T = TypeVar("T")
@@ -180,6 +181,7 @@ def _deeper(hint: Any, current: Any, entries: _Entries, where: str) -> Any:
 
 def _read(hint: Any, value: Any, where: str) -> Any:
     """A value of the type ``hint`` from what TOML holds."""
+    hint = unaliased(hint)
     origin, arguments = get_origin(hint), get_args(hint)
     if origin in (Union, UnionType):
         return _read_one_of([a for a in arguments if a is not NoneType], value, where)
@@ -287,6 +289,7 @@ def _is_union(hint: Any) -> bool:
 
 def _said(hint: Any) -> bool:
     """True if TOML can hold values of a type."""
+    hint = unaliased(hint)
     arguments = get_args(hint)
     if _is_union(hint):
         return any(_said(h) for h in arguments if h is not NoneType)

@@ -53,8 +53,18 @@ def inward(low: float, high: float, digits: int = 3) -> str:
     return f"{first:.{digits + 2}g} to {last:.{digits + 2}g}"
 
 
+def unaliased(hint: Any) -> Any:
+    """The annotation that a type alias stands for, such as NumPy's NDArray from Python 3.12 on."""
+    value = getattr(get_origin(hint) or hint, "__value__", None)
+    if value is None:
+        return hint
+    arguments = get_args(hint)
+    return value[arguments] if arguments else value
+
+
 def words_for(hint: Any) -> str:
     """Words for what fits an annotation, for a message."""
+    hint = unaliased(hint)
     origin, args = get_origin(hint), get_args(hint)
     if origin is Literal:
         return "one of " + ", ".join(dict.fromkeys(repr(x) for x in args))
@@ -124,6 +134,7 @@ def _fit(value: Any, hint: Any) -> Any:
 
 
 def _plan(hint: Any) -> Callable[[Any], Any]:
+    hint = unaliased(hint)
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _annotated(args[0], args[1:])
