@@ -134,12 +134,12 @@ def _fit(value: Any, hint: Any) -> Any:
 
 
 def _plan(hint: Any) -> Callable[[Any], Any]:
+    if hint in _SIMPLE:
+        return _SIMPLE[hint]
     hint = unaliased(hint)
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _annotated(args[0], args[1:])
-    if hint in _SIMPLE:
-        return _SIMPLE[hint]
     if origin in (Union, types.UnionType):
         return partial(_one_of, hints=args)
     if origin in (list, Sequence):

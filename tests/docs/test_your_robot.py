@@ -46,7 +46,9 @@ def bolt(joints=BOLT_JOINTS, radius=0.016):
 
 def walk(robot, start=None):
     planner = tc.LqrPlanner(tc.default_gait(robot))
-    tc.simulate(tc.Experiment(robot, planner=planner, steps=1, start=start))
+    tc.simulate(
+        tc.Experiment(robot, planner=planner, steps=1, start=start, world=tc.PlantOptions())
+    )
 
 
 def linked(folder):

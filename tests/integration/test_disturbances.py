@@ -23,6 +23,7 @@ from template_control.view.style import Look
 
 
 def walk(robot, gait, **options):
+    options = {"world": PlantOptions(), **options}
     return simulate(Experiment(robot, planner=LqrPlanner(gait), **options))
 
 

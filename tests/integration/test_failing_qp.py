@@ -4,6 +4,7 @@ import json
 import logging
 import warnings
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -21,7 +22,8 @@ from template_control.slip.lateral.path import lateral_path
 
 def _weak(scale):
     """A walk whose motors are much too weak."""
-    return tc.Experiment(steps=10, controller=tc.EmbeddingOptions(torque_scale=scale))
+    controller = tc.EmbeddingOptions(torque_scale=scale)
+    return tc.Experiment(steps=10, controller=controller, world=tc.PlantOptions())
 
 
 @pytest.mark.parametrize(("scale", "fails"), [(0.05, True), (1.0, False)])
@@ -39,6 +41,7 @@ def test_a_run_in_which_the_qp_fails_says_so_at_once(robot, default_gait, caplog
         assert "no solution in 101 of the last" in told[0].getMessage()
 
 
+@pytest.mark.skipif(find_spec("pybullet") is None, reason="in MuJoCo the QP is solved to the fall")
 @pytest.mark.parametrize("json_too", [False, True])
 def test_the_command_line_says_so_at_once_and_in_table_and_json(tmp_path, capsys, json_too):
     words = ["walk", "--steps", "3", "--torque-scale", "0.05", "--no-figures"]

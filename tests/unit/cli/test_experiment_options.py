@@ -269,7 +269,7 @@ def test_keys_come_before_those_of_the_file(understood, tmp_path):
     [
         ("--world.friction x", "world.friction is 'x': give a number"),
         ("--world.friction -1", "world.friction is -1: give a positive number"),
-        ("--world.contact_time 0.01", "unknown key world.contact_time: known are"),
+        ("--plant pybullet --world.contact_time 0.01", "unknown key world.contact_time: known are"),
         ("--world.frictoin 1", "--world.frictoin"),
         ("--motion.speed 1 --scenario examples/walk_speeds.toml", "unknown key motion.speed"),
         ("--planner.kind jump", "planner.kind is 'jump': give one of lqr, ahead"),

@@ -308,6 +308,7 @@ def stand(spacing, impulse, beats):
             steps=beats,
             pose=standing_pose(p, spacing),
             pushes=pushes,
+            world=tc.PlantOptions(),
         )
     )
 

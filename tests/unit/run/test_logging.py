@@ -30,6 +30,7 @@ def weak_walk(robot, default_gait, caplog):
                 planner=tc.LqrPlanner(default_gait),
                 steps=10,
                 controller=tc.EmbeddingOptions(torque_scale=0.07),
+                world=tc.PlantOptions(),
             )
         )
     assert record.fell
