@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,60 +18,22 @@ from template_control.checks.checked import checked
 from template_control.errors import RecordError, TemplateControlError
 from template_control.plant.terrain import GroundStep, Terrain
 from template_control.run.facts import Facts
-from template_control.run.tables import to_dataframe, to_xarray
+from template_control.run.tables import Quantity, quantities, to_dataframe, to_xarray
 from template_control.slip.automaton.vocabulary import Phase
 
 Array = NDArray[np.float64]
 
-LAYOUT = storage.Layout(
-    fields={
-        "time": "T",
-        "q": "T nv",
-        "v": "T nv",
-        "torque": "T nu",
-        "com": "T 2",
-        "com_velocity": "T 2",
-        "angular_momentum": "T",
-        "template_com": "T 2",
-        "template_velocity": "T 2",
-        "foot": "T n 2",
-        "joint": "T nu 2",
-        "contact_force": "T n 2",
-        "template_force": "T 2 2",
-        "node": "T <nodes",
-        "rear": "T <2",
-        "solved": "T",
-        "swing_reference": "T 2 2",
-        "push": "T",
-        "section": "S <sections",
-        "section_time": "S",
-        "section_state": "S 3",
-        "stride": "S <strides",
-        "section_target": "S 3",
-        "section_accepted": "S",
-        "section_predicted": "S 3",
-        "section_controls": "S 6",
-        "section_offset": "S 3",
-        "section_nominal": "S",
-        "section_feasible": "S",
-        "section_load": "S",
-        "section_trim": "S",
-        "tick_seconds": "ticks",
-        "solve_seconds": "ticks",
-        "plan_seconds": "S",
-    },
-    metadata={
-        **dict.fromkeys(("robot", "urdf", "gait", "planner", "plant"), (str,)),
-        **dict.fromkeys(("fall_reason", "error"), (str,)),
-        **dict.fromkeys(("arrived", "interrupted"), (bool,)),
-        **dict.fromkeys(("mass", "trunk_com", "duration", "wall_seconds", "ticks"), (float, int)),
-        **dict.fromkeys(("gait_mean_speed", "gait_flight_share"), (float, int)),
-        **dict.fromkeys(("joints", "torque_limit", "velocity_limit", "feet", "legs"), (list,)),
-        **dict.fromkeys(("nodes", "phases", "stiffness_slots", "sections", "strides"), (list,)),
-        **dict.fromkeys(("gait_state", "gait_controls"), (list,)),
-        **dict.fromkeys(("template", "options", "summary"), (dict,)),
-    },
-)
+_METADATA: dict[str, tuple[type, ...]] = {
+    **dict.fromkeys(("robot", "urdf", "gait", "planner", "plant"), (str,)),
+    **dict.fromkeys(("fall_reason", "error"), (str,)),
+    **dict.fromkeys(("arrived", "interrupted"), (bool,)),
+    **dict.fromkeys(("mass", "trunk_com", "duration", "wall_seconds", "ticks"), (float, int)),
+    **dict.fromkeys(("gait_mean_speed", "gait_flight_share"), (float, int)),
+    **dict.fromkeys(("joints", "torque_limit", "velocity_limit", "feet", "legs"), (list,)),
+    **dict.fromkeys(("nodes", "phases", "stiffness_slots", "sections", "strides"), (list,)),
+    **dict.fromkeys(("gait_state", "gait_controls"), (list,)),
+    **dict.fromkeys(("template", "options", "summary"), (dict,)),
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -122,44 +84,43 @@ class Record(Facts):
         metadata: the facts as the file has them.
     """
 
-    time: Array
-    q: Array
-    v: Array
-    torque: Array
-    com: Array
-    com_velocity: Array
-    angular_momentum: Array
-    template_com: Array
-    template_velocity: Array
-    foot: Array
-    joint: Array
-    contact_force: Array
-    template_force: Array
-    node: NDArray[np.int64]
-    rear: NDArray[np.int64]
-    solved: NDArray[np.bool_]
-    swing_reference: Array
-    push: Array
-    section: NDArray[np.int64]
-    section_time: Array
-    section_state: Array
-    stride: NDArray[np.int64]
-    section_target: Array
-    section_accepted: Array
-    section_predicted: Array
-    section_controls: Array
-    section_offset: Array
-    section_nominal: NDArray[np.bool_]
-    section_feasible: NDArray[np.bool_]
-    section_load: Array
-    section_trim: Array
-    tick_seconds: Array
-    solve_seconds: Array
-    plan_seconds: Array
+    time: Annotated[Array, Quantity("T", "s")]
+    q: Annotated[Array, Quantity("T nv:coordinate")]
+    v: Annotated[Array, Quantity("T nv:velocity")]
+    torque: Annotated[Array, Quantity("T nu:joint", "N m")]
+    com: Annotated[Array, Quantity("T 2:axis", "m")]
+    com_velocity: Annotated[Array, Quantity("T 2:axis", "m/s")]
+    angular_momentum: Annotated[Array, Quantity("T", "kg m^2/s")]
+    template_com: Annotated[Array, Quantity("T 2:axis", "m")]
+    template_velocity: Annotated[Array, Quantity("T 2:axis", "m/s")]
+    foot: Annotated[Array, Quantity("T n:foot 2:axis", "m")]
+    joint: Annotated[Array, Quantity("T nu:joint 2:axis", "m")]
+    contact_force: Annotated[Array, Quantity("T n:foot 2:axis", "N")]
+    template_force: Annotated[Array, Quantity("T 2:leg 2:axis", "N")]
+    node: Annotated[NDArray[np.int64], Quantity("T <nodes")]
+    rear: Annotated[NDArray[np.int64], Quantity("T <2")]
+    solved: Annotated[NDArray[np.bool_], Quantity("T")]
+    swing_reference: Annotated[Array, Quantity("T 2:group 2:axis", "m")]
+    push: Annotated[Array, Quantity("T", "N")]
+    section: Annotated[NDArray[np.int64], Quantity("S <sections")]
+    section_time: Annotated[Array, Quantity("S", "s")]
+    section_state: Annotated[Array, Quantity("S 3:state")]
+    stride: Annotated[NDArray[np.int64], Quantity("S <strides")]
+    section_target: Annotated[Array, Quantity("S 3:state")]
+    section_accepted: Annotated[Array, Quantity("S", "m/s")]
+    section_predicted: Annotated[Array, Quantity("S 3:state")]
+    section_controls: Annotated[Array, Quantity("S 6:control")]
+    section_offset: Annotated[Array, Quantity("S 3:state")]
+    section_nominal: Annotated[NDArray[np.bool_], Quantity("S")]
+    section_feasible: Annotated[NDArray[np.bool_], Quantity("S")]
+    section_load: Annotated[Array, Quantity("S")]
+    section_trim: Annotated[Array, Quantity("S", "m/s^2")]
+    tick_seconds: Annotated[Array, Quantity("ticks", "s")]
+    solve_seconds: Annotated[Array, Quantity("ticks", "s")]
+    plan_seconds: Annotated[Array, Quantity("S", "s")]
     metadata: dict[str, Any]
 
     file_format: ClassVar[str] = "template-control run 6"
-    layout: ClassVar[storage.Layout] = LAYOUT
 
     def check_shown(self) -> None:
         """Check that the run can be drawn.
@@ -170,10 +131,10 @@ class Record(Facts):
         """
         if len(self.time) < 2:
             raise RecordError("the run has fewer than two samples: there is nothing to show")
-        for name, axes in self.layout.fields.items():
+        for name, quantity in quantities(type(self)).items():
             values = getattr(self, name)
             # A foot without a reference has NaN there.
-            if axes.split()[0] != "T" or name.endswith("reference"):
+            if quantity.dimensions[0] != "time" or name.endswith("reference"):
                 continue
             good = np.isfinite(values).reshape(len(values), -1).all(axis=1)
             if not good.all():
@@ -290,7 +251,8 @@ class Record(Facts):
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
         kind = next((k for k in cls.__subclasses__() if _holds(path, k)), cls)
-        return storage.load(kind, path, kind.file_format, kind.layout)
+        sizes = {name: quantity.layout for name, quantity in quantities(kind).items()}
+        return storage.load(kind, path, kind.file_format, storage.Layout(sizes, _METADATA))
 
 
 class RunInterrupted(KeyboardInterrupt):
@@ -327,31 +289,16 @@ def recorded(error: BaseException) -> Record | None:
     return record if isinstance(record, Record) else None
 
 
-_FLOATING_LAYOUT = storage.Layout(
-    fields={
-        **LAYOUT.fields,
-        "q": "T nq",
-        "space_com": "T 3",
-        "space_foot": "T n 3",
-        "space_force": "T n 3",
-        "attitude": "T 3",
-        "heading": "T",
-        "sway": "T 2",
-        "side_reference": "T 2",
-    },
-    metadata=LAYOUT.metadata,
-)
-
-
 @dataclass(frozen=True, repr=False)
 class FloatingRecord(Record):
     """A run of a robot that nothing holds.
 
     The fields of :class:`~template_control.run.record.Record` are those of its view in the heading
-    frame: x there is the way walked, as the frame turns about the stance foot. ``q`` and ``v`` are
-    Pinocchio's of a free flyer.
+    frame: x there is the way walked, as the frame turns about the stance foot. ``v`` is Pinocchio's
+    of a free flyer.
 
     Attributes:
+        q: (T, nq) configuration, Pinocchio's of a free flyer.
         space_com: (T, 3) of the CoM in the world, x, y to the left, z up [m].
         space_foot: (T, n, 3) lowest points of the foot spheres in the world [m].
         space_force: (T, n, 3) the ground's force on each of them in the world [N].
@@ -364,22 +311,22 @@ class FloatingRecord(Record):
     """
 
     file_format: ClassVar[str] = "template-control free run 2"
-    layout: ClassVar[storage.Layout] = _FLOATING_LAYOUT
 
-    space_com: Array
-    space_foot: Array
-    space_force: Array
-    attitude: Array
-    heading: Array
-    sway: Array
-    side_reference: Array
+    q: Annotated[Array, Quantity("T nq:coordinate")]
+    space_com: Annotated[Array, Quantity("T 3:space_axis", "m")]
+    space_foot: Annotated[Array, Quantity("T n:foot 3:space_axis", "m")]
+    space_force: Annotated[Array, Quantity("T n:foot 3:space_axis", "N")]
+    attitude: Annotated[Array, Quantity("T 3:angle", "rad")]
+    heading: Annotated[Array, Quantity("T", "rad")]
+    sway: Annotated[Array, Quantity("T 2:sway_state")]
+    side_reference: Annotated[Array, Quantity("T 2:group", "m")]
 
 
 def _holds(path: str | Path, kind: type[Record]) -> bool:
     """True if a file has all fields of a kind of run; False if it cannot be read."""
     try:
         with np.load(path, allow_pickle=False) as data:
-            return set(data.files) >= set(kind.layout.fields)
+            return set(data.files) >= set(quantities(kind))
     except Exception:  # a damaged file has any of a dozen; its reader says which
         return False
 

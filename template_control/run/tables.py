@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from dataclasses import fields
+from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,52 +19,35 @@ _FLOATING_RATES = {**dict.fromkeys("xyz", "m/s"), **dict.fromkeys(("wx", "wy", "
 _STATE = {"dx": "m/s", "y": "m", "dy": "m/s"}
 _SWAY = {"place": "m", "rate": "m/s"}
 _CONTROLS = {slot.name.lower(): "rad" if slot is Slot.TOUCHDOWN_ANGLE else "N/m" for slot in Slot}
-# Of each field: dimensions after the first one, and the unit; "" where there is none, or where the
-# last dimension's labels have their own.
-_SAMPLED: dict[str, tuple[tuple[str, ...], str]] = {
-    "time": ((), "s"),
-    "q": (("coordinate",), ""),
-    "v": (("velocity",), ""),
-    "torque": (("joint",), "N m"),
-    "com": (("axis",), "m"),
-    "com_velocity": (("axis",), "m/s"),
-    "angular_momentum": ((), "kg m^2/s"),
-    "template_com": (("axis",), "m"),
-    "template_velocity": (("axis",), "m/s"),
-    "foot": (("foot", "axis"), "m"),
-    "joint": (("joint", "axis"), "m"),
-    "contact_force": (("foot", "axis"), "N"),
-    "template_force": (("leg", "axis"), "N"),
-    "node": ((), ""),
-    "rear": ((), ""),
-    "solved": ((), ""),
-    "swing_reference": (("group", "axis"), "m"),
-    "push": ((), "N"),
-    "space_com": (("space_axis",), "m"),
-    "space_foot": (("foot", "space_axis"), "m"),
-    "space_force": (("foot", "space_axis"), "N"),
-    "attitude": (("angle",), "rad"),
-    "heading": ((), "rad"),
-    "sway": (("sway_state",), ""),
-    "side_reference": (("group",), "m"),
-}
-_BY_SECTION: dict[str, tuple[tuple[str, ...], str]] = {
-    "section": ((), ""),
-    "section_time": ((), "s"),
-    "section_state": (("state",), ""),
-    "stride": ((), ""),
-    "section_target": (("state",), ""),
-    "section_accepted": ((), "m/s"),
-    "section_predicted": (("state",), ""),
-    "section_controls": (("control",), ""),
-    "section_offset": (("state",), ""),
-    "section_nominal": ((), ""),
-    "section_feasible": ((), ""),
-    "section_load": ((), ""),
-    "section_trim": ((), "m/s^2"),
-    "plan_seconds": ((), "s"),
-}
-_BY_TICK = ("tick_seconds", "solve_seconds")
+_FIRST = {"T": "time", "S": "section", "ticks": "tick"}
+
+
+class Quantity(NamedTuple):
+    """Axes and SI unit of a field of a record.
+
+    ``axes`` are those of :class:`~template_control.storage.Layout`, each after the first one with
+    the dimension that it stands for, such as "T n:foot 2:axis". ``unit`` is "" where there is none,
+    or where the last dimension's labels have their own.
+    """
+
+    axes: str
+    unit: str = ""
+
+    @property
+    def layout(self) -> str:
+        """The axes' sizes."""
+        return re.sub(r":\w+", "", self.axes)
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """What the axes stand for."""
+        return (_FIRST[self.axes.split()[0]], *re.findall(r":(\w+)", self.axes))
+
+
+def quantities(kind: type) -> dict[str, Quantity]:
+    """Quantities of a class of records, by field."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {f.name: get_args(hints[f.name])[1] for f in fields(kind) if f.name != "metadata"}
 
 
 class Column(NamedTuple):
@@ -120,14 +105,15 @@ def columns(record: Any) -> dict[str, Column]:
             cannot be named as the type here.
     """
     labels, found = _labels(record), {}
-    for name, (dimensions, unit) in _SAMPLED.items():
-        if not hasattr(record, name):
+    for name, quantity in quantities(type(record)).items():
+        first, *dimensions = quantity.dimensions
+        if first != "time":
             continue
         values, axes = _values(record, name), [list(labels[axis]) for axis in dimensions]
         for index in np.ndindex(*(len(axis) for axis in axes)):
             words = [axis[i] for axis, i in zip(axes, index, strict=True)]
             own = labels[dimensions[-1]][words[-1]] if words else ""
-            found["_".join((name, *words))] = Column(values[:, *index], unit or own)
+            found["_".join((name, *words))] = Column(values[:, *index], quantity.unit or own)
     return found
 
 
@@ -153,18 +139,13 @@ def to_xarray(record: Any) -> Any:
         raise MissingPackageError(
             "to_xarray needs xarray, which is not installed: pip install xarray"
         ) from None
-    fields = {
-        **{name: (("time", *axes), unit) for name, (axes, unit) in _SAMPLED.items()},
-        **{name: (("section", *axes), unit) for name, (axes, unit) in _BY_SECTION.items()},
-        **dict.fromkeys(_BY_TICK, (("tick",), "s")),
-    }
     # A variable cannot have the name of a dimension that it does not run along alone.
     renamed = {"joint": "joint_position", "foot": "foot_position", "section": "section_kind"}
     found, used = {}, set()
-    for name, (axes, unit) in fields.items():
-        if hasattr(record, name):
-            found[renamed.get(name, name)] = (axes, _values(record, name), {"units": unit})
-            used |= set(axes)
+    for name, quantity in quantities(type(record)).items():
+        axes, units = quantity.dimensions, {"units": quantity.unit}
+        found[renamed.get(name, name)] = (axes, _values(record, name), units)
+        used |= set(axes)
     coordinates: dict[str, Any] = {"time": found.pop("time")}
     for axis, labels in _labels(record).items():
         if axis in used:

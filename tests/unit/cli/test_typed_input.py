@@ -22,6 +22,7 @@ from template_control.robot.five_link import SolidLink
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robustness.campaign import DisturbanceDistribution
 from template_control.run.experiment import Experiment
+from template_control.run.tables import quantities
 from template_control.storage import writing
 
 INTERNAL = re.compile(r"\b[A-Z][a-z]+[A-Za-z]*\.[a-z_]+")
@@ -334,8 +335,8 @@ def test_feet_larger_than_the_legs_are_refused(tmp_path):
 def sampled(record):
     return [
         name
-        for name, axes in record.layout.fields.items()
-        if axes.split()[0] == "T"
+        for name, quantity in quantities(type(record)).items()
+        if quantity.dimensions[0] == "time"
         and getattr(record, name).dtype.kind == "f"
         and not name.endswith("reference")
     ]
