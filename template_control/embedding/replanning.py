@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import product
 from math import asin, atan2, hypot, inf, isnan
 from typing import NamedTuple
 
@@ -111,21 +110,6 @@ def ballistic_touchdown_angle(sensed: TemplateState, parameters: SlipParameters)
     return atan2(py, -px)
 
 
-class _Pricing(NamedTuple):
-    """Price of a choice: of the state that it leads to, and of its distance from the gait's.
-
-    ``gait`` (f,) are the gait's stiffnesses [N/m].
-    """
-
-    price: Callable[[Array], float]
-    gait: Array
-
-    def effort(self, x: Array) -> float:
-        """Of stiffnesses ``x`` (f,) [N/m]."""
-        change = (x / self.gait - 1.0) / _CHANGE
-        return float(_EFFORT * (change @ change))
-
-
 def choose_legs(
     ahead: EndOfStride,
     decision: Decision,
@@ -152,32 +136,42 @@ def choose_legs(
     tolerance = np.array([speed * scale.speed, length * scale.length, speed * scale.speed])
     u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
     if price is not None:
-        u, end = _cheapest(u, end, prior, ahead, _Pricing(price, nominal[stiff]))
+        u, end = _cheapest(u, end, prior, ahead, price, base)
     if end is None:
         return decision
     return replace(decision, controls=u, predicted=end, nominal=False)
 
 
 def _cheapest(
-    u: Array, end: Array | None, prior: Prior, ahead: EndOfStride, pricing: _Pricing
+    u: Array,
+    end: Array | None,
+    prior: Prior,
+    ahead: EndOfStride,
+    price: Callable[[Array], float],
+    gait: Array,
 ) -> tuple[Array, Array | None]:
-    """The cheapest of a grid within the bounds, and of controls ``u`` that lead to ``end``."""
+    """The cheapest of a grid within the bounds, and of controls ``u`` that lead to ``end``.
+
+    An end has its price, stiffnesses that of their distance from the ``gait``'s (f,).
+    """
+
+    def effort(x: Array) -> float:
+        change = (x / gait - 1.0) / _CHANGE
+        return float(_EFFORT * (change @ change))
+
     stiff = prior.slots
-    least = np.inf if end is None else pricing.price(end) + pricing.effort(u[stiff])
+    least = np.inf if end is None else price(end) + effort(u[stiff])
     if isnan(least):
         return u, end
-    points = max(2, round(TRIES ** (1.0 / max(len(stiff), 1))))
-    axes = [np.linspace(*ends, points) for ends in zip(prior.lower, prior.upper, strict=True)]
-    for x in np.array(list(product(*axes))):
-        effort = pricing.effort(x)
-        if effort >= least:
+    for x in prior.grid(max(2, round(TRIES ** (1.0 / max(len(stiff), 1))))):
+        if effort(x) >= least:
             continue
         tried = prior.controls.copy()
         tried[stiff] = x
         there, outcome = ahead(tried)
         if outcome is not Outcome.SECTION:
             continue
-        cost = effort + pricing.price(there)
+        cost = effort(x) + price(there)
         if cost < least:
             least, u, end = cost, tried, there
     return u, end

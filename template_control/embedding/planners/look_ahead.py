@@ -124,15 +124,7 @@ _KNEE_TOLERANCE = 0.05  # share of the knee moment beyond that costs 1
 
 @compiled
 def aimed(p: PlanProblem, aim: PlanTarget, plan: Plan, target: Array, factor: Array) -> None:
-    """The aimed gait, as the robot settles on it.
-
-    Args:
-        p: the table of gaits.
-        aim: speed and offset.
-        plan: its ``row`` is overwritten.
-        target: (7,) overwritten with z* and u*.
-        factor: (3, 3) overwritten with L, P = L L'.
-    """
+    """Write the aimed gait, as the robot settles on it: z*, u* (7,), and L (3, 3), P = L L'."""
     row = plan.row
     gait_row(p.table, aim.speed, row)
     for i in range(STATES + CONTROLS):
@@ -147,13 +139,7 @@ def aimed(p: PlanProblem, aim: PlanTarget, plan: Plan, target: Array, factor: Ar
 
 @compiled
 def slots_of(plan: Plan, i: int, u: Array) -> None:
-    """The controls of a step by :class:`Slot`.
-
-    Args:
-        plan: shares of the aimed gait's k.
-        i: which step.
-        u: (NUM_SLOTS,) overwritten.
-    """
+    """Write the controls of step ``i`` by :class:`Slot` into ``u`` (NUM_SLOTS,)."""
     for j in range(NUM_SLOTS):
         u[j] = 0.0
     for j in range(CONTROLS):
@@ -163,17 +149,9 @@ def slots_of(plan: Plan, i: int, u: Array) -> None:
 
 @compiled
 def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Array) -> float:
-    """Errors of a plan, in tolerances.
+    """Write the errors of a plan, in tolerances, into ``out`` (11 N,); return the cost.
 
-    Args:
-        p: the tolerances.
-        plan: its states and controls.
-        target: (7,) z* and u*.
-        factor: (3, 3) lower triangular L with P = L L'.
-        out: (11 N,) overwritten: of each step what PER_STEP counts.
-
-    Returns:
-        The cost, their sum of squares.
+    ``target`` and ``factor`` are from :func:`aimed`.
     """
     steps, cost = plan.controls.shape[0], 0.0
     for i in range(steps):
@@ -201,13 +179,9 @@ def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Arr
 
 @compiled
 def excess(out: Array) -> float:
-    """What of a plan's cost says that it cannot be done, or leads nowhere.
+    """Share of the limits and of the last state in the cost of ``out``, from :func:`residuals`.
 
-    Args:
-        out: (11 N,) from :func:`residuals`.
-
-    Returns:
-        The limits' share of the cost, and that of the last state.
+    It says that a plan cannot be done, or leads nowhere.
     """
     total, steps = 0.0, out.shape[0] // PER_STEP
     for i in range(steps):
@@ -223,16 +197,8 @@ def knee_moment(p: PlanProblem, plan: Plan, i: int, leg: int) -> tuple[float, fl
     """Moment of a leg's force about its knee, which is half-way up the leg.
 
     M = kappa (l0 - l) sqrt(reach^2 - l^2) / 2, with the larger of the stiffnesses that the leg has
-    before and after.
-
-    Args:
-        p: the knee.
-        plan: its controls and legs' lengths.
-        i: which step.
-        leg: rear or front one at the virtual bottom, or the rear one at touchdown.
-
-    Returns:
-        M [N m], its derivative by the length [N], and which control the stiffness is.
+    before and after. ``leg`` is one of the plan's ``lengths``. Returns M [N m], its derivative by
+    the length [N], and which control the stiffness is.
     """
     u, length = plan.controls[i], plan.lengths[i, leg]
     stiff = 3 if leg != 1 else (1 if u[1] >= u[2] else 2)
@@ -248,14 +214,9 @@ def _chain(
 ) -> None:
     """Derivatives of three results of step ``i`` by the controls of all steps up to it.
 
-    Args:
-        jacobian: of the step, by its state, of ``skip`` columns, and its controls.
-        first: place of the three results.
-        skip: 0 where the state is what it is.
-        plan: its unit of stiffness.
-        i: which step.
-        state: (3, c) derivatives of the step's own state.
-        out: (3, c) overwritten.
+    ``jacobian`` is the step's, by its state, of ``skip`` columns (0: it is what it is), and its
+    controls; the results' places begin at ``first``; ``state`` (3, c) are the derivatives of the
+    step's own state; ``out`` (3, c) is overwritten.
     """
     for a in range(3):
         for c in range(CONTROLS * i):
@@ -270,15 +231,7 @@ def _chain(
 
 @compiled
 def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: Array) -> None:
-    """Derivatives of :func:`residuals` by all controls.
-
-    Args:
-        p: the tolerances.
-        work: overwritten.
-        plan: its states and controls; the template completes its steps.
-        factor: as for :func:`residuals`.
-        rows: (11 N, 4 N) overwritten.
-    """
+    """Write the derivatives of :func:`residuals` by all controls into ``rows`` (11 N, 4 N)."""
     steps = plan.controls.shape[0]
     size = CONTROLS * steps
     u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
@@ -398,18 +351,10 @@ def _guess(
 def look_ahead(
     p: PlanProblem, work: MapWorkspace, z: Array, aim: PlanTarget, plan: Plan
 ) -> tuple[float, float]:
-    """Plan N steps from a VLO.
+    """Plan N steps from a VLO state ``z`` (3,) [m/s, m, m/s]; ``plan`` is overwritten.
 
-    Args:
-        p: what holds for every plan.
-        work: overwritten.
-        z: (3,) VLO state dx/dt, y, dy/dt [m/s, m, m/s].
-        aim: where the plan is to lead.
-        plan: overwritten.
-
-    Returns:
-        The plan's cost, and its :func:`excess`; inf where the template completes no steps to begin
-        with.
+    Returns the plan's cost and its :func:`excess`, inf where the template completes no steps to
+    begin with.
     """
     steps = plan.controls.shape[0]
     size = CONTROLS * steps

@@ -9,7 +9,7 @@ gait and not near it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from template_control.embedding.planners.planner import (
     Cause,
     Context,
     Decision,
-    EndOfStride,
     Planner,
     RestContext,
 )
@@ -149,61 +148,6 @@ class LqrOptions(Checked):
     earliest_share: Share = tuned(0.2)
     trusted_price: NotNegative = tuned(1.0)
     knee_load_price: NotNegative = tuned(100.0)
-
-
-@dataclass(frozen=True)
-class _Weighed:
-    """End of the rest of a step, in coordinates in which the cost-to-go is a squared length.
-
-    The cost-to-go is root' root, root (3, 3). What the robot adds to a step has mostly come in by
-    then.
-    """
-
-    ahead: EndOfStride
-    root: Array
-
-    def __call__(self, u: Array) -> tuple[Array, Outcome]:
-        end, outcome = self.ahead(u)
-        return self.root @ end, outcome
-
-
-class Rest(NamedTuple):
-    """A choice for the rest of a step.
-
-    Attributes:
-        controls: (NUM_SLOTS,) of the stride.
-        end: (3,) where the step ends; None where no controls complete it.
-        change: (3,) how far that is from where it would have ended; None where it would not have.
-    """
-
-    controls: Array
-    end: Array | None
-    change: Array | None
-
-
-def choose_rest(law: Law, costs: Array, context: RestContext) -> Rest:
-    """Controls with the least cost-to-go at the step's end, and the least change.
-
-    ``costs`` (c,) are those of the controls' squared changes, within the law's bounds.
-    """
-    ahead, controls = context.ahead, context.decision.controls
-    before, outcome = ahead(controls)
-    completed = outcome is Outcome.SECTION
-    slow = before[0] < law.target[0] if completed else outcome is not Outcome.UNWANTED_FLIGHT
-    softest = _SOFTEST_REST if slow else 0.0
-    places = [place for place, slot in enumerate(law.slots) if place and slot in context.free]
-    slots = [int(law.slots[place]) for place in places]
-    change = law.stiffness / np.sqrt(costs[places])
-    lower = np.maximum(law.lower[places], softest) * law.stiffness
-    upper = law.upper[places] * law.stiffness
-    prior = Prior(controls, slots, np.array([controls[slots], change, lower, upper]), _REST_ROUNDS)
-    root: Array = np.linalg.cholesky(law.cost).T.astype(np.float64)
-    rest = FromHere(_Weighed(ahead, root), slots)
-    u, weighed = solve_stride(rest, root @ law.target, prior, np.ones(3))
-    if weighed is None:
-        return Rest(u, None, None)
-    end: Array = np.linalg.solve(root, weighed).astype(np.float64)
-    return Rest(u, end, end - before if completed else None)
 
 
 class LqrPlanner(Planner):
@@ -383,20 +327,42 @@ class LqrPlanner(Planner):
     def decide_rest(self, context: RestContext) -> Decision | None:
         """See :meth:`~.planner.Planner.decide_rest`; nothing breaks into a walking step.
 
-        Without push-off there is too little to choose. The offset is still learnt from the whole
-        step: its prediction moves by as much as the choice does.
+        Without push-off there is too little to choose. With it, the end has the least cost-to-go,
+        and the controls the least change. The offset is still learnt from the whole step: its
+        prediction moves by as much as the choice does.
         """
-        decision = context.decision
+        decision, law = context.decision, self._law
         if context.cause is Cause.RECOVERY:
             return None
         if not self._pushes:
             return decision
-        u, end, change = choose_rest(self._law, self._costs, context)
-        if end is None:
+        ahead, controls = context.ahead, decision.controls
+        before, outcome = ahead(controls)
+        completed = outcome is Outcome.SECTION
+        slow = before[0] < law.target[0] if completed else outcome is not Outcome.UNWANTED_FLIGHT
+        softest = _SOFTEST_REST if slow else 0.0
+        places = [place for place, slot in enumerate(law.slots) if place and slot in context.free]
+        slots = [int(law.slots[place]) for place in places]
+        change = law.stiffness / np.sqrt(self._costs[places])
+        lower = np.maximum(law.lower[places], softest) * law.stiffness
+        upper = law.upper[places] * law.stiffness
+        table = np.array([controls[slots], change, lower, upper])
+        # What the robot adds to a step has mostly come in by then. The cost-to-go of the end is the
+        # square of its length times this.
+        root: Array = np.linalg.cholesky(law.cost).T.astype(np.float64)
+
+        def weighed(u: Array) -> tuple[Array, Outcome]:
+            end, outcome = ahead(u)
+            return root @ end, outcome
+
+        rest, prior = FromHere(weighed, slots), Prior(controls, slots, table, _REST_ROUNDS)
+        u, there = solve_stride(rest, root @ law.target, prior, np.ones(3))
+        if there is None:
             return replace(decision, feasible=False, nominal=False)
-        if change is None:
+        end: Array = np.linalg.solve(root, there).astype(np.float64)
+        if not completed:
             return Decision(u, end, True, True, False)
-        return replace(decision, controls=u, predicted=decision.predicted + change)
+        return replace(decision, controls=u, predicted=decision.predicted + (end - before))
 
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""

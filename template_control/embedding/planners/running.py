@@ -58,18 +58,12 @@ def leg_bounds(
     change: tuple[float, float, float],
     stiffness_range: tuple[float, float],
 ) -> Array:
-    """Controls that a stride may have, about those of a gait.
+    """Controls (4, 3) of a :class:`~.stride_solver.Prior` about a gait's.
 
-    (4, 3) of a :class:`~.stride_solver.Prior`. Compiled: a run plans three times a stride, and each
-    plan decides on two strides.
-
-    Args:
-        z: (2,) apex that the stride begins at, dx/dt and y [m/s, m].
-        legs: (3,) alpha [rad], k_sc and k_sd [N/m] of the gait near the present speed.
-        angles: least and greatest alpha that the swing foot can still reach [rad].
-        rest_length: l0 [m].
-        change: of alpha [rad], k_sc and k_sd (shares of the gait's) that count as 1.
-        stiffness_range: k_sc and k_sd over the gait's.
+    Compiled: a run plans three times a stride, and each plan decides on two strides. ``z`` (2,) is
+    the apex that the stride begins at, ``legs`` (3,) alpha [rad], k_sc and k_sd [N/m] of the gait
+    near the present speed; ``angles`` the foot can still reach; ``change`` and ``stiffness_range``
+    as of the options.
     """
     table = np.empty((4, 3))
     top = np.arcsin(min(z[1] / rest_length, 1.0)) - _TOP_MARGIN

@@ -139,12 +139,11 @@ def linear(law: Law, z: Array, u: Array) -> None:
 
 @compiled
 def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -> int:
-    """Take one walking step of the template, and add the robot's offset to where it ends.
+    """Take one walking step from ``z`` (3,), and add the robot's offset to where it ends.
 
-    ``exact`` tries the exact map, else the improved closed form. ``z`` (3,) is the VLO state dx/dt,
-    y, dy/dt [m/s, m, m/s], ``u`` (c,) alpha [rad], stiffnesses/k0; ``s`` and ``result`` (RESULTS,)
-    are overwritten, see :func:`~.one_stride`. Returns the Outcome's value; ``result`` means nothing
-    where that is not SECTION.
+    ``exact`` tries the exact map, else the improved closed form. ``u`` (c,) is alpha [rad],
+    stiffnesses/k0; ``result`` (RESULTS,) means nothing where the returned Outcome's value is not
+    SECTION.
     """
     # The template's leg would pull at the ground, which no robot's does.
     if z[1] + max(z[2], 0.0) ** 2 / (2.0 * law.kernel.gravity) > law.highest:
@@ -263,7 +262,7 @@ def search(law: Law, s: Scratch, z: Array, best: Array, first: Array) -> float:
 
     Far from the gait the good steps (hard braking, say, with a stiff leg before the virtual bottom
     and a soft one after) are not near the linear law's. Returns the price of ``best``; ``first``
-    (3,) is overwritten with the state after the step.
+    (3,) is the state after it.
     """
     controls = best.shape[0]
     u, end, centre = np.empty(controls), np.empty(3), np.empty(controls)
@@ -298,8 +297,8 @@ def choose(law: Law, s: Scratch, z: Array, u: Array, first: Array) -> tuple[floa
     """The law's controls, or better ones where they cost too much, into ``u`` (c,).
 
     One function for both: compiled code of the maps is long, and each function that Python calls
-    has one of its own. Returns the price of ``u``, alpha [rad] and stiffnesses/k0, and whether it
-    is the law's; ``first`` (3,) is overwritten with the state after the step.
+    has one of its own. Returns the price of ``u``, and whether it is the law's; ``first`` (3,) is
+    overwritten with the state after the step.
     """
     linear(law, z, u)
     cost = price(law, _ON_EXACT, s, z, u, np.inf, first)

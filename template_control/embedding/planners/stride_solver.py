@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from operator import gt, lt, sub
 from typing import NamedTuple, Protocol
 
@@ -32,8 +33,8 @@ def bounded_step(
 
     D holds the lengths of the columns of ``rows``: Levenberg's damping in Marquardt's scale; 0 for
     a step of Gauss and Newton. A variable that would leave its bounds is held there, and the others
-    are solved for again. ``rows`` (r, f) is the Jacobian of the residual (r,) at x (f,), which is
-    within the bounds; its columns are independent.
+    are solved for again. ``rows`` (r, f) is the Jacobian of the residual (r,) at x (f,), within the
+    bounds.
     """
     size = x.shape[0]
     there = np.empty(size)
@@ -82,15 +83,7 @@ def bounded_step(
 
 
 class Linear(NamedTuple):
-    """A stride to first order.
-
-    Attributes:
-        z: (n,) where it begins.
-        x: (f,) its free controls.
-        end: (m,) where it ends.
-        by_state: (m, n) derivatives.
-        by_controls: (m, f) derivatives.
-    """
+    """A stride to first order about its start z (n,) and free controls x (f,): end (m,), slopes."""
 
     z: Array
     x: Array
@@ -110,17 +103,10 @@ def improve(
 ) -> tuple[float, float, Array, Array]:
     """One step towards the least |(end - aim) / tolerance|^2 + |(x - base) / change|^2.
 
-    Args:
-        linear: a :class:`Linear`; compiled code takes a plain tuple more quickly.
-        z: (n,) where the stride begins, near that of ``linear``.
-        aim: (m,) where it should end.
-        tolerance: (m,) errors that count as 1.
-        prior: (4, f) base, change, lower and upper bounds.
-        damping: of the step, see :func:`bounded_step`.
-
-    Returns:
-        The cost at x; the longest component of the step in units of its change; (f,) the next x;
-        (m,) where that leads, to first order.
+    ``linear`` is a :class:`Linear`, a plain tuple for compiled code; the stride begins in ``z``
+    (n,), near its own; ``prior`` (4, f) is base, change, lower and upper bounds; ``damping`` as for
+    :func:`bounded_step`. Returns the cost at x, the longest component of the step in units of its
+    change, (f,) the next x, and (m,) where that leads, to first order.
     """
     known, x, end, by_state, by_controls = linear
     m, size = by_controls.shape
@@ -190,6 +176,11 @@ class Prior:
         """(f,) upper bounds."""
         return self.table[3]
 
+    def grid(self, points: int) -> Array:
+        """(n, f) values of the free controls: so many of each within its bounds."""
+        axes = [np.linspace(*ends, points) for ends in zip(self.lower, self.upper, strict=True)]
+        return np.array(list(product(*axes)))
+
 
 class StrideEnd(Protocol):
     """Map from the controls of a stride, or of the rest of one, to its end."""
@@ -255,9 +246,8 @@ def solve_stride(
 ) -> tuple[Array, Array | None]:
     """min |(P(u) - aim) / tolerance|^2 + |(u - base) / change|^2 over bounded u.
 
-    ``aim`` (m,) is where the stride should end, ``tolerance`` (m,) errors that count as 1. Returns
-    (NUM_SLOTS,) controls, and (m,) where the stride ends, None where none of those tried completes
-    it.
+    ``aim`` (m,) is where the stride should end. Returns (NUM_SLOTS,) controls, and (m,) where the
+    stride ends, None where none of those tried completes it.
     """
     u = prior.controls.copy()
     wish, errors = np.array([aim, tolerance])
@@ -297,11 +287,8 @@ def solve_stride(
 def _from_grid(stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array) -> Array:
     """The best of a grid within the bounds; the base where all of it fails."""
     u = prior.controls.copy()
-    axes = [
-        np.linspace(low, high, _GRID) for low, high in zip(prior.lower, prior.upper, strict=True)
-    ]
     best, least = prior.base, np.inf
-    for x in np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes)):
+    for x in prior.grid(_GRID):
         u[prior.slots] = x
         end, outcome = stride.at(u)
         if outcome is Outcome.SECTION:
@@ -404,8 +391,7 @@ def solve_within_reach(
 ) -> tuple[Array, Array | None]:
     """The stride that comes nearest to the speed aimed at, of a few that aim at less.
 
-    ``z`` (n,) is where it begins, ``aim`` (n,) where it should end; strides that miss the speed by
-    less than ``least`` [m/s] are left as they are. Returns as ``solve``.
+    Strides from ``z`` (n,) that miss the speed of ``aim`` (n,) by less than ``least`` [m/s] stay.
     """
     u, end = solve(aim)
     if end is None:

@@ -107,17 +107,11 @@ class Rules(NamedTuple):
 def best_quintic(
     starts: Array, ends: Array, durations: Array, rules: Rules, curve: Array
 ) -> tuple[float, float, int, int]:
-    """Find the quintic of least cost: excess beyond the slack, and time.
+    """Cost and excess [m] of the best quintic: excess beyond the slack, and time.
 
-    Args:
-        starts: (m, 2, 3) x and y, each position, velocity, acceleration.
-        ends: (n, 2, 3) the same.
-        durations: (d,) tried between each start and each end [s].
-        rules: of the cost.
-        curve: (2, 6) overwritten with the best one's coefficients, constant term first.
-
-    Returns:
-        Cost and excess [m], number of the end, and number of the duration.
+    ``starts`` (m, 2, 3) and ``ends`` (n, 2, 3) are x and y, each position, velocity, acceleration;
+    ``durations`` (d,) are tried between each two [s]; ``curve`` (2, 6) is overwritten with
+    coefficients, constant term first. Also returns the numbers of the end and of the duration.
     """
     best, least, chosen, lasting = np.inf, np.inf, 0, 0
     c = np.empty((2, _TERMS))
