@@ -8,7 +8,7 @@ clock, is looked up in the table of phases: the controller knows no gait.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -37,11 +37,13 @@ from template_control.embedding.swing import Feet
 from template_control.embedding.tick import (
     DIVERGED,
     QUIET,
+    SNAPSHOT,
     TICK,
     act,
     advance,
     feel_in_space,
     fired_edge,
+    look,
     sense,
     stand,
 )
@@ -91,6 +93,7 @@ class EmbeddingController:
         time: since the start [s].
         qp: the whole-body problem.
         lateral: heading, and footholds to the left and right; None in the plane.
+        memory: (1,) each of ``TICK``, ``ROBOT_DATA`` and ``REFERENCES``, of the last tick.
     """
 
     @checked
@@ -119,7 +122,7 @@ class EmbeddingController:
         now["settling"] = SETTLING * scale.speed
         now["friction_margin"] = o.friction_margin
         self.learners = Learners(o, self.parameters, robot, tick)
-        self.ground = SlopingGround(robot, self.parameters.rest_length)
+        self.ground = SlopingGround(robot, self.parameters.rest_length, tick["frame"])
         self.frame = self.ground.frame
         self.references = References(pitch=o.trunk_pitch)
         self.swings = o.swings(robot, scale)
@@ -152,6 +155,7 @@ class EmbeddingController:
             self.lateral = LateralMotion.of(robot, self.parameters, given, *keeps)
         self._terms = robot.data, robot.arrays
         self._memory = self.references.data, self.qp.data
+        self.memory = tick, robot.data, self.references.data
 
     @property
     def time(self) -> float:
@@ -175,34 +179,13 @@ class EmbeddingController:
 
     def snapshot(self) -> Snapshot:
         """Node, phase, template and swing references of the last tick."""
-        clock, frame, feet = self.path_clock, self.frame, self.feet.foot_of_leg
-        x, y = clock.reference.tolist()[:2]
-        swing = np.full((2, 2), np.nan)
-        for leg in self.mode.swings:
-            swing[feet[leg]] = frame.world(self.references.foot[feet[leg], :, 0])
-        planar = Snapshot(
-            time=self.time,
-            node=self.mode.node.name,
-            phase=clock.time,
-            rear=feet[Leg.REAR],
-            stands=bool(self.mode.stance),
-            template_com=np.array(frame.point(self._origin + x, self.observer.ground + y)),
-            template_velocity=frame.outward(clock.reference[2:4]).copy(),
-            template_force=frame.outward(clock.forces).copy(),
-            swing_reference=swing,
-        )
-        if self.lateral is None:
-            return planar
-        side = np.full(2, np.nan)
-        for leg in self.mode.swings:
-            side[feet[leg]] = self.references.side[feet[leg], 0]
-        sway = self.lateral_state() - (self.lateral.side(planar.rear), 0.0)
-        return FloatingSnapshot(**vars(planar), sway=sway, side_reference=side)
-
-    @property
-    def _origin(self) -> float:
-        """x of the template's rear toe in the world: at the foot, if that stands [m]."""
-        return float(self.observer.now.toes[0]) if self.mode.stance else self.supervisor.toe
+        seen = np.zeros(1, SNAPSHOT)
+        look(*self.memory, seen)
+        kind = Snapshot if self.lateral is None else FloatingSnapshot
+        found = {field.name: seen[field.name][0] for field in fields(kind)}
+        for name, number in (("time", float), ("phase", float), ("rear", int), ("stands", bool)):
+            found[name] = number(found[name])
+        return kind(**{**found, "node": self.mode.node.name})
 
     def first_pitch(self) -> float:
         """Of the trunk where the route begins [rad]."""
@@ -316,7 +299,7 @@ class EmbeddingController:
         now = self._tick[0]
         self.path_clock.take(self.supervisor)
         stand(self._tick, self.robot.data, *self._memory)
-        now["tilt"], now["trim"] = self.frame.angle, self.learners.trim.acceleration
+        now["trim"] = self.learners.trim.acceleration
         sideways = None if self.lateral is None else self.lateral.arrays(self.supervisor)
         self._path: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
 

@@ -10,10 +10,12 @@ from collections import deque
 from itertools import combinations
 from math import atan, cos, sin, tan
 from statistics import median
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.compiled import compiled
 from template_control.embedding.state import StateObserver
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.robot.biped import Biped
@@ -93,27 +95,61 @@ class SlopeEstimate:
 
 
 _BASE = 2  # the first coordinates are the base's place
+_F, _I = np.float64, np.int64
+
+FRAME = np.dtype(
+    [
+        ("angle", _F),  # of the ground, uphill positive [rad]
+        ("turn", _F, (_BASE, _BASE)),  # vectors of the world into these axes
+        ("shift", _F, (_BASE,)),  # of places, once they are turned [m]
+        ("level", _I),  # whether these are the world's axes
+    ],
+    align=True,
+)
+"""Axes that are turned with the ground."""
+
+
+@compiled
+def to_world(frame: Any, x: float, y: float, out: Array) -> None:
+    """Write a place of the frame's axes in the world's, (2,) [m]; ``frame`` is of ``FRAME``."""
+    if frame.level:
+        out[0], out[1] = x, y
+    else:
+        vector_to_world(frame, x - frame.shift[0], y - frame.shift[1], out)
+
+
+@compiled
+def vector_to_world(frame: Any, x: float, y: float, out: Array) -> None:
+    """As :func:`to_world`, of a vector."""
+    out[0] = x * frame.turn[0, 0] + y * frame.turn[1, 0]
+    out[1] = x * frame.turn[0, 1] + y * frame.turn[1, 1]
 
 
 class SlopeFrame:
     """Turns states into the ground's axes, and results back into the world's.
 
     The robot's gravity is turned as well; a free robot stays in the world's axes. ``angle`` is the
-    ground's, uphill positive [rad].
+    ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``, own memory if not given.
     """
 
-    def __init__(self, robot: Biped) -> None:
+    def __init__(self, robot: Biped, data: Any = None) -> None:
         self._planar = robot if isinstance(robot, PlanarBiped) else None
+        self.data = np.zeros(1, FRAME) if data is None else data
+        self._turn: Array = self.data["turn"][0]
+        self._shift: Array = self.data["shift"][0]
         self.reset()
 
     def reset(self) -> None:
         """Back to the world's axes."""
-        self.angle = 0.0
-        self._turn = np.eye(_BASE)
-        self._shift = np.zeros(_BASE)
-        self._level = True  # these are the world's axes
+        self._take(0.0, np.eye(_BASE), np.zeros(_BASE))
         if self._planar is not None:
             self._planar.turn_gravity(0.0)
+
+    def _take(self, angle: float, turn: Array, shift: Array) -> None:
+        """Take other axes."""
+        self.angle = self.data["angle"][0] = angle
+        self._turn[:], self._shift[:] = turn, shift
+        self._level = self.data["level"][0] = angle == 0.0 and not shift.any()
 
     @property
     def turns(self) -> bool:
@@ -128,11 +164,9 @@ class SlopeFrame:
         if self._planar is None or angle == self.angle:
             return
         fixed = self.world(place)
-        self.angle = angle
         c, s = cos(angle), sin(angle)
-        self._turn = np.array([[c, s], [-s, c]])
-        self._shift = place - self._turn @ fixed
-        self._level = angle == 0.0 and not self._shift.any()
+        turn = np.array([[c, s], [-s, c]])
+        self._take(angle, turn, place - turn @ fixed)
         self._planar.turn_gravity(angle)
 
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -171,16 +205,16 @@ class SlopeFrame:
 class SlopingGround:
     """Learns how steep the ground is, and turns the axes as far as the planner knows slopes.
 
-    Every tick updates the robot's model in these axes, ``frame``; ``length`` is the template's l0
-    [m]. ``slope`` is the estimate, ``raw_state`` the robot's q and v in the world, as measured
-    last.
+    Every tick updates the robot's model in these axes, ``frame``, of the ``data`` given;
+    ``length`` is the template's l0 [m]. ``slope`` is the estimate, ``raw_state`` the robot's q and
+    v in the world, as measured last.
     """
 
     raw_state: tuple[Array, Array]
 
-    def __init__(self, robot: Biped, length: float) -> None:
+    def __init__(self, robot: Biped, length: float, data: Any = None) -> None:
         self._robot = robot
-        self.frame = SlopeFrame(robot)
+        self.frame = SlopeFrame(robot, data)
         self.slope = SlopeEstimate(length)
 
     def begin(self, foot: int) -> None:

@@ -182,6 +182,7 @@ def _numbered(edge: Edge) -> tuple[int, int]:
 
 MODE = np.dtype(
     [
+        ("node", _I),  # its number on the automaton
         ("stances", _I),  # legs that carry: the rear one, or both
         ("swings", _I),  # legs in the air that have a foothold to go to
         ("swing_leg", _I, (2,)),  # which
@@ -221,8 +222,8 @@ class Mode:
     data: Any
 
 
-def _mode(node: Node, control: PhaseControl, nv: int, trimmed: bool) -> Mode:
-    """The mode of a node."""
+def _mode(node: Node, number: int, control: PhaseControl, nv: int, trimmed: bool) -> Mode:
+    """The mode of a node, which is the automaton's ``number``-th."""
     touchdown, tasks = node.edge(Event.TOUCHDOWN), TaskStack(control.tasks, nv)
     edges = tuple(edge for edge in node.edges if isinstance(edge.target, str))
     if len(edges) > _MOST_EDGES:
@@ -230,6 +231,7 @@ def _mode(node: Node, control: PhaseControl, nv: int, trimmed: bool) -> Mode:
             f"node {node.name} has {len(edges)} edges to other nodes: give at most {_MOST_EDGES}"
         )
     data = np.zeros(1, MODE)[0]
+    data["node"] = number
     data["stances"], data["swings"], data["edges"] = map(len, (node.stance, control.swings, edges))
     data["swing_leg"][: len(control.swings)] = control.swings
     data["next_touchdown_leg"] = -1 if touchdown is None else PLACED[touchdown.reset]
@@ -274,7 +276,9 @@ def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:
         for node in automaton.stride(start)
     }
     return {
-        node.name: _mode(node, phase_control(phases, node), nv, node.name in trimmed)
+        node.name: _mode(
+            node, automaton.index[node.name], phase_control(phases, node), nv, node.name in trimmed
+        )
         for node in automaton.nodes
     }
 
@@ -291,6 +295,7 @@ PATH = np.dtype(
         ("event_times", _F, (NUM_EVENTS,)),  # of each event's next occurrence [s]; inf: none
         ("landing_x", _F, (2,)),  # of each foot's next foothold [m]; NaN: none
         ("landing_time", _F, (2,)),  # [s]; inf: never
+        ("toe", _F),  # x of the template's rear toe [m]
         ("touchdown_angle", _F),  # of the stride [rad]
         ("step_length", _F),  # of the planner's gait [m]
         ("step_duration", _F),  # of it [s]
@@ -387,6 +392,7 @@ class PathClock:
         now["event_times"] = s.event_times
         for foot in range(2):
             now["landing_x"][foot], now["landing_time"][foot] = s.landing(foot)
+        now["toe"] = s.toe
         now["touchdown_angle"] = controls[Slot.TOUCHDOWN_ANGLE]
         now["step_length"], now["step_duration"] = gait.step_length, gait.step_duration
         now["planned_at"], now["viable"] = s.planned_at, s.viable

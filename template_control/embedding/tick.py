@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from template_control.compiled import compiled
 from template_control.embedding.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
+from template_control.embedding.ground import FRAME, to_world, vector_to_world
 from template_control.embedding.learners.friction import SLIDES, feel_slides
 from template_control.embedding.learners.lean import LEAN, advance_lean
 from template_control.embedding.learners.momentum import LOAD, observe_load
@@ -58,8 +59,8 @@ TICK = np.dtype(
         ("sinking", _F),  # a foot that comes down faster is not due [m/s]
         ("settling", _F),  # a contact comes down to others of its foot as fast [m/s]
         ("friction_margin", _F),  # share of the friction that the cones use
-        ("tilt", _F),  # of the axes with the ground [rad]
         ("trim", _F),  # acceleration that the momentum trim adds in its phases [m/s^2]
+        ("frame", FRAME),
         ("mode", MODE),
         ("contacts", CONTACTS),
         ("slides", SLIDES),
@@ -74,6 +75,25 @@ TICK = np.dtype(
     align=True,
 )
 """State of the controller from tick to tick."""
+
+SNAPSHOT = np.dtype(
+    [
+        ("time", _F),
+        ("phase", _F),
+        ("node", _I),  # its number on the automaton
+        ("rear", _I),
+        ("stands", _I),
+        ("template_com", _F, (2,)),
+        ("template_velocity", _F, (2,)),
+        ("template_force", _F, (LEGS, 2)),
+        ("swing_reference", _F, (LEGS, 2)),
+        ("sway", _F, (2,)),
+        ("side_reference", _F, (LEGS,)),
+    ],
+    align=True,
+)
+"""Numbers of a :class:`~.state.FloatingSnapshot`, which explains them; a planar robot's sway is
+zero."""
 
 QUIET, EVENTFUL, DIVERGED = 0, 1, 2
 """Results of :func:`sense`: nothing to decide; an event, or a plan that is due; no finite state."""
@@ -217,7 +237,7 @@ def advance(
         want.com_now[k] = s.state[k]
     want.com_now[0] -= s.toes[0]
     want.com_push = t.trim if mode.trim_momentum else 0.0
-    want.pitch = advance_lean(t.lean, r.attitude[1] - t.tilt, dt) + t.tilt
+    want.pitch = advance_lean(t.lean, r.attitude[1] - t.frame.angle, dt) + t.frame.angle
     for leg in range(LEGS):
         want.feet[leg] = t.feet.roles[leg]
     _bear(t, r, qp[0], want, arrays[4].shape[1])
@@ -291,9 +311,7 @@ def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: floa
     if not mode.swings:
         return
     com, feet = np.empty(2), np.empty(2)
-    com[0], com[1] = r.com[_SIDE], r.com_velocity[_SIDE]
-    if mode.momentum_speed:
-        com[1] = r.com_velocity[_SIDE] - r.momentum[0] / (r.mass * t.sensed.state[1])
+    com[0], com[1] = r.com[_SIDE], side_speed(t, r)
     first = np.inf
     for i in range(mode.swings):
         first = min(first, path.landing_time[f.roles[mode.swing_leg[i]]])
@@ -375,3 +393,46 @@ def _bear(t: Any, r: Any, qp: Any, want: Any, directions: int) -> None:
                 up = r.com[UP] - r.foot_position[foot, UP]
                 qp.force[at, _SIDE] = forces[leg, 1] * away / up / share
             at += 1
+
+
+@compiled
+def look(tick: Any, data: Any, references: Any, out: Any) -> None:
+    """Write where the controller is at its last tick.
+
+    ``tick``, ``data``, ``references``: see the module; ``out`` (1,), of ``SNAPSHOT``, is
+    overwritten.
+    """
+    t, r, want, o = tick[0], data[0], references[0], out[0]
+    f, mode, path, s, frame = t.feet, t.mode, t.path, t.sensed, t.frame
+    o.time, o.phase, o.node, o.rear = t.time, path.time, mode.node, f.roles[_REAR]
+    o.stands = 1 if mode.stances > 0 else 0
+    # Of the template's rear toe: at the foot, if that stands.
+    origin = s.toes[_REAR] if mode.stances > 0 else path.toe
+    to_world(frame, origin + want.com[0], s.ground + want.com[1], o.template_com)
+    vector_to_world(frame, want.com[2], want.com[3], o.template_velocity)
+    for leg in range(LEGS):
+        force = path.forces[leg]
+        vector_to_world(frame, force[0], force[1], o.template_force[leg])
+        o.side_reference[leg] = np.nan
+        for axis in range(2):
+            o.swing_reference[leg, axis] = np.nan
+    for i in range(mode.swings):
+        foot = f.roles[mode.swing_leg[i]]
+        place = want.foot[foot]
+        to_world(frame, place[0, 0], place[1, 0], o.swing_reference[foot])
+        o.side_reference[foot] = want.side[foot, 0]
+    rear = f.roles[_REAR]
+    o.sway[0] = r.com[_SIDE] - r.foot_position[rear, _SIDE]
+    o.sway[1] = side_speed(t, r)
+
+
+@compiled
+def side_speed(t: Any, r: Any) -> float:
+    """Speed of a floating-base robot's CoM to the left, as the phase has the forward one [m/s].
+
+    ``t`` and ``r`` are of ``TICK`` and ``ROBOT_DATA``.
+    """
+    speed = r.com_velocity[_SIDE]
+    if t.mode.momentum_speed:
+        speed -= r.momentum[0] / (r.mass * t.sensed.state[1])
+    return speed

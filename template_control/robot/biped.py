@@ -56,6 +56,9 @@ class Biped(Robot):
             hip the sign of their axis' y.
         leg_mass: of the heavier leg [kg].
         trunk_com: height of the trunk's own CoM above the hips [m].
+        heading_frame: (5,) of a floating-base robot x and y of its heading frame's origin in the
+            world [m], cosine and sine of the heading, y of the trunk's hips in it [m]; of a planar
+            one the world.
 
     Attributes (written by :meth:`update`; views that the next call overwrites):
         com, com_velocity: (2,) [m, m/s].
@@ -72,6 +75,7 @@ class Biped(Robot):
         foot_velocity: (2, 2) [m/s].
         foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
         foot_bias: (2, 2) dJ/dt v of these Jacobians [m/s^2].
+        joint_places: (nu, 3) of the actuated joints in the world [m].
         hips: (2,) the point the legs hang from [m].
         hip_speed: its forward velocity [m/s].
         pitch, pitch_rate: of the trunk in the sagittal plane [rad, rad/s].
@@ -136,7 +140,10 @@ class Biped(Robot):
             float(sum(model.inertias[j].mass for j in leg)) for leg in self._leg_joints
         )
         data = self._data
-        self._joint_places = [data.oMi[j].translation for j in range(first, model.njoints)]
+        self.joint_places = _in_a_row(
+            [data.oMi[j].translation for j in range(first, model.njoints)]
+        )
+        self.heading_frame: Array = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
         self.data["foot_radius"], self.data["leg_length"] = foot_radius, self.leg_length
         self._sources = sources(model, data, self._foot_ids, self._joint_limits)
         self._look()
@@ -254,13 +261,17 @@ class Biped(Robot):
         """
 
     @abstractmethod
-    def joint_positions(self, out: Array) -> None:
-        """Write the actuated joints' sagittal positions (nu, 2) [m] at the last update."""
-
-    @abstractmethod
     def hip_height(self, q: Array) -> float:
         """Height of the point the legs hang from [m], of the last update's ``q``."""
 
     @abstractmethod
     def tilt(self, q: Array) -> float:
         """Angle of the trunk from the upright [rad], at the last update."""
+
+
+def _in_a_row(views: list[Array]) -> Array:
+    """One view (n, 3) of what n views (3,) show, which lie in memory at equal distances."""
+    places = [view.__array_interface__["data"][0] for view in views]
+    step = places[1] - places[0]
+    assert np.all(np.diff(places) == step)  # elements of one vector of Pinocchio's
+    return np.lib.stride_tricks.as_strided(views[0], (len(views), 3), (step, views[0].strides[0]))

@@ -158,10 +158,9 @@ class FloatingBaseBiped(Biped):
         places, axes = zip(*((hip.translation, hip.rotation) for hip in self._hips), strict=True)
         self._trunk = tuple(Trunk(self.rotation, places, axes, self._in_leg))
         self.space = SpaceTerms.of(self.data, self.jacobians)
-        self._frame = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
         self.axes = np.eye(3)
-        self._base, self._out = (self._frame, self._trunk), self.arrays[1:]
-        self.origin = self._frame[:2]
+        self._base, self._out = (self.heading_frame, self._trunk), self.arrays[1:]
+        self.origin = self.heading_frame[:2]
         self.heading = 0.0
         self.update(self._neutral, np.zeros(self.nv))
         # A hip is the point of its axis that is in the plane in which the leg swings.
@@ -182,7 +181,7 @@ class FloatingBaseBiped(Biped):
         now["spare"] = len(self.spare)
         for i, (joint, angle) in enumerate(self.spare):
             now["spare_joint"][i], now["spare_angle"][i] = joint, angle
-        self._frame[4] = now["hips"][1]  # of the trunk's origin
+        self.heading_frame[4] = now["hips"][1]  # of the trunk's origin
         for leg, group in enumerate(self.groups):
             contacts = list(group)
             self.spread[contacts] = (self.space.contact[contacts] - self.space.foot[leg])[:, :2]
@@ -288,7 +287,7 @@ class FloatingBaseBiped(Biped):
         """
         self.heading = heading
         c, s = cos(heading), sin(heading)
-        self._frame[:4] = origin[0], origin[1], c, s
+        self.heading_frame[:4] = origin[0], origin[1], c, s
         self.axes[:2, :2] = (c, -s), (s, c)
 
     def turn(self, angle: float, about: Array) -> None:
@@ -311,7 +310,7 @@ class FloatingBaseBiped(Biped):
         Args:
             point: (..., 2) or (..., 3) [m].
         """
-        x0, y0, c, s = self._frame[:4]
+        x0, y0, c, s = self.heading_frame[:4]
         x, y = point[..., 0], point[..., 1]
         out = np.array(point)
         out[..., 0], out[..., 1] = x0 + c * x - s * y, y0 + s * x + c * y
@@ -328,12 +327,6 @@ class FloatingBaseBiped(Biped):
             q, other: (nq,) configurations, not half a turn apart.
         """
         return np.asarray(pin.difference(self.model, q, other))
-
-    def joint_positions(self, out: Array) -> None:
-        """See :meth:`~template_control.robot.biped.Biped.joint_positions`."""
-        x0, y0, c, s = self._frame[:4]
-        for i, place in enumerate(self._joint_places):
-            out[i, 0], out[i, 1] = c * (place[0] - x0) + s * (place[1] - y0), place[2]
 
     def hip_height(self, q: Array) -> float:
         """Mean height of the hips that swing the legs forward [m], at the last update."""

@@ -157,11 +157,6 @@ class PlanarBiped(Biped):
         """See :meth:`~.biped.Biped.moved`."""
         return q + step
 
-    def joint_positions(self, out: Array) -> None:
-        """See :meth:`~.biped.Biped.joint_positions`."""
-        for i, position in enumerate(self._joint_places):
-            out[i, 0], out[i, 1] = position[0], position[2]
-
     def hip_height(self, q: Array) -> float:
         """Height of the point the legs hang from [m]; the base joint is placed there."""
         return float(q[1])

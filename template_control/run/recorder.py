@@ -12,35 +12,148 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count
+from template_control.compiled import compiled
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.state import FloatingSnapshot
+from template_control.embedding.tick import SNAPSHOT, TICK, look
 from template_control.errors import ParameterError
+from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.robot.terms import LEGS
+from template_control.robot.library import load_robot
+from template_control.robot.terms import LEGS, UP
 from template_control.run.metadata import about, outcome
 from template_control.run.record import FloatingRecord, Record
 from template_control.run.statistics import Counts, Statistics, count, statistics
+from template_control.warm_up import Part, ready
 from template_control.whole_body.solver import Solution
+from template_control.whole_body.task import References
 
 Array = NDArray[np.float64]
 
 _BLOCK = 1024  # ticks
-# Columns of one or two numbers, and their widths.
-_NUMBERS = {
-    "time": 1,
-    "angular_momentum": 1,
-    "node": 1,
-    "rear": 1,
-    "solved": 1,
-    "push": 1,
-    "stands": 1,
-    "interval": 1,
-    "tick_seconds": 1,
-    "solve_seconds": 1,
-}
-# Of these, what no field of the record holds.
-_OTHERWISE = ("stands", "interval", "tick_seconds", "solve_seconds")
+_CLOCKS = ("tick_seconds", "solve_seconds")  # kept of all ticks
 _KINDS = {"node": np.int64, "rear": np.int64, "solved": np.bool_}
+
+
+def _columns(robot: Biped) -> dict[str, tuple[int, ...]]:
+    """Shapes of the columns of a robot's record, in the order in which :func:`write_row` fills."""
+    nu, contacts = len(robot.joint_names), len(robot.feet)
+    numbers = ("time", "push", "interval", "tick_seconds", "solve_seconds", "solved")
+    found: dict[str, tuple[int, ...]] = {
+        **dict.fromkeys(numbers, ()),
+        "heading": (),
+        "q": (robot.nq,),
+        "v": (robot.nv,),
+        "torque": (nu,),
+        "joint": (nu, 2),
+        "foot": (contacts, 2),
+        "contact_force": (contacts, 2),
+        "com": (2,),
+        "com_velocity": (2,),
+        "angular_momentum": (),
+        "node": (),
+        "rear": (),
+        "stands": (),
+        "template_com": (2,),
+        "template_velocity": (2,),
+        "template_force": (LEGS, 2),
+        "swing_reference": (LEGS, 2),
+    }
+    if robot.directions > UP:
+        found |= {
+            "space_com": (3,),
+            "space_foot": (contacts, 3),
+            "space_force": (contacts, 3),
+            "attitude": (3,),
+            "sway": (2,),
+            "side_reference": (LEGS,),
+        }
+    return found
+
+
+@compiled
+def _put(row: Array, at: int, values: Array) -> int:
+    """Write some numbers into a row from a place on; the place after them."""
+    for value in values:
+        row[at] = value
+        at += 1
+    return at
+
+
+@compiled
+def write_row(
+    row: Array,
+    numbers: tuple[float, ...],
+    state: tuple[Array, Array, Array, Array],
+    robot: tuple[Any, Array, Array],
+    seen: Any,
+) -> None:
+    """Write the row of a tick, columns of :func:`_columns`.
+
+    Args:
+        row: overwritten.
+        numbers: the first seven columns.
+        state: q, v, torques, and the ground's forces in the world (n, d) [N].
+        robot: ``data`` of the robot, its ``joint_places`` and ``heading_frame``.
+        seen: (1,) of ``SNAPSHOT``.
+    """
+    (q, v, torque, force), (data, joints, frame) = state, robot
+    r, s, at = data[0], seen[0], 0
+    x, y, c, sine = frame[0], frame[1], frame[2], frame[3]
+    for number in numbers:
+        row[at] = number
+        at += 1
+    at = _put(row, _put(row, _put(row, at, q), v), torque)
+    for i in range(joints.shape[0]):
+        row[at] = c * (joints[i, 0] - x) + sine * (joints[i, 1] - y)
+        row[at + 1] = joints[i, UP]
+        at += 2
+    contacts, up = force.shape[0], force.shape[1] - 1
+    for i in range(contacts):
+        row[at], row[at + 1] = r.contact_position[i, 0], r.contact_position[i, UP]
+        row[at + 2 * contacts], row[at + 2 * contacts + 1] = force[i, 0], force[i, up]
+        if up == UP:
+            row[at + 2 * contacts] = c * force[i, 0] + sine * force[i, 1]
+        at += 2
+    at += 2 * contacts
+    row[at], row[at + 1] = r.com[0], r.com[UP]
+    row[at + 2], row[at + 3] = r.com_velocity[0], r.com_velocity[UP]
+    row[at + 4], row[at + 5], row[at + 6], row[at + 7] = r.momentum[1], s.node, s.rear, s.stands
+    at = _put(row, _put(row, at + 8, s.template_com), s.template_velocity)
+    for leg in range(LEGS):
+        at = _put(row, at, s.template_force[leg])
+    for leg in range(LEGS):
+        at = _put(row, at, s.swing_reference[leg])
+    if up < UP:
+        return
+    at = _to_world(frame, r.com, row, at)
+    for i in range(contacts):
+        at = _to_world(frame, r.contact_position[i], row, at)
+    for i in range(contacts):
+        at = _put(row, at, force[i])
+    _put(row, _put(row, _put(row, at, r.attitude), s.sway), s.side_reference)
+
+
+@compiled
+def _to_world(frame: Array, point: Array, row: Array, at: int) -> int:
+    """Write a point (3,) of the heading frame in the world [m]; the place after it."""
+    x, y, c, s = frame[0], frame[1], frame[2], frame[3]
+    row[at] = x + c * point[0] - s * point[1]
+    row[at + 1] = y + s * point[0] + c * point[1]
+    row[at + 2] = point[2]
+    return at + 3
+
+
+def record_row() -> None:
+    """A row of the record."""
+    robot, tick, seen = load_robot("five-link"), np.zeros(1, TICK), np.zeros(1, SNAPSHOT)
+    look(tick, robot.data, References().data, seen)
+    row = np.zeros(sum(map(prod, _columns(robot).values())))
+    state = robot.neutral(), np.zeros(robot.nv), np.zeros(len(robot.joint_names)), np.zeros((2, 2))
+    write_row(row, (0.0,) * 7, state, (robot.data, robot.joint_places, robot.heading_frame), seen)
+
+
+RECORD = (Part(record_row, 1.5),)
+"""Compiled functions of a recorder."""
 
 
 class Recorder:
@@ -81,45 +194,17 @@ class Recorder:
         self.controller, self.every = controller, every
         robot = controller.robot
         self._floating = robot if isinstance(robot, FloatingBaseBiped) else None
-        nu, contacts = len(robot.joint_names), len(robot.feet)
-        # In the order in which a tick writes them; single numbers are written together.
-        shapes: dict[str, tuple[int, ...]] = {
-            "q": (robot.nq,),
-            "v": (robot.nv,),
-            "torque": (nu,),
-            "com": (2,),
-            "com_velocity": (2,),
-            "foot": (contacts, 2),
-            "contact_force": (contacts, 2),
-            "template_com": (2,),
-            "template_velocity": (2,),
-            "template_force": (LEGS, 2),
-            "swing_reference": (LEGS, 2),
-            "joint": (nu, 2),
+        ready(RECORD)
+        self._shapes = _columns(robot)
+        widths = [prod(shape) for shape in self._shapes.values()]
+        ends = np.cumsum(widths).tolist()
+        self._places = {
+            name: slice(end - width, end)
+            for name, end, width in zip(self._shapes, ends, widths, strict=True)
         }
-        if self._floating is not None:
-            shapes |= {
-                "space_com": (3,),
-                "space_foot": (contacts, 3),
-                "space_force": (contacts, 3),
-                "attitude": (3,),
-                "heading": (),
-                "sway": (2,),
-                "side_reference": (LEGS,),
-            }
-        widths = {**_NUMBERS, **{name: prod(shape) for name, shape in shapes.items()}}
-        ends = np.cumsum(list(widths.values()))
-        starts = ends - list(widths.values())
-        self._columns = {
-            name: slice(int(a), int(b)) for name, a, b in zip(widths, starts, ends, strict=True)
-        }
-        self._block = np.empty((_BLOCK, int(ends[-1])))
-        self._numbers = self._block[:, : self._columns["q"].start]
-        self._arrays = {
-            name: self._block[:, self._columns[name]].reshape(_BLOCK, *shape)
-            for name, shape in shapes.items()
-        }
-        self._written = [array for name, array in self._arrays.items() if name != "joint"]
+        self._block = np.empty((_BLOCK, ends[-1]))
+        self._seen = np.zeros(1, SNAPSHOT)
+        self._robot = robot.data, robot.joint_places, robot.heading_frame
         self._block_start = 0  # tick of the block
         # By the block's first tick: closing it once more, after an interruption, changes nothing.
         self._kept: dict[int, Array] = {}
@@ -127,7 +212,6 @@ class Recorder:
         self._counted: dict[int, Counts] = {}
         self._first = self._before = self._begins = controller.time  # [s]
         self._step = 0.0  # of the last tick [s]
-        self._node_index = controller.supervisor.automaton.index
         self.ticks = 0
         # Before the run, which would be lost if this failed after it.
         self._about = {**about(controller), **(conditions or {})}
@@ -159,38 +243,25 @@ class Recorder:
             push: disturbance on the trunk; of a free robot its size, negative backward [N].
             seconds: wall-clock time of the controller's tick.
         """
-        c, robot, s = self.controller, self.controller.robot, self.controller.snapshot()
-        seen = c.ground.raw_state
-        if c.frame.angle != 0.0 or not (np.array_equal(q, seen[0]) and np.array_equal(v, seen[1])):
-            robot.update(q, v)
+        c, (seen_q, seen_v) = self.controller, self.controller.ground.raw_state
+        force, torque = np.ascontiguousarray(force, dtype=np.float64), solution.torque
+        look(*c.memory, self._seen)
+        known = q is seen_q and v is seen_v
+        if not known:
+            q, v = (np.ascontiguousarray(values, dtype=np.float64) for values in (q, v))
+            known = np.array_equal(q, seen_q) and np.array_equal(v, seen_v)
+        if not known or c.frame.angle != 0.0:
+            c.robot.update(q, v)
+        after = c.time
         now = self._begins if time is None else time
-        self._step, self._begins = s.time - self._begins, s.time
+        self._step, self._begins = after - self._begins, after
         if not self.ticks:
             self._first = self._before = now
-        row = self.ticks - self._block_start
-        self._numbers[row] = (
-            now,
-            robot.angular_momentum,
-            self._node_index[s.node],
-            s.rear,
-            solution.solved,
-            push,
-            s.stands,
-            now - self._before,
-            seconds,
-            solution.solve_seconds,
-        )
-        floating, more = self._floating, ()
-        if floating is not None and isinstance(s, FloatingSnapshot):
-            more = _in_space(floating, s, force)
-            cosine, sine = np.cos(floating.heading), np.sin(floating.heading)
-            force = np.column_stack((cosine * force[:, 0] + sine * force[:, 1], force[:, 2]))
-        places = robot.contact_position[:, :: robot.directions - 1]
-        planar = (q, v, solution.torque, robot.com, robot.com_velocity, places, force)
-        template = s.template_com, s.template_velocity, s.template_force, s.swing_reference
-        for column, value in zip(self._written, (*planar, *template, *more), strict=True):
-            column[row] = value
-        robot.joint_positions(self._arrays["joint"][row])
+        row, interval = self._block[self.ticks - self._block_start], now - self._before
+        clocks = float(seconds), solution.solve_seconds
+        heading = 0.0 if self._floating is None else self._floating.heading
+        numbers = float(now), float(push), interval, *clocks, float(solution.solved), heading
+        write_row(row, numbers, (q, v, torque, force), self._robot, self._seen)
         self._before = now
         self.ticks += 1
         if self.ticks - self._block_start == _BLOCK:
@@ -200,11 +271,18 @@ class Recorder:
         """Count the ticks of the block, keep its samples, and begin anew."""
         first = self._block_start
         block = self._block[: self.ticks - first]
-        named = {name: block[:, columns] for name, columns in self._columns.items()}
+        named = self._named(block)
         self._counted[first] = count(named, self.controller.qp.torque_limit)
         self._kept[first] = block[-first % self.every :: self.every].copy()
-        self._clocks[first] = np.hstack((named["tick_seconds"], named["solve_seconds"]))
+        self._clocks[first] = np.column_stack([named[name] for name in _CLOCKS])
         self._block_start = self.ticks
+
+    def _named(self, rows: Array) -> dict[str, Array]:
+        """Columns of some rows by their names, each in its shape."""
+        return {
+            name: rows[:, self._places[name]].reshape(-1, *shape)
+            for name, shape in self._shapes.items()
+        }
 
     def statistics(self) -> Statistics:
         """Statistics over all ticks, sampled or not."""
@@ -223,14 +301,16 @@ class Recorder:
             error: that ended it, on one line.
         """
         self._close_block()
+        kind = FloatingRecord if self._floating is not None else Record
         table, clocks = (
             np.concatenate(list(parts.values())) for parts in (self._kept, self._clocks)
         )
-        data: dict[str, Any] = {}
-        for name, columns in self._columns.items():
-            if name not in _OTHERWISE:
-                shape = self._arrays[name].shape[1:] if name in self._arrays else ()
-                data[name] = table[:, columns].reshape(-1, *shape).astype(_KINDS.get(name, float))
+        fields = kind.__dataclass_fields__
+        data: dict[str, Any] = {
+            name: values.astype(_KINDS.get(name, float))
+            for name, values in self._named(table).items()
+            if name in fields and name not in _CLOCKS
+        }
         c, reports = self.controller, self.controller.reports
         sections = list(dict.fromkeys(r.section.name for r in reports))
         strides = list(dict.fromkeys(r.goal.stride for r in reports))
@@ -246,7 +326,6 @@ class Recorder:
             "sections": sections,
             "strides": strides,
         }
-        kind = FloatingRecord if self._floating is not None else Record
         return kind(
             **data,
             section=np.array([sections.index(r.section.name) for r in reports], dtype=np.int64),
@@ -267,11 +346,3 @@ class Recorder:
             plan_seconds=np.array([r.plan_seconds for r in reports]),
             metadata=metadata,
         )
-
-
-def _in_space(robot: FloatingBaseBiped, s: FloatingSnapshot, force: Array) -> tuple[Any, ...]:
-    """Columns that only a floating-base robot has, in their order."""
-    space = robot.space
-    feet = robot.to_world(space.contact)
-    angles = robot.roll_pitch_yaw()
-    return robot.to_world(space.com), feet, force, angles, robot.heading, s.sway, s.side_reference

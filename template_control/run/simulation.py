@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
+from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_template import template_for
 from template_control.embedding.state import SectionReport
 from template_control.errors import DivergedError, ParameterError
@@ -30,12 +31,13 @@ from template_control.run.metadata import conditions
 from template_control.run.old import accepts_old_call
 from template_control.run.options import Push, check_pushes
 from template_control.run.record import Record, RunInterrupted, keep, one_line
-from template_control.run.recorder import Recorder
+from template_control.run.recorder import RECORD, Recorder
 from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, SteadyRoute
+from template_control.warm_up import ready
 
 Array = NDArray[np.float64]
 
@@ -93,6 +95,7 @@ def simulate(experiment: Experiment, progress: Callable[[int], None] | None = No
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
     """
+    ready((*WALK, *RECORD))
     o = experiment.prepare()
     robot, backend = o.robot, _backend(o.robot)
     controller = _controller(backend, o)

@@ -129,7 +129,7 @@ def count(block: Mapping[str, Array], torque_limit: Array) -> Counts:
     torque, nu = block["torque"], len(torque_limit)
     angle, speed = block["q"][:, -nu:], block["v"][:, -nu:]
     size = np.abs(torque)
-    errors, stands = block["template_com"] - block["com"], block["stands"][:, 0] > 0.0
+    errors, stands = block["template_com"] - block["com"], block["stands"] > 0.0
     sorts = errors[stands], errors[~stands]
     return Counts(
         torque=size.max(axis=0, initial=0.0),
@@ -137,7 +137,7 @@ def count(block: Mapping[str, Array], torque_limit: Array) -> Counts:
         torque_square=(torque * torque).sum(axis=0),
         least=angle.min(axis=0, initial=np.inf),
         most=angle.max(axis=0, initial=-np.inf),
-        work=float(np.abs(torque * speed).sum(axis=1) @ block["interval"][:, 0]),
+        work=float(np.abs(torque * speed).sum(axis=1) @ block["interval"]),
         saturated=int((size >= _AT_LIMIT * torque_limit).any(axis=1).sum()),
         failures=int((block["solved"] == 0.0).sum()),
         ticks=np.array([len(some) for some in sorts]),
