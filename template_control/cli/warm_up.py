@@ -25,12 +25,14 @@ def run(options: argparse.Namespace) -> int:
     from template_control.embedding.planners.ahead import AHEAD
     from template_control.embedding.planners.walk_kernels import WALK
     from template_control.embedding.standing.curves import STAND
+    from template_control.estimation.delay import DELAY
+    from template_control.plant.trunk import READ
     from template_control.run.recorder import RECORD
     from template_control.slip.lateral.placing import LATERAL
     from template_control.warm_up import Part, ready
 
     other = (Part(scenarios, 6.0), Part(basins, 1.5), Part(floating_base, 1.0))
-    ready((*WALK, *RECORD, *AHEAD, *STAND, *LATERAL, *other, Part(ideal_plant, 2.0)))
+    ready((*WALK, *RECORD, *DELAY, *AHEAD, *STAND, *LATERAL, *READ, *other, Part(ideal_plant, 2.0)))
     plain_console().print(f"everything is compiled, in {cache_folder()}", soft_wrap=True)
     return 0
 

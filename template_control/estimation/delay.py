@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
+from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import RATE_SQUARED, TIME, tuned
+from template_control.warm_up import Part, ready
 
 Array = NDArray[np.float64]
 
@@ -43,6 +45,38 @@ class DelayOptions(Checked):
     most: Positive = tuned(60.0, RATE_SQUARED)
 
 
+@compiled
+def add_errors(
+    errors: Array, measured: Array, expected: Array, first: int, rest: tuple[float, float]
+) -> None:
+    """Add a block's squared errors to those of each delay of whole ticks.
+
+    Args:
+        errors: (d + 1,) overwritten, of the delays up to d ticks.
+        measured: (n + 1, nv) velocities of the block's ticks, and of the next one.
+        expected: (d + 1 + n, nv) accelerations, of the ticks up to d + 1 before the block too.
+        first: of the joints among the coordinates.
+        rest: time step [s], and the bound of an error [rad/s^2].
+    """
+    dt, most = rest
+    ticks, longest = measured.shape[0] - 1, errors.shape[0]
+    for k in range(ticks):
+        for joint in range(first, measured.shape[1]):
+            found = (measured[k + 1, joint] - measured[k, joint]) / dt
+            for d in range(longest):
+                error = min(max(found - expected[longest - d + k, joint], -most), most)
+                errors[d] += error * error
+
+
+def learnt_delay() -> None:
+    """The errors of each delay."""
+    add_errors(np.zeros(9), np.zeros((65, 7)), np.zeros((73, 7)), 3, (1e-3, 60.0))
+
+
+DELAY = (Part(learnt_delay, 0.7),)
+"""Compiled functions of the delay's estimate."""
+
+
 class DelayCompensation:
     """Prediction of the state in which the torques of this tick will act.
 
@@ -64,6 +98,7 @@ class DelayCompensation:
 
     @checked
     def __init__(self, options: DelayOptions, robot: Biped, dt: float) -> None:
+        ready(DELAY)
         self._options, self._robot, self._dt = options, robot, dt
         self._most = round(options.longest / dt)
         self._expected = np.zeros((self._most + 1 + _BLOCK, robot.nv))
@@ -113,14 +148,11 @@ class DelayCompensation:
 
     def _compare(self) -> None:
         """Add the block's errors to each delay's sum, update the estimate, start a new block."""
-        o, joints = self._options, slice(self._robot.base_dof, None)
+        o = self._options
         if self._first >= self._most:  # before, the first torques have no history
-            found = np.diff(self._measured[:, joints], axis=0) / self._dt
             self._errors *= np.exp(-_BLOCK * self._dt / o.memory)
-            for d in range(self._most + 1):
-                first = self._most + 1 - d
-                errors = found - self._expected[first : first + _BLOCK, joints]
-                self._errors[d] += np.square(np.clip(errors, -o.most, o.most)).sum()
+            first = self._robot.base_dof
+            add_errors(self._errors, self._measured, self._expected, first, (self._dt, o.most))
             likeliest = int(self._errors.argmin())
             if self._errors[likeliest] < (1.0 - _MARGIN) * self._errors[self.ticks]:
                 self.ticks = likeliest

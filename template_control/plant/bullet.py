@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -20,11 +19,13 @@ from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_damping, check_mass_matrix
 from template_control.plant.c_library import decimal_points, silenced
 from template_control.plant.terrain import GroundStep, Terrain, pieces
+from template_control.plant.trunk import READ, read_trunk
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.spec import RobotSpec
 from template_control.robot.terms import FLOATING_DOF, PLANAR_DOF
 from template_control.robot.urdf import link_masses
+from template_control.warm_up import ready
 
 Array = NDArray[np.float64]
 
@@ -138,7 +139,9 @@ class BulletPlant:
         self._actuated = [by_name[name] for name in robot.joint_names]
         self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
         self._trunk = self._trunk_link()
-        self._contacts: Sequence[Any] | None = None
+        self._forces = np.zeros((len(robot.feet), robot.directions))
+        self._trunk_lies = False
+        self._stale = True  # whether the contacts of the last step are still to be asked for
         self._configure(len(info))
 
     def _load(self) -> int:
@@ -231,7 +234,7 @@ class BulletPlant:
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
-        self._contacts = None
+        self._stale = True
         for joint, position, velocity in zip(self.joints, q, v, strict=True):
             self._engine.resetJointState(
                 self.body, joint, position, velocity, physicsClientId=self.client
@@ -250,37 +253,39 @@ class BulletPlant:
         Averages over the last physics step: the first sample of a touchdown is an impulse
         divided by that step.
         """
-        out[:] = 0.0
-        axes = AXES[out.shape[1]]
-        for contact in self._touching():
-            sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
-            foot = self._feet.get(link)
-            if foot is None:
-                continue
-            # Normal force and direction (a wall pushes sideways), two of friction.
-            for i, axis in enumerate(axes):
-                out[foot, i] += sign * (
-                    contact[9] * contact[7][axis]
-                    + contact[10] * contact[11][axis]
-                    + contact[12] * contact[13][axis]
-                )
+        self._read_contacts()
+        out[:] = self._forces
 
     def trunk_touches_ground(self) -> bool:
         """True where the trunk itself lies on the ground."""
-        return any(
-            contact[3 if contact[1] == self.body else 4] == self._trunk
-            for contact in self._touching()
-        )
+        self._read_contacts()
+        return self._trunk_lies
 
-    def _touching(self) -> Sequence[Any]:
-        """PyBullet's contact points, asked for once a step.
+    def _read_contacts(self) -> None:
+        """Ask for the contact points, once a step.
 
         Asked for one body, PyBullet turns the normal towards it but not the friction, so ask for
         all. Whatever touches the robot is ground: it does not collide with itself.
         """
-        if self._contacts is None:
-            self._contacts = self._engine.getContactPoints(physicsClientId=self.client)
-        return self._contacts
+        if not self._stale:
+            return
+        self._stale, self._trunk_lies = False, False
+        forces, axes = self._forces, AXES[self.robot.directions]
+        forces[:] = 0.0
+        for contact in self._engine.getContactPoints(physicsClientId=self.client):
+            sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
+            foot = self._feet.get(link)
+            if foot is None:
+                self._trunk_lies = self._trunk_lies or link == self._trunk
+                continue
+            # Normal force and direction (a wall pushes sideways), two of friction.
+            normal, along, across = contact[9], contact[10], contact[12]
+            for i, axis in enumerate(axes):
+                forces[foot, i] += sign * (
+                    normal * contact[7][axis]
+                    + along * contact[11][axis]
+                    + across * contact[13][axis]
+                )
 
     def step(self, torque: Array, push: float = 0.0) -> None:
         """Advance one physics step.
@@ -294,7 +299,7 @@ class BulletPlant:
     def _advance(self, torque: Array, push: float, aside: float) -> None:
         """One physics step with a push along the world's x and y [N]."""
         p, c = self._engine, self.client
-        self._contacts = None
+        self._stale = True
         forces = np.asarray(torque).tolist()  # Python's numbers: PyBullet is slow with others
         p.setJointMotorControlArray(
             self.body, self._actuated, p.TORQUE_CONTROL, forces=forces, physicsClientId=c
@@ -332,8 +337,11 @@ class FloatingBaseBulletPlant(BulletPlant):
     """
 
     def __init__(self, robot: FloatingBaseBiped, options: PlantOptions) -> None:
+        ready(READ)
         super().__init__(robot, options)
-        self._away = self._inertial.inverse()
+        away = self._inertial.inverse()
+        self._away = np.ascontiguousarray(away.rotation), np.array(away.translation)
+        self._moving = np.zeros((5, 3))
 
     def _load(self) -> int:
         body = _load_body(self.robot, self.client, held=False)
@@ -378,17 +386,11 @@ class FloatingBaseBulletPlant(BulletPlant):
         """See :meth:`~.plant.Plant.read`."""
         super().read(q[_POSITION:], v[FLOATING_DOF:])
         p, c = self._engine, self.client
-        position, quaternion = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
-        linear, angular = p.getBaseVelocity(self.body, physicsClientId=c)
-        place = _pose(position, quaternion)
-        trunk = place * self._away
-        back = trunk.rotation.T
-        speed = linear - np.cross(angular, place.translation - trunk.translation)
-        q[:3], v[:3], v[3:FLOATING_DOF] = trunk.translation, back @ speed, back @ angular
-        coefficients = pin.Quaternion(trunk.rotation).coeffs()
-        # Of the two quaternions of a rotation the one nearer to the last.
-        near = float(coefficients @ q[3:_POSITION]) >= 0.0
-        q[3:_POSITION] = coefficients if near else -coefficients
+        place = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
+        velocity, moving = p.getBaseVelocity(self.body, physicsClientId=c), self._moving
+        read_trunk(*place, *velocity, *self._away, q, moving)
+        np.matmul(moving[:3], moving[3], out=v[:3])
+        np.matmul(moving[:3], moving[4], out=v[3:FLOATING_DOF])
 
 
 def _load_body(robot: Biped, client: int, held: bool = True) -> int:

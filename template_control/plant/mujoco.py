@@ -94,6 +94,9 @@ class MujocoPlant:
         self._feet = {shapes.index(f"{FOOT}{i}"): i for i in range(len(robot.feet))}
         self._trunk_shapes = {i for i, name in enumerate(shapes) if name.startswith(TRUNK)}
         self._force = np.zeros(6)
+        self._forces = np.zeros((len(robot.feet), robot.directions))
+        self._trunk_lies = False
+        self._stale = True  # whether the contacts of the last step are still to be gone through
         check_mass_matrix(robot, "MuJoCo", self._mass_matrix)
 
     def _mass_matrix(self, q: Array) -> Array:
@@ -116,6 +119,7 @@ class MujocoPlant:
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
+        self._stale = True
         self._engine.mj_resetData(self.model, self.data)
         self.data.qpos[self._q], self.data.qvel[self._v] = q, v
 
@@ -125,28 +129,35 @@ class MujocoPlant:
 
     def contact_forces(self, out: Array) -> None:
         """See :meth:`~.plant.Plant.contact_forces`."""
-        out[:] = 0.0
-        axes = AXES[out.shape[1]]
-        for i in range(self.data.ncon):
-            contact = self.data.contact[i]
-            ours = 1 if contact.geom[1] in self._feet else 0
-            foot = self._feet.get(contact.geom[ours])
-            if foot is None:
-                continue
-            self._engine.mj_contactForce(self.model, self.data, i, self._force)
-            # The contact's axes are the rows of its frame; its force acts on the second shape.
-            force = contact.frame.reshape(3, 3).T @ self._force[:3]
-            out[foot] += force[axes] if ours else -force[axes]
+        self._read_contacts()
+        out[:] = self._forces
 
     def trunk_touches_ground(self) -> bool:
         """True where the trunk itself lies on the ground."""
-        return any(
-            not self._trunk_shapes.isdisjoint(self.data.contact[i].geom.tolist())
-            for i in range(self.data.ncon)
-        )
+        self._read_contacts()
+        return self._trunk_lies
+
+    def _read_contacts(self) -> None:
+        """Go through the contacts, once a step."""
+        if not self._stale:
+            return
+        self._stale, self._trunk_lies = False, False
+        self._forces[:] = 0.0
+        axes, contacts = AXES[self._forces.shape[1]], self.data.contact
+        for i, shapes in enumerate(contacts.geom.tolist()):
+            ours = 1 if shapes[1] in self._feet else 0
+            foot = self._feet.get(shapes[ours])
+            if foot is None:
+                self._trunk_lies = self._trunk_lies or not self._trunk_shapes.isdisjoint(shapes)
+                continue
+            self._engine.mj_contactForce(self.model, self.data, i, self._force)
+            # The contact's axes are the rows of its frame; its force acts on the second shape.
+            force = (contacts.frame[i].reshape(3, 3).T @ self._force[:3])[axes]
+            self._forces[foot] += force if ours else -force
 
     def step(self, torque: Array, push: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`."""
+        self._stale = True
         self.data.qfrc_applied[self._actuated] = torque
         self.data.xfrc_applied[self._trunk, 0] = push  # at the body's centre of mass
         self._engine.mj_step(self.model, self.data)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, isfinite, sin, sqrt
+from math import acos, cos, isfinite, sin, sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -330,7 +330,7 @@ class FloatingBaseBiped(Biped):
 
     def hip_height(self, q: Array) -> float:
         """Mean height of the hips that swing the legs forward [m], at the last update."""
-        return float(self.data[0]["hips"][UP])
+        return float(self.data["hips"][0, UP])
 
     def roll_pitch_yaw(self) -> tuple[float, float, float]:
         """Attitude of the trunk in the heading frame, at the last update [rad].
@@ -347,4 +347,4 @@ class FloatingBaseBiped(Biped):
 
     def tilt(self, q: Array) -> float:
         """See :meth:`~template_control.robot.biped.Biped.tilt`."""
-        return float(np.arccos(np.clip(self.rotation[2, 2], -1.0, 1.0)))
+        return acos(min(max(float(self.rotation[2, 2]), -1.0), 1.0))

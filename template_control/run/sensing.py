@@ -169,11 +169,12 @@ class TorqueDelay:
         self._line: deque[Array] = deque(maxlen=ticks + 1)
 
     def pass_on(self, torque: Array) -> Array:
-        """Take this tick's torques (nu,); returns those that act now."""
-        self._line.append(torque.copy())
-        while len(self._line) < (self._line.maxlen or 0):
-            self._line.append(self._line[0])
-        return self._line[0]
+        """Take this tick's torques (nu,), an array of their own; returns those that act now."""
+        line = self._line
+        line.append(torque)
+        while len(line) < (line.maxlen or 0):
+            line.append(line[0])
+        return line[0]
 
 
 class FilteredSensors:

@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from math import copysign, cos, hypot, sin
+from math import copysign, cos, degrees, hypot, sin
 from threading import Lock
 from typing import Any
 
@@ -20,6 +20,7 @@ from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_template import template_for
 from template_control.embedding.state import SectionReport
 from template_control.errors import DivergedError, ParameterError
+from template_control.estimation.delay import DELAY
 from template_control.plant.plant import Plant, plant_name
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
@@ -95,7 +96,7 @@ def simulate(experiment: Experiment, progress: Callable[[int], None] | None = No
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
     """
-    ready((*WALK, *RECORD))
+    ready((*WALK, *RECORD, *DELAY))
     o = experiment.prepare()
     robot, backend = o.robot, _backend(o.robot)
     controller = _controller(backend, o)
@@ -234,7 +235,7 @@ def _loop(
         if len(begun) <= len(supervisor.log):
             # A step that changes into another stride keeps its pushes where they were.
             begun.append((supervisor.begun_at, controller.planner.gait.step_duration))
-        along, lateral = _push(o.pushes, begun, now)
+        along, lateral = _push(o.pushes, begun, now) if o.pushes else (0.0, 0.0)
         size = copysign(hypot(along, lateral), along)
         recorder.tick(q, v, forces, solution, time=now, push=size, seconds=seconds)
         reason = _fallen(plant, controller, q, o, now)
@@ -299,12 +300,13 @@ def _push(
 def _fallen(
     plant: Plant, controller: EmbeddingController, q: Array, o: PreparedExperiment, now: float
 ) -> str:
-    falls, length = o.falls, controller.parameters.rest_length
-    hip = controller.robot.hip_height(q) - o.world.ground_height(q[0])
+    falls, length, robot = o.falls, controller.parameters.rest_length, controller.robot
+    hip = robot.hip_height(q) - o.world.ground_height(float(q[0]))
     if hip < falls.height * length:
         return f"the hip was {hip:.2f} m above the ground"
-    if controller.robot.tilt(q) > falls.pitch:
-        return f"the trunk tilted to {np.degrees(controller.robot.tilt(q)):.0f} degrees"
+    tilt = robot.tilt(q)
+    if tilt > falls.pitch:
+        return f"the trunk tilted to {degrees(tilt):.0f} degrees"
     patience = falls.patience * controller.planner.gait.step_duration
     if now - controller.supervisor.begun_at > patience:
         return "the robot stopped walking"
