@@ -118,7 +118,7 @@ def _plant(robot: Biped) -> BulletPlant | FloatingBaseBulletPlant:
     return BulletPlant(robot, options)
 
 
-def _ticks(start: Start, ticks: list[float], steps: list[float]) -> Generator[int, None, None]:
+def ticks_of(start: Start, ticks: list[float], steps: list[float]) -> Generator[int, None, None]:
     """Tick by tick, without an end; yields how many strides are over, less those of the warm-up."""
     controller, q, v = start
     robot, clock = controller.robot, time.perf_counter
@@ -161,7 +161,7 @@ def measure(count: int, gaits: list[str]) -> dict[str, dict[str, float]]:
     """
     starts = {gait: GAITS[gait][0]() for gait in gaits}
     times: dict[str, tuple[list[float], list[float]]] = {gait: ([], []) for gait in gaits}
-    under_way = [_ticks(starts[gait], *times[gait]) for gait in gaits]
+    under_way = [ticks_of(starts[gait], *times[gait]) for gait in gaits]
     done = 0
     while done <= count:
         for ticks in reversed(under_way):

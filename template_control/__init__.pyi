@@ -54,6 +54,7 @@ from .slip.scenario.run import simulate_scenario as simulate_scenario
 from .slip.scenario.scenario import example_one as example_one
 from .slip.scenario.scenario import load_scenario as load_scenario
 from .slip.scenario.scenario_route import ScenarioRoute as ScenarioRoute
+from .sweep.many import simulate_many as simulate_many
 from .version import __version__ as __version__
 from .view.figures import plot as plot
 from .view.figures import save_figures as save_figures

@@ -16,10 +16,9 @@ from template_control.cli.notices import notice, printed
 from template_control.cli.plots import TEMPLATE, add_figure_options, draw
 from template_control.errors import TemplateControlError
 from template_control.plant.c_library import stdout_to_stderr
-from template_control.run import failures
 from template_control.run.experiment import STEPS, Experiment, PreparedExperiment
 from template_control.run.record import Record, RunInterrupted, one_line, recorded
-from template_control.run.simulation import simulate
+from template_control.run.simulation import QP_FAILURES, simulate
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
 from template_control.terminal import figures_table, progress_bar, show
@@ -89,7 +88,7 @@ def run_and_keep(
     total = prepared.steps or (None if ends else STEPS)
     with output_folder(options.output) as folder, stdout_to_stderr():
         try:
-            with progress_bar(doing, total) as advance, printed(failures.LOG):
+            with progress_bar(doing, total) as advance, printed(QP_FAILURES):
                 record = simulate(prepared, advance)
         except RunInterrupted as stop:
             record = stop.record

@@ -388,7 +388,7 @@ class FloatingBaseBulletPlant(BulletPlant):
         p, c = self._engine, self.client
         place = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
         velocity, moving = p.getBaseVelocity(self.body, physicsClientId=c), self._moving
-        read_trunk(*place, *velocity, *self._away, q, moving)
+        read_trunk(place, velocity, *self._away, q, moving)
         np.matmul(moving[:3], moving[3], out=v[:3])
         np.matmul(moving[:3], moving[4], out=v[3:FLOATING_DOF])
 

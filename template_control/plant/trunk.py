@@ -11,14 +11,13 @@ from template_control.warm_up import Part
 Array = NDArray[np.float64]
 
 _Three = tuple[float, float, float]
+_Four = tuple[float, float, float, float]
 
 
 @compiled
 def read_trunk(
-    place: _Three,
-    quaternion: tuple[float, float, float, float],
-    linear: _Three,
-    angular: _Three,
+    place: tuple[_Three, _Four],
+    velocity: tuple[_Three, _Three],
     turn: Array,
     shift: Array,
     q: Array,
@@ -29,14 +28,14 @@ def read_trunk(
     Of the two quaternions of a rotation the one nearer to that in ``q`` is taken.
 
     Args:
-        place, quaternion: of the trunk's axes of inertia, in the world [m].
-        linear, angular: velocity of the CoM [m/s], and angular velocity [rad/s], in the world.
+        place: of the CoM in the world [m], and quaternion of the axes of inertia.
+        velocity: of the CoM [m/s], and angular velocity [rad/s], in the world.
         turn, shift: (3, 3), (3,) frame of the trunk in its axes of inertia [m].
         q: (nq,) overwritten.
         moving: (5, 3) overwritten with the world's axes in the trunk's (a rotation), and the
             velocity of the trunk's origin and its angular velocity, in the world's axes.
     """
-    x, y, z, w = quaternion
+    (at, (x, y, z, w)), (linear, angular) = place, velocity
     own, away = np.empty((3, 3)), np.empty(3)
     own[0, 0], own[1, 1] = 1.0 - (2.0 * y * y + 2.0 * z * z), 1.0 - (2.0 * x * x + 2.0 * z * z)
     own[2, 2] = 1.0 - (2.0 * x * x + 2.0 * y * y)
@@ -46,8 +45,8 @@ def read_trunk(
     for i in range(3):
         for j in range(3):
             moving[j, i] = own[i, 0] * turn[0, j] + own[i, 1] * turn[1, j] + own[i, 2] * turn[2, j]
-        q[i] = place[i] + (own[i, 0] * shift[0] + own[i, 1] * shift[1] + own[i, 2] * shift[2])
-        away[i] = place[i] - q[i]
+        q[i] = at[i] + (own[i, 0] * shift[0] + own[i, 1] * shift[1] + own[i, 2] * shift[2])
+        away[i] = at[i] - q[i]
         moving[4, i] = angular[i]
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -85,9 +84,8 @@ def _near_quaternion(inverse: Array, q: Array) -> None:
 def read_base() -> None:
     """The state of a floating base in PyBullet."""
     three = (0.0, 0.0, 0.0)
-    read_trunk(
-        three, (*three, 1.0), three, three, np.eye(3), np.zeros(3), np.zeros(9), np.zeros((5, 3))
-    )
+    place, velocity = (three, (*three, 1.0)), (three, three)
+    read_trunk(place, velocity, np.eye(3), np.zeros(3), np.zeros(9), np.zeros((5, 3)))
 
 
 READ = (Part(read_base, 1.0),)

@@ -27,7 +27,6 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.run.backends import FloatingBackend, PlanarBackend, RobotBackend
 from template_control.run.experiment import STEPS, Experiment, PreparedExperiment
-from template_control.run.failures import QpFailures
 from template_control.run.metadata import conditions
 from template_control.run.old import accepts_old_call
 from template_control.run.options import Push, check_pushes
@@ -69,9 +68,16 @@ def exclusive(*parts: Any) -> Iterator[None]:
 
 
 _LOG = logging.getLogger(__name__)
+QP_FAILURES = logging.getLogger(f"{__name__}.failures")
+"""Logger of the warning that the QP has no solution in many ticks."""
+
+COMPILED = (*WALK, *RECORD, *DELAY)
+"""Compiled functions of a walk and its record."""
 
 _OTHER_TEMPLATE = 0.05
 """Share by which a template may differ from the robot's own: a choice of l0, not another robot."""
+_FAILURES_BLOCK = 200  # ticks
+_MANY_FAILURES = 0.5  # share of a block: in a stumble the QP fails for a few ticks
 
 
 @accepts_old_call
@@ -96,7 +102,7 @@ def simulate(experiment: Experiment, progress: Callable[[int], None] | None = No
         RunInterrupted: at Ctrl-C, with the record until then; a plain KeyboardInterrupt before
             the first sample.
     """
-    ready((*WALK, *RECORD, *DELAY))
+    ready(COMPILED)
     o = experiment.prepare()
     robot, backend = o.robot, _backend(o.robot)
     controller = _controller(backend, o)
@@ -247,7 +253,8 @@ def _loop(
             if progress is not None:
                 progress(done)
         try:
-            plant.step(delay.pass_on(solution.torque), *backend.force(along, lateral))
+            push = backend.force(along, lateral) if o.pushes else ()
+            plant.step(delay.pass_on(solution.torque), *push)
         except DivergedError as error:
             return f"the simulation diverged at {now:.3f} s: {error}"
         tick += 1
@@ -313,3 +320,29 @@ def _fallen(
     if plant.trunk_touches_ground():
         return "the trunk touched the ground"
     return ""
+
+
+class QpFailures:
+    """Counts the ticks without a solved QP; warns once, with the robot's name, if they are many."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._ticks = self._failed = 0
+        self._told = False
+
+    def tick(self, solved: bool, now: float) -> None:
+        """Count one tick at the time ``now`` [s]."""
+        if self._ticks == _FAILURES_BLOCK:
+            self._ticks = self._failed = 0
+        self._ticks += 1
+        self._failed += not solved
+        if self._failed > _MANY_FAILURES * _FAILURES_BLOCK and not self._told:
+            self._told = True
+            QP_FAILURES.warning(
+                "%s at %.3f s: the QP had no solution in %d of the last %d ticks, which keep the"
+                " torques of the last one that had; what follows is no controlled motion",
+                self._name,
+                now,
+                self._failed,
+                self._ticks,
+            )

@@ -1,4 +1,5 @@
 from .executor import workers as workers
+from .many import simulate_many as simulate_many
 from .sweep import SweepOptions as SweepOptions
 from .sweep import SweepResult as SweepResult
 from .sweep import grid as grid

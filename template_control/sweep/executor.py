@@ -66,7 +66,7 @@ def run_calls(
     done: SimpleQueue[Future[Outcome]] = SimpleQueue()
     under_way: dict[Future[Outcome], int] = {}
     due = time.monotonic()
-    with _workers(executor) as pool:
+    with given_or_own(executor) as pool:
         try:
             while True:
                 for index, arguments in islice(calls, in_flight - len(under_way)):
@@ -165,7 +165,7 @@ def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
 
 
 @contextmanager
-def _workers(executor: Executor | None) -> Iterator[Executor]:
+def given_or_own(executor: Executor | None) -> Iterator[Executor]:
     """The user's executor, or a pool of our own that ends with the sweep."""
     if executor is not None:
         yield executor
