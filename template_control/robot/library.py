@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +54,9 @@ _BOLT_ACTUATOR = JointLimits(
     ranges=((-1.0, 1.0), (-1.9, 1.9), (-3.4, 3.4)),
 )
 
+# Solo12 has the same modules; ranges: those of its file there (config_solo12.yaml).
+_SOLO_ACTUATOR = replace(_BOLT_ACTUATOR, ranges=((-0.9, 0.9), (-1.45, 1.45), (-2.8, 2.8)))
+
 _CORNERS = ("FL", "FR", "RL", "RR")  # as Unitree names the legs of a quadruped
 
 _ENTRIES = {
@@ -97,6 +100,16 @@ _ENTRIES = {
         foot_radius=0.022,
         planar=False,
         free=True,
+    ),
+    "solo12": _Entry(
+        "solo12.urdf",
+        "the Open Dynamic Robot Initiative's quadruped of example-robot-data, which trots",
+        distribution="example-robot-data",
+        feet=("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"),
+        foot_radius=0.016,
+        planar=False,
+        free=True,
+        limits=_SOLO_ACTUATOR,
     ),
 }
 

@@ -1,0 +1,101 @@
+"""Feet of several contacts: when they stand, and where their contacts are in the air."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from template_control.embedding.contacts import ContactMonitor, ContactOptions
+from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.free.trot import TrotOptions, default_options
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.swing import FEET, spread_contacts
+from template_control.robot.library import load_floating_robot, load_robot
+from template_control.robot.spec import RobotSpec
+from template_control.run.experiment import Experiment
+from template_control.whole_body.task import References
+
+PAIRS = ((0, 3), (1, 2))
+DT, STEP = 1e-3, 0.3
+
+
+def flags(*touching):
+    return np.isin(np.arange(4), touching)
+
+
+def test_a_foot_stands_on_one_of_its_contacts():
+    monitor = ContactMonitor(ContactOptions(doubt=0.004), 100.0, groups=PAIRS)
+    monitor.update(flags(3), None, (None, False), DT)
+    assert monitor.standing.tolist() == [True, False]
+    assert monitor.data["touching"][0, :4].tolist() == [0, 0, 0, 1]
+    monitor.update(flags(0, 3), None, (True, False), DT)
+    assert monitor.data["touching"][0, :4].tolist() == [1, 0, 0, 1]
+    # One that nobody expects is doubted; a foot that leaves has to leave with all of them.
+    monitor.update(flags(0, 2, 3), None, (True, False), DT)
+    assert monitor.standing.tolist() == [True, False]
+    monitor.update(flags(3), None, (False, False), DT)
+    assert monitor.standing.tolist() == [True, False]
+    monitor.update(flags(), None, (False, False), DT)
+    assert monitor.standing.tolist() == [False, False]
+
+
+def offsets(swung, yaw=0.0):
+    """(4, 3, 3) of Go2's contacts, ``swung`` seconds after a pair lifted off 2 cm further apart."""
+    robot, feet = load_floating_robot("go2"), np.zeros(1, FEET)
+    feet["spread"][0, :4] = robot.spread
+    feet["lifted"][0, :4, :2] = 1.1 * robot.spread
+    feet["swing_time"][0, 0] = swung
+    offset = References().offset
+    spread_contacts(feet[0], 0, robot.data[0], yaw, STEP, offset)
+    return offset[:4].copy(), robot.spread
+
+
+def test_contacts_return_to_their_places_in_half_a_step():
+    first, spread = offsets(0.0)
+    np.testing.assert_allclose(first[[0, 3], :2, 0], 1.1 * spread[[0, 3]], atol=1e-12)
+    np.testing.assert_allclose(first[:, :, 1:], 0.0, atol=1e-12)
+    for swung in (0.5 * STEP, STEP, np.inf):
+        last, _ = offsets(swung)
+        np.testing.assert_allclose(last[[0, 3], :2, 0], spread[[0, 3]], atol=1e-12)
+        np.testing.assert_allclose(last[:, :, 1:], 0.0, atol=1e-9)
+    assert not last[[1, 2]].any(), "the other pair's"
+
+
+def test_their_velocities_are_the_derivatives_of_their_places():
+    h = 1e-5
+    for swung in (0.02, 0.07, 0.13):
+        before, now, after = (offsets(swung + dt)[0] for dt in (-h, 0.0, h))
+        for order in (0, 1):
+            slope = (after[:, :, order] - before[:, :, order]) / (2.0 * h)
+            np.testing.assert_allclose(now[:, :, order + 1], slope, atol=1e-5)
+
+
+def test_their_places_turn_with_the_trunk():
+    angle = 0.3
+    turned, spread = offsets(STEP, angle)
+    c, s = np.cos(angle), np.sin(angle)
+    np.testing.assert_allclose(turned[0, :2, 0], spread[0] @ [[c, s], [-s, c]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("robot", "kind"),
+    [
+        (RobotSpec("go2", free=True), TrotOptions),
+        (RobotSpec("bolt", free=True), FreeOptions),
+        (RobotSpec("bolt"), EmbeddingOptions),
+    ],
+)
+def test_each_kind_of_robot_has_its_own_tuning(robot, kind, tmp_path):
+    experiment = Experiment(robot)
+    assert type(experiment.tuning) is kind
+    assert type(default_options(robot.load())) is kind
+    assert type(experiment.with_({"robot.gravity": 1.62}).tuning) is kind
+    saved = experiment.save(tmp_path / "run.toml")
+    assert Experiment.load(saved) == experiment.resolved()
+
+
+def test_another_robot_takes_another_tuning():
+    experiment = Experiment(RobotSpec("bolt", free=True)).resolved()
+    assert type(experiment.with_({"robot.model": "go2"}).tuning) is TrotOptions
+    own = replace(experiment, robot=load_robot("five-link"), controller=None)
+    assert type(own.tuning) is EmbeddingOptions
