@@ -54,8 +54,9 @@ _BOLT_ACTUATOR = JointLimits(
     ranges=((-1.0, 1.0), (-1.9, 1.9), (-3.4, 3.4)),
 )
 
-# Solo12 has the same modules; ranges: those of its file there (config_solo12.yaml).
-_SOLO_ACTUATOR = replace(_BOLT_ACTUATOR, ranges=((-0.9, 0.9), (-1.45, 1.45), (-2.8, 2.8)))
+# Solo12 has the same modules; ranges: those of its file there (config_solo12.yaml), but that knees
+# bend behind only, as Go2's. Ahead, its running trot became faster from step to step.
+_SOLO_ACTUATOR = replace(_BOLT_ACTUATOR, ranges=((-0.9, 0.9), (-1.45, 1.45), (-2.8, 0.0)))
 
 _CORNERS = ("FL", "FR", "RL", "RR")  # as Unitree names the legs of a quadruped
 
