@@ -248,7 +248,7 @@ class BulletPlant:
             v[i] = state[1]
 
     def contact_forces(self, out: Array) -> None:
-        """Write the ground's force on each foot (2, 2) [N], x and y, into ``out``.
+        """Write the ground's force on each contact (n, d) [N], x first and up last, into ``out``.
 
         Averages over the last physics step: the first sample of a touchdown is an impulse
         divided by that step.

@@ -51,10 +51,11 @@ class Plant(Protocol):
         """
 
     def contact_forces(self, out: Array) -> None:
-        """Write the ground's mean force on each foot during the last step into ``out``.
+        """Write the ground's mean force on each contact during the last step into ``out``.
 
         Args:
-            out: (2, 2) overwritten with x and y of each foot's force [N].
+            out: (n, 2) overwritten with x and y of each contact's force, in the order of the
+                robot's ``feet`` [N]; (n, 3) with x, y and z of a floating-base robot's.
         """
 
     def trunk_touches_ground(self) -> bool:
