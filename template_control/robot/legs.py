@@ -13,9 +13,8 @@ from math import atan2, cos, hypot, pi, sqrt
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from template_control.arrays import Array
 
 HINGES = 2  # hip and knee, the last joints of a leg
 _CENTRE = " sphere's centre"  # ends a frame's name

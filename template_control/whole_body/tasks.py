@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative
 from template_control.compiled import compiled
@@ -30,8 +30,6 @@ from template_control.slip.similarity import (
     tuned,
 )
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT, References, Rows
-
-Array = NDArray[np.float64]
 
 _PITCH = 2  # place of a planar robot's pitch in q
 _SIDE = 1  # y of a floating-base robot's feet, to the left

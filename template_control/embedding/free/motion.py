@@ -12,8 +12,8 @@ from math import atan2, cos, inf, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.embedding.free.lateral import (
     BEYOND,
     SIDES,
@@ -37,8 +37,6 @@ from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
 from template_control.whole_body.task import References
-
-Array = NDArray[np.float64]
 
 _SIDE = 1  # y, to the left
 TURN_RAMP = 0.15  # change of a run's turning rate [rad/s^2, of the reference template]

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from template_control import storage
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -30,8 +30,6 @@ from template_control.slip.maps.section import APEX, PADDED, VLO, section_of
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import MOST_STRIDES, Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
-
-Array = NDArray[np.float64]
 
 FORMAT = "template-control scenario 2"
 _LAYOUT = storage.Layout(
@@ -87,11 +85,11 @@ class ScenarioRecord:
 
     time: Array
     state: Array
-    node: NDArray[np.int64]
+    node: IntArray
     toes: Array
     stiffness: Array
     foothold: Array
-    stride: NDArray[np.int64]
+    stride: IntArray
     section_time: Array
     section_state: Array
     wanted_speed: Array
@@ -99,7 +97,7 @@ class ScenarioRecord:
     predicted: Array
     controls: Array
     residual: Array
-    reached: NDArray[np.bool_]
+    reached: BoolArray
     solve_seconds: Array
     metadata: dict[str, Any]
 

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.view.style import interval
-
-Array = NDArray[np.float64]
 
 _ZIGZAGS = 12
 _CARRYING = 0.005  # of the weight: what the plant counts as a contact
@@ -35,7 +33,7 @@ class Playback:
     """
 
     record: Record
-    rows: NDArray[np.int64]
+    rows: IntArray
     clock: Array
 
 
@@ -72,7 +70,7 @@ def playback(
     return Playback(record, np.searchsorted(middles, moments), clock)
 
 
-def carrying(record: Record) -> NDArray[np.bool_]:
+def carrying(record: Record) -> BoolArray:
     """(T, n) whether the ground carries each foot."""
     return np.asarray(record.contact_force[:, :, 1] > _CARRYING * record.weight)
 
@@ -87,7 +85,7 @@ def stances(record: Record) -> list[list[tuple[int, int]]]:
     return found
 
 
-def pushing(record: Record) -> NDArray[np.bool_]:
+def pushing(record: Record) -> BoolArray:
     """(T, 2) whether the template's rear and its front leg push."""
     return np.asarray(np.linalg.norm(record.template_force, axis=2) > _CARRYING * record.weight)
 
