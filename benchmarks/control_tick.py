@@ -100,7 +100,7 @@ def _free() -> Start:
     planner = _free_planner(backend.robot)
     route = SteadyRoute.of(planner.gait)
     controller = backend.controller(planner, FreeOptions(), route, AUTOMATON)
-    return Start(controller, *backend.start(controller, Experiment()))
+    return Start(controller, *backend.start(controller, Experiment(backend.robot).prepare()))
 
 
 GAITS: dict[str, tuple[Callable[[], Start], Callable[[Biped], Planner]]] = {

@@ -6,7 +6,8 @@ import math
 from types import EllipsisType
 from typing import Annotated, NamedTuple
 
-from template_control.arrays import Array
+import numpy as np
+from numpy.typing import NDArray
 
 
 class Range(NamedTuple):
@@ -85,6 +86,7 @@ class Rising(NamedTuple):
     """Two numbers, the second greater than the first."""
 
 
+Array = NDArray[np.float64]
 Positive = Annotated[float, Range(0.0, above=True)]
 NotNegative = Annotated[float, Range(0.0)]
 Share = Annotated[float, Range(0.0, 1.0)]

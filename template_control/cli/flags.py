@@ -392,6 +392,12 @@ COURSE = (
         _turns,
     ),
     Flag(
+        "--side-speed",
+        "course.side_speed",
+        "speed of a floating-base robot to the left",
+        {"type": number(Range(-5.0, 5.0)), "metavar": "M/S"},
+    ),
+    Flag(
         "--step-width",
         "course.step_width",
         "lateral distance between a floating-base robot's left and right footholds; 0.22 l0 if not"

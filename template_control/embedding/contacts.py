@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
 from template_control.robot.biped import SINGLE
 from template_control.robot.terms import LEGS, MOST_CONTACTS
 from template_control.slip.similarity import TIME, tuned
+
+Array = NDArray[np.float64]
 
 EARLY = 0.015
 """A touchdown is due from this long before its time on the path [s, of the reference template].
@@ -78,7 +80,7 @@ NO_FORCE: Array = np.zeros((0, 0))
 
 
 @compiled
-def update_contacts(c: Any, flags: BoolArray, force: Array, dt: float) -> None:
+def update_contacts(c: Any, flags: NDArray[np.bool_], force: Array, dt: float) -> None:
     """Take in the flags of a tick.
 
     ``c``, of ``CONTACTS``, is overwritten but for ``expected``. ``flags`` (n,) say whether each
@@ -127,7 +129,7 @@ class ContactMonitor:
         for foot, group in enumerate(groups):
             now["foot"][list(group)] = foot
         now["least"], now["doubt"], now["linger"] = _FORCE * weight, options.doubt, options.linger
-        self.standing: BoolArray = self.data["standing"][0].view(bool)
+        self.standing: NDArray[np.bool_] = self.data["standing"][0].view(bool)
         self.begin()
 
     def begin(self) -> None:
@@ -141,7 +143,7 @@ class ContactMonitor:
 
     def update(
         self,
-        flags: BoolArray,
+        flags: NDArray[np.bool_],
         force: Array | None,
         expected: Sequence[bool | None],
         dt: float,

@@ -12,8 +12,8 @@ from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import checked
 from template_control.embedding.contacts import EARLY, NO_FORCE, SETTLING, SINKING, ContactMonitor
 from template_control.embedding.free.motion import LateralMotion
@@ -60,6 +60,8 @@ from template_control.warm_up import ready
 from template_control.whole_body.problem import solve_free
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.task import References
+
+Array = NDArray[np.float64]
 
 
 class EmbeddingController:
@@ -214,7 +216,7 @@ class EmbeddingController:
         self.learners.lean.reset()
         self.frame.reset()
         if self.lateral is not None:
-            self.lateral.begin(planner.gait)
+            self.lateral.begin(planner.gait, in_flight=not node.stance)
         self._enter(node.name)
         self.feet.begin(rear)
         half = 0.5 * planner.gait.step_duration
@@ -238,7 +240,7 @@ class EmbeddingController:
         self,
         q: Array,
         v: Array,
-        contact: BoolArray,
+        contact: NDArray[np.bool_],
         dt: float,
         force: Array | None = None,
     ) -> Solution:
@@ -266,7 +268,7 @@ class EmbeddingController:
             feel_in_space(self._tick, robot.data, self.qp.data, force, robot.axes, dt)
         return solution
 
-    def _sense(self, contact: BoolArray, force: Array | None, dt: float) -> bool:
+    def _sense(self, contact: NDArray[np.bool_], force: Array | None, dt: float) -> bool:
         """Take in what was measured; whether there is anything to decide."""
         felt = NO_FORCE if force is None or self.lateral is not None else force
         if self.frame.angle != 0.0:

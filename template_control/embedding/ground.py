@@ -13,13 +13,16 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.state import StateObserver
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
+
+Array = NDArray[np.float64]
+
 
 # Footholds that the slope's estimate looks back to. More of them make it slower on a slope that
 # begins, and surer where each foothold is a little off.

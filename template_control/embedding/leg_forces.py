@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.compiled import compiled
+
+Array = NDArray[np.float64]
+
 
 # Largest normal force of a foot that is about to lift off, over the template's. It is over 1, as
 # the robot's forces are not exactly the template's.

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, BoolArray
 from template_control.compiled import compiled
 from template_control.embedding.planners.planner import Decision
 from template_control.embedding.swing import Feet
@@ -18,6 +18,8 @@ from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import StrideGoal
 from template_control.structured import Number
+
+Array = NDArray[np.float64]
 
 
 @compiled
@@ -120,7 +122,7 @@ class TemplateState:
 
     state: Array = field(default_factory=lambda: np.zeros(4))
     toes: Array = field(default_factory=lambda: np.zeros(2))
-    contact: BoolArray = field(default_factory=lambda: np.zeros(2, dtype=bool))
+    contact: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(2, dtype=bool))
     swing_time: Array = field(default_factory=lambda: np.full(2, np.inf))
     feet: tuple[int, int] = (0, 1)
     acceleration: Array = field(default_factory=lambda: np.zeros(2))
@@ -143,7 +145,7 @@ class StateObserver:
         self,
         robot: Biped,
         feet: Feet,
-        contact: BoolArray,
+        contact: NDArray[np.bool_],
         acceleration: Array,
         data: Any = None,
     ) -> None:

@@ -10,8 +10,8 @@ from collections.abc import Set
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.checks.fitting import answered_or_none
 from template_control.embedding.com_path import Landing, TemplatePath, join
 from template_control.embedding.planners.planner import Cause, Decision, Planner, Planners
@@ -32,6 +32,9 @@ from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, StrideGoal
+
+Array = NDArray[np.float64]
+
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
 

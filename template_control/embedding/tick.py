@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, BoolArray
 from template_control.compiled import compiled
 from template_control.embedding.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
@@ -47,6 +47,8 @@ from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.problem import solve_free
 from template_control.whole_body.tasks import write_rows
+
+Array = NDArray[np.float64]
 
 _F, _I = np.float64, np.int64
 
@@ -107,7 +109,7 @@ def sense(
     data: Any,
     references: Any,
     qp: Any,
-    contact: BoolArray,
+    contact: NDArray[np.bool_],
     force: Array,
     dt: float,
 ) -> int:

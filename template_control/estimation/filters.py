@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import FLOATING_DOF
 from template_control.slip.similarity import LENGTH, RATE_SQUARED, SPEED, TIME, tuned
+
+Array = NDArray[np.float64]
 
 _X, _PITCH, _V = slice(0, 2), 2, slice(3, 5)
 _SIZE = 5 + 2 * 2
@@ -145,7 +147,7 @@ class BaseFilter:
         noise[5:] = o.creep**2 * dt
         self._covariance = flow @ self._covariance @ flow.T + np.diag(noise)
 
-    def correct(self, joints: Array, contact: BoolArray) -> None:
+    def correct(self, joints: Array, contact: NDArray[np.bool_]) -> None:
         """Correct the estimate with the joints' angles (nu,) [rad] of the feet in contact (2,)."""
         q = np.concatenate((self.state[:3], joints))
         robot = self.robot
@@ -228,7 +230,7 @@ class NoiseFilter:
         self,
         measured: tuple[Array, Array],
         acceleration: Array,
-        contact: BoolArray,
+        contact: NDArray[np.bool_],
         dt: float,
     ) -> tuple[Array, Array]:
         """Update the estimate with one tick's measurement; the first one sets it.

@@ -16,8 +16,8 @@ from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import DivergedError
@@ -27,6 +27,8 @@ from template_control.plant.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.spec import RobotSpec
 from template_control.robot.terms import PLANAR_DOF
+
+Array = NDArray[np.float64]
 
 _DEPTH = 1e-8  # [m] a foot this deep in the ground has touched down
 _HALVINGS = 24  # of a time step, to locate an event in
@@ -293,7 +295,7 @@ class IdealPlant:
             for i in range(2)
         )
 
-    def _land(self, feet: BoolArray) -> None:
+    def _land(self, feet: NDArray[np.bool_]) -> None:
         """Plastic impact of ``feet`` (2,) with the ground; the other one may be released."""
         landing = tuple(i for i in range(2) if feet[i] and i not in self.contacts)
         if not landing:

@@ -12,9 +12,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from template_control.arrays import Array
 from template_control.plant.agreement import trunk_corners
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.terrain import pieces
@@ -23,6 +22,8 @@ from template_control.robot.legs import foot_frame
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import UNLIMITED
 from template_control.robot.terms import PLANAR_DOF
+
+Array = NDArray[np.float64]
 
 FOOT = "foot"
 TRUNK = "trunk"

@@ -7,8 +7,8 @@ from importlib.util import find_spec
 from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, PlantOptions
@@ -16,6 +16,8 @@ from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
+
+Array = NDArray[np.float64]
 
 
 @runtime_checkable

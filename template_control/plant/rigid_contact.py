@@ -20,12 +20,14 @@ from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.plant.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.whole_body.elimination import cholesky, solve_cholesky
+
+Array = NDArray[np.float64]
 
 _ROUNDING = 1e-9  # relative: forces and accelerations this small have no sign
 

@@ -9,14 +9,16 @@ from typing import Self
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.robot.legs import HINGES, foot_frame, leg_joints, middle, straight_legs
 from template_control.robot.requirements import add_feet, check_size
 from template_control.robot.robot import WORLD_ALIGNED, Robot
 from template_control.robot.terms import UP, sources
 from template_control.robot.urdf import with_masses
 from template_control.structured import Number
+
+Array = NDArray[np.float64]
 
 SINGLE = ((0,), (1,))
 """Groups of a biped with point feet: each contact is a foot."""

@@ -13,8 +13,9 @@ from math import atan2, cos, hypot, pi, sqrt
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
+Array = NDArray[np.float64]
 
 HINGES = 2  # hip and knee, the last joints of a leg
 _CENTRE = " sphere's centre"  # ends a frame's name

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.errors import RobotError
 from template_control.robot.legs import (
     HINGES,
@@ -19,6 +19,8 @@ from template_control.robot.legs import (
     straight_legs,
 )
 from template_control.robot.terms import FLOATING_DOF, LEGS, PLANAR_DOF
+
+Array = NDArray[np.float64]
 
 UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 _CLOSE = 1e-4  # [m]

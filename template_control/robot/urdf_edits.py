@@ -13,8 +13,8 @@ from urllib.parse import unquote
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.errors import RobotError
 from template_control.robot.urdf import (
     MOMENTS,
@@ -25,6 +25,8 @@ from template_control.robot.urdf import (
     strip_motion,
     why_impossible,
 )
+
+Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 _PACKAGE = ("package://", "model://")  # what the name of a package's mesh begins with

@@ -17,3 +17,5 @@ from .specs import OwnPlanner as OwnPlanner
 from .statistics import Statistics as Statistics
 from .summary import summarise as summarise
 from .tables import columns as columns
+from .velocity import VelocityCommand as VelocityCommand
+from .velocity import VelocityProfile as VelocityProfile

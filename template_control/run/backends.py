@@ -7,9 +7,8 @@ from contextlib import AbstractContextManager, nullcontext
 from math import atan2, cos, degrees, sin
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from template_control.arrays import Array
 from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.lateral import SIDES, LateralPlanner
@@ -36,7 +35,7 @@ from template_control.robot.start import (
     state_at_vlo,
     state_in,
 )
-from template_control.run.experiment import Experiment
+from template_control.run.experiment import Experiment, PreparedExperiment
 from template_control.run.sensing import (
     FilteredSensors,
     ForeseeingSensors,
@@ -49,6 +48,8 @@ from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.maps.section import APEX, REST, VLO
 from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import Scale
+
+Array = NDArray[np.float64]
 
 
 class RobotBackend(ABC):
@@ -65,7 +66,7 @@ class RobotBackend(ABC):
         """The robot's controller, with planners for each kind of stride of the route."""
 
     @abstractmethod
-    def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
+    def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """Start the controller where the run begins; (q, v) there.
 
         A ParameterError if it is not clear where the feet are.
@@ -105,7 +106,7 @@ class PlanarBackend(RobotBackend):
             )
         return EmbeddingController(self.robot, planners, options, route, automaton)
 
-    def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
+    def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns."""
         robot, route, pose = self.robot, controller.supervisor.route, o.pose
         first = planner, node = controller.supervisor.begin(route.section)
@@ -190,7 +191,7 @@ class FloatingBackend(RobotBackend):
             )
         return EmbeddingController(self.robot, planners, options, route, automaton)
 
-    def start(self, controller: EmbeddingController, o: Experiment) -> tuple[Array, Array]:
+    def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`: at VLO or an apex, in the sideways motion of the gait.
 
         A ParameterError if the run begins elsewhere, or the options have a planar pose.
@@ -204,13 +205,15 @@ class FloatingBackend(RobotBackend):
         z = route.start if o.start is None else np.array(o.start)
         first = controller.supervisor.begin(route.section)
         planner = first[0]
-        lateral, course = motion.planner, o.course
+        lateral = motion.planner
+        side_speed, rate = o.heading(0.0)
         lateral.wish = LateralWish(
-            course.step_width or lateral.wish.width,
+            o.course.step_width or lateral.wish.width,
+            aside=side_speed * planner.gait.step_duration,
             # A run leans into its turns by and by.
-            turn=course.rate(0.0) * planner.gait.step_duration if route.section == VLO else 0.0,
+            turn=rate * planner.gait.step_duration if route.section == VLO else 0.0,
         )
-        motion.turning = course.rate
+        motion.command = o.heading
         lateral.reset(planner.gait)
         width = lateral.wish.width
         if route.section == APEX:

@@ -19,6 +19,7 @@ from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
 from template_control.embedding.free.trot import TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
+    FREE_AHEAD,
     AheadOptions,
     AheadPlanner,
     check_feasibility,
@@ -30,7 +31,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_route import robot_route
-from template_control.embedding.robot_template import check_apex
+from template_control.embedding.robot_template import check_apex, template_for
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import PlantOptions
@@ -44,13 +45,14 @@ from template_control.robot.start import Pose
 from template_control.run.options import FallOptions, HeadingCommand, Push, check_pushes
 from template_control.run.sensing import SensorOptions
 from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
+from template_control.run.velocity import VelocityCommand, VelocityProfile
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.gait import Gait, WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.slip.gaits.walking_by_speed import walking_gait
-from template_control.slip.scenario.route import Route
+from template_control.slip.scenario.route import Route, SpeedRoute
 from template_control.slip.scenario.scenario import STAND_HEIGHT, Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.warm_up import ready
@@ -71,9 +73,9 @@ class Experiment(Checked):
 
     Attributes:
         robot: a shipped robot's name or a URDF's path; or its options; or the model.
-        motion: a gait to keep, or a scenario, which is put on the robot's template, or a route;
-            None: the gait of the planner, or the robot's own walk. A walk breaks into another
-            stride where it cannot go on, and walks again
+        motion: a gait to keep, or a scenario, which is put on the robot's template, or a route, or
+            velocities of a floating-base robot; None: the gait of the planner, or the robot's own
+            walk. A walk breaks into another stride where it cannot go on, and walks again
             (:class:`~template_control.embedding.recovery.Recovery`).
         planner: its options; or a planner; or one for each kind of stride of a route. None: ahead
             where a planar robot has a scenario that walks only, deadbeat for a run, else lqr, tuned
@@ -108,7 +110,7 @@ class Experiment(Checked):
     """
 
     robot: RobotSpec | Biped | str = field(default_factory=RobotSpec)
-    motion: GaitSpec | Scenario | Gait | Route | None = None
+    motion: GaitSpec | Scenario | VelocityProfile | VelocityCommand | Gait | Route | None = None
     planner: PlannerSpec | Planner | Planners | None = None
     controller: EmbeddingOptions | FreeOptions | TrotOptions | None = None
     world: PlantOptions | MujocoOptions | IdealOptions | Plant = field(
@@ -180,7 +182,7 @@ class Experiment(Checked):
         motion, planner = self.motion, self.planner
         if motion is None and (planner is None or isinstance(planner, _SPECS)):
             motion = GaitSpec()
-        if planner is None and not isinstance(motion, Route):
+        if planner is None and not isinstance(motion, Route | VelocityProfile | VelocityCommand):
             planner = self._default_planner(motion)
         return replace(self, motion=motion, planner=planner, controller=self.tuning)
 
@@ -234,7 +236,9 @@ class Experiment(Checked):
         if not e.free:
             _check_plane(robot, e)
         ready(WALK)  # before the gait is looked for, which would compile a part of it alone
-        motion, steps = e.motion, e.steps
+        motion, steps, velocity = e.motion, e.steps, None
+        if isinstance(motion, VelocityProfile | VelocityCommand):
+            velocity, motion = motion, _velocity_route(robot, motion, e.course)
         if isinstance(motion, GaitSpec):
             gait = _gait(motion, robot, e.tuning.torque_scale)
             if motion.from_stand or motion.to_stand:
@@ -255,7 +259,8 @@ class Experiment(Checked):
             _check_strictly(found, planner)
         same = {f.name: getattr(e, f.name) for f in fields(e)}
         new = {"robot": robot, "motion": found, "planner": planner, "start": start, "steps": steps}
-        return PreparedExperiment(**{**same, **new, "seed": None, "strict": False})
+        rest = {"seed": None, "strict": False, "velocity": velocity}
+        return PreparedExperiment(**{**same, **new, **rest})
 
     def _kept(self, motion: Gait | None) -> tuple[Gait, Planner]:
         """The gait that is kept, and its planner."""
@@ -276,6 +281,8 @@ class Experiment(Checked):
         if isinstance(motion, Scenario):
             push_off = None if isinstance(planner, Mapping) else _pushes_off(planner)
             motion = robot_route(robot, motion, push_off)
+        if planner is None and self.free and isinstance(motion, SpeedRoute):
+            planner = FREE_AHEAD
         if planner is None:
             return motion, default_planners(motion)
         if isinstance(planner, Mapping):
@@ -316,15 +323,27 @@ class PreparedExperiment(Experiment):
         robot: the model; its last update is overwritten by a run.
         motion: the gait that is kept, or the route.
         planner: of this gait, or of each kind of stride of this route.
+        velocity: what the route's speed is of; None: the course is the experiment's.
     """
 
     robot: Biped
     motion: Gait | Route
     planner: Planner | Planners
+    velocity: VelocityProfile | VelocityCommand | None = None
 
     def prepare(self) -> PreparedExperiment:
         """Itself."""
         return self
+
+    def heading(self, time: float) -> tuple[float, float]:
+        """Speed to the left [m/s] and turning rate [rad/s] of a floating-base robot at a time.
+
+        Args:
+            time: from the run's start [s].
+        """
+        if self.velocity is None:
+            return self.course.side_speed, self.course.rate(time)
+        return self.velocity.at(time)[1:]
 
     @property
     def planners(self) -> Planners:
@@ -376,6 +395,8 @@ def _gait(spec: GaitSpec, robot: Biped, torque_scale: float) -> WalkingGait | Ru
 def _check_plane(robot: Biped, e: Experiment) -> None:
     """Refuse what only a floating-base robot can have."""
     had = "has no course" if e.course != HeadingCommand() else ""
+    if isinstance(e.motion, VelocityProfile | VelocityCommand):
+        had = "has no velocity to the left"
     if any(push.direction for push in e.pushes):
         had = "a push has a direction"
     if had:
@@ -383,6 +404,19 @@ def _check_plane(robot: Biped, e: Experiment) -> None:
             f"{robot.name} is held in its plane, and {had}: leave it out, or take a floating-base"
             " robot"
         )
+
+
+def _velocity_route(
+    robot: Biped, velocity: VelocityProfile | VelocityCommand, course: HeadingCommand
+) -> Route:
+    """Walk at the forward speeds of a velocity command."""
+    if course.turning_rate or course.turns or course.side_speed:
+        raise ParameterError("a course does not go with velocities, which turn: leave one out")
+    return SpeedRoute(
+        template_for(robot),
+        lambda time: velocity.at(time)[0],
+        getattr(velocity, "duration", None),
+    )
 
 
 def _with_stands(spec: GaitSpec, gait: WalkingGait | RunningGait, e: Experiment) -> Scenario:

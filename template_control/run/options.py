@@ -71,20 +71,23 @@ def check_pushes(pushes: tuple[Push, ...], steps: int) -> None:
 
 
 TurningRate = Annotated[float, Range(-2.0, 2.0)]
+SideSpeed = Annotated[float, Range(-5.0, 5.0)]
 
 
 @dataclass(frozen=True)
 class HeadingCommand(Checked):
-    """Heading and step width of a free robot.
+    """Heading, lateral speed and step width of a floating-base robot.
 
     Attributes:
         turning_rate: of the heading, to the left positive [rad/s].
+        side_speed: of the walk, to the left positive [m/s].
         turns: times [s] and the turning rate [rad/s] from each of them on; the times rise.
         step_width: lateral distance between left and right footholds [m]; None: the one of the
             embedding's options, by the robot's size.
     """
 
     turning_rate: TurningRate = 0.0
+    side_speed: SideSpeed = 0.0
     step_width: Positive | None = None
     turns: tuple[tuple[NotNegative, TurningRate], ...] = ()
 

@@ -11,8 +11,8 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
@@ -38,6 +38,8 @@ from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.warm_up import ready
+
+Array = NDArray[np.float64]
 
 _LOCK = Lock()
 _TAKEN: set[int] = set()

@@ -15,10 +15,12 @@ from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
 from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.slip.automaton.hybrid import Automaton, Edge
 from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, StrideKind
+
+Array = NDArray[np.float64]
 
 PAD = 1.2
 """Space about the centres of a gait's nodes, in drawing units."""

@@ -11,8 +11,8 @@ from typing import Any, Literal
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count
 from template_control.errors import ParameterError
@@ -46,6 +46,7 @@ from template_control.view.style import (
     upward,
 )
 
+Array = NDArray[np.float64]
 Draw = Callable[[Any, Look], Figure]
 
 _LOOK = Look()

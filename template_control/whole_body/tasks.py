@@ -8,12 +8,12 @@ is :class:`~template_control.robot.terms.Jacobians` as a plain tuple, ``want`` i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative
 from template_control.compiled import compiled
@@ -30,6 +30,8 @@ from template_control.slip.similarity import (
     tuned,
 )
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT, References, Rows
+
+Array = NDArray[np.float64]
 
 _PITCH = 2  # place of a planar robot's pitch in q
 _SIDE = 1  # y of a floating-base robot's feet, to the left
@@ -184,7 +186,8 @@ class FootTask(CompiledTask):
     """
 
     leg: Leg = Leg.FRONT
-    contact: Index = field(default=0, kw_only=True)
+    _: KW_ONLY
+    contact: Index = tuned(0)
     weight: tuple[NotNegative, NotNegative] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
     gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
     hold_gains: tuple[NotNegative, NotNegative] = tuned((1e4, 200.0), RATE_SQUARED, RATE)
@@ -403,7 +406,8 @@ class SideFootTask(CompiledTask):
     """
 
     leg: Leg = Leg.FRONT
-    contact: Index = field(default=0, kw_only=True)
+    _: KW_ONLY
+    contact: Index = tuned(0)
     weight: NotNegative = tuned(1.0, PER_ACCELERATION_SQUARED)
     gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
 

@@ -37,7 +37,6 @@ SLIP_STAGES = (
     ("lateral", "scenario"),
 )
 SHARED = (
-    "arrays",
     "checks",
     "compiled",
     "deprecated",

@@ -12,8 +12,8 @@ from math import atan2, cos, inf, sin
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.embedding.free.lateral import (
     BEYOND,
     SIDES,
@@ -38,8 +38,12 @@ from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
 from template_control.whole_body.task import References
 
+Array = NDArray[np.float64]
+
 _SIDE = 1  # y, to the left
-TURN_RAMP = 0.15  # change of a run's turning rate [rad/s^2, of the reference template]
+SIDE_RAMP = 0.05  # change of the speed to the left [m/s^2]
+TURN_RAMP = 0.1  # change of a walk's turning rate [rad/s^2, of the reference template]
+RUN_RAMP = 0.15  # and of a run's, which leans into its turns
 BANK_RATE = 0.2  # of the roll into a turn's curve [rad/s, of the reference template]
 
 
@@ -48,8 +52,9 @@ class LateralMotion:
 
     ``robot`` is the nominal model, which every tick updates; ``side`` of ``references`` is kept
     here. A foothold that is wanted further than ``reach`` [m] beyond its bounds is out of reach.
-    ``turning`` is the rate of the heading by time [rad/s]; a run changes its own by ``ramp``
-    [rad/s^2].
+    ``command`` is the speed to the left [m/s] and the rate of the heading [rad/s] by time. They are
+    followed by ``ramps``: of that speed [m/s^2], and of a walk's and of a run's turning rate
+    [rad/s^2]. A jump would move the periodic motion further than one step reaches.
     """
 
     def __init__(
@@ -59,14 +64,14 @@ class LateralMotion:
         feet: Feet,
         references: References,
         reach: float,
-        ramp: float,
+        ramps: tuple[float, float, float],
     ) -> None:
         self.robot, self.planner = robot, planner
         self._feet, self._references, self._reach = feet, references, reach
         self._stood: Array = planner.data["stood"][0]
-        self._rate = 0.0  # of the heading [rad/s]
-        self._ramp = ramp
-        self.turning: Callable[[float], float] = lambda time: 0.0
+        self._now: Array = np.zeros(2)  # speed to the left [m/s], rate of the heading [rad/s]
+        self._ramps = ramps
+        self.command: Callable[[float], tuple[float, float]] = lambda time: (0.0, 0.0)
 
     @classmethod
     def of(
@@ -87,12 +92,18 @@ class LateralMotion:
         wish = LateralWish(scaled(options, scale).step_width)
         planner = LateralPlanner(parameters, options.lateral, wish, data)
         data["bank_rate"] = BANK_RATE / scale.time
-        reach, ramp = BEYOND * scale.length, TURN_RAMP / scale.time**2
-        return cls(robot, planner, feet, references, reach, ramp)
+        turns = TURN_RAMP / scale.time**2, RUN_RAMP / scale.time**2
+        ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
+        return cls(robot, planner, feet, references, BEYOND * scale.length, ramps)
 
-    def begin(self, gait: Gait) -> None:
-        """Begin a run with the gait of its first stride; nothing is learnt yet."""
-        self._rate = 0.0
+    def begin(self, gait: Gait, in_flight: bool) -> None:
+        """Begin a run with the gait of its first stride; nothing is learnt yet.
+
+        It turns at once, unless it begins in flight.
+        """
+        self._now[:] = self.command(0.0)
+        if in_flight:
+            self._now[1] = 0.0
         self.planner.reset(gait)
         for foot in range(2):
             self._stands(foot)
@@ -166,12 +177,11 @@ class LateralMotion:
         robot is in then.
         """
         planner, gait = self.planner, supervisor.planner.gait
-        rate, duration = self.turning(time), gait.step_duration
-        if not node.stance:
-            most = self._ramp * duration
-            rate = min(max(rate, self._rate - most), self._rate + most)
-        self._rate = rate
-        planner.wish = replace(planner.wish, turn=rate * duration)
+        side_ramp, walk_ramp, run_ramp = self._ramps
+        most = gait.step_duration * np.array([side_ramp, walk_ramp if node.stance else run_ramp])
+        self._now += np.clip(self.command(time) - self._now, -most, most)
+        aside, turn = (gait.step_duration * self._now).tolist()
+        planner.wish = replace(planner.wish, aside=aside, turn=turn)
         planner.walk(gait)
         planner.aim(SIDES[self._feet.landed])
         z, target = section.of(sensed.state), supervisor.goal.target

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.robot.terms import MOST_CONTACTS
 from template_control.slip.similarity import TIME, Scale, tuned
 from template_control.structured import Number
+
+Array = NDArray[np.float64]
+
 
 # A foot on the ground that moves faster along it slides [m/s, of the reference template]. Speeds
 # of a foot that stands are noise; 0.5 mrad of it is about 0.02 m/s there, which never stays this
@@ -151,6 +153,6 @@ class FrictionEstimate:
             now[name] = getattr(options, name)
         now["coefficient"] = before
 
-    def update(self, standing: BoolArray, force: Array, speed: Array, dt: float) -> bool:
+    def update(self, standing: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
         """As :func:`feel_slides`."""
         return bool(feel_slides(self.data[0], standing.view(np.uint8), force, speed, dt))

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive, Range
 from template_control.embedding.planners.gait_table import (
@@ -47,6 +47,8 @@ from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 from template_control.warm_up import Part, ready
 
+Array = NDArray[np.float64]
+
 MOST_STEPS = 6
 """That a plan may look ahead."""
 RISE = (0.13, 0.01)
@@ -72,7 +74,9 @@ class AheadOptions(Checked):
             plan led on; with four it gets faster no sooner.
         pace: largest difference between the aimed speed and the present one. A few steps do not
             lead to a gait that is further away.
-        cheap: cost up to which a plan is taken.
+        cheap: cost of limits and of the last state up to which a plan is taken.
+        ease: tolerances of the controls, over the usual ones.
+        dearest: cost in all up to which a plan is taken; None: whatever it is.
     """
 
     kind: ClassVar[str] = "ahead"
@@ -80,6 +84,12 @@ class AheadOptions(Checked):
     steps: Annotated[int, Range(1, MOST_STEPS)] = tuned(3)
     pace: Positive = tuned(0.3, SPEED)
     cheap: Positive = tuned(20.0)
+    ease: Positive = tuned(1.0)
+    dearest: Positive | None = None
+
+
+FREE_AHEAD = AheadOptions(ease=0.5, dearest=20.0)
+"""Of a floating base: the sideways motion is that of steps near a gait."""
 
 
 class AheadPlanner(Planner):
@@ -115,7 +125,7 @@ class AheadPlanner(Planner):
         self._spacing = SPACING * scale.speed
         self.parameters = parameters
         self.table: GaitTable = gait_table(parameters)
-        self._problem = plan_problem(parameters, self.table)
+        self._problem = plan_problem(parameters, self.table, o.ease)
         self._work = new_workspace()
         self._plan = Plan(
             np.empty((o.steps + 1, PADDED)),
@@ -172,7 +182,7 @@ class AheadPlanner(Planner):
         for share in _SHARES:
             speed = present + share * change
             cost, excess = self._look(z, speed, angles)
-            if excess <= self.options.cheap:
+            if excess <= self.options.cheap and cost <= (self.options.dearest or np.inf):
                 return self._decision(speed, wanted, True)
             cheapest = min(cheapest, (cost, speed))
         return self._otherwise(z, wanted, cheapest, angles)
@@ -212,7 +222,7 @@ class AheadPlanner(Planner):
         self.offset = self._lqr.offset
 
 
-def plan_problem(parameters: SlipParameters, table: GaitTable) -> PlanProblem:
+def plan_problem(parameters: SlipParameters, table: GaitTable, ease: float = 1.0) -> PlanProblem:
     """Model and costs of the plans on a template, with the table of its gaits."""
     scale = Scale.of(parameters)
     beyond, tolerance = RISE
@@ -220,6 +230,7 @@ def plan_problem(parameters: SlipParameters, table: GaitTable) -> PlanProblem:
         kernel=stride_kernel(parameters, STRIDE),
         table=table,
         tolerance=STATE_TOLERANCE * scale.state,
+        ease=ease,
         rise=(beyond * scale.speed, tolerance * scale.speed),
         knee_reach=KNEE_STRAIGHT * scale.length,
         knee_moment=KNEE_MOMENT * scale.length * parameters.mass * parameters.gravity,

@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.embedding.planners.gait_table import (
     CONTROL,
@@ -45,6 +45,8 @@ from template_control.slip.maps.return_map import (
 )
 from template_control.whole_body.elimination import cholesky
 
+Array = NDArray[np.float64]
+
 BOUNDS = np.array(
     [[angle, *[share] * 3] for angle, share in zip(ANGLE_RANGE, STIFFNESS_RANGE, strict=True)]
 )
@@ -61,6 +63,7 @@ class PlanProblem(NamedTuple):
         kernel: the step.
         table: gaits by speed.
         tolerance: (3,) differences of the states that cost 1.
+        ease: control tolerances over those of the gaits' table.
         rise: |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s].
         knee_reach: length of the leg at which the knee is straight [m].
         knee_moment: moment of the leg force about the knee that costs nothing [N m].
@@ -71,11 +74,12 @@ class PlanProblem(NamedTuple):
     kernel: Kernel
     table: GaitTable
     tolerance: Array
+    ease: float
     rise: tuple[float, float]
     knee_reach: float
     knee_moment: float
     rounds: int
-    columns: IntArray
+    columns: NDArray[np.int64]
 
 
 class PlanTarget(NamedTuple):
@@ -163,7 +167,7 @@ def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Arr
                     out[row + j] += factor[k, j] * (plan.states[i + 1, k] - target[k])
         for j in range(CONTROLS):
             miss = plan.controls[i, j] - target[STATES + j]
-            out[row + STATES + j] = miss / CONTROL_TOLERANCE[j]
+            out[row + STATES + j] = miss / (p.ease * CONTROL_TOLERANCE[j])
         beyond = abs(plan.states[i + 1, 2]) - p.rise[0]
         out[row + _LIMITS] = max(beyond, 0.0) / p.rise[1]
         for leg in range(_KNEES):
@@ -267,7 +271,7 @@ def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: 
             if beyond:
                 rows[row + _LIMITS, c] = sign * state[2, c] / p.rise[1]
         for c in range(CONTROLS):
-            rows[row + STATES + c, CONTROLS * i + c] = 1.0 / CONTROL_TOLERANCE[c]
+            rows[row + STATES + c, CONTROLS * i + c] = 1.0 / (p.ease * CONTROL_TOLERANCE[c])
         for leg in range(_KNEES):
             moment, by_length, stiff = knee_moment(p, plan, i, leg)
             if moment <= p.knee_moment:

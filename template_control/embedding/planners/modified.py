@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, NotNegative, Positive
@@ -18,6 +19,8 @@ from template_control.slip.gaits.gait import WalkingGait, without_push_off
 from template_control.slip.gaits.walking_by_speed import WalkingFamily
 from template_control.slip.maps.return_map import closed_form
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

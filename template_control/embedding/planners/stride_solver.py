@@ -11,14 +11,16 @@ from operator import gt, lt, sub
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.embedding.planners.planner import EndOfStride
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
 from template_control.whole_body.elimination import cholesky, solve_cholesky
+
+Array = NDArray[np.float64]
 
 _NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
 
@@ -203,7 +205,7 @@ class FromSection:
         return self.step.step(self.z, u)
 
     @cached_property
-    def columns(self) -> IntArray:
+    def columns(self) -> NDArray[np.int64]:
         """Places of the free controls among the map's arguments."""
         return np.array(self.slots) + PADDED
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
@@ -19,6 +18,8 @@ from template_control.slip.dynamics.stride import controls, finite
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO, Section
 from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
 
 _ANGLE, _K_SC, _K_SD = Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD
 _LANDING = (_ANGLE, _K_SC, _K_SD)

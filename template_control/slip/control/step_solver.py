@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import leastsq
 
-from template_control.arrays import Array, IntArray
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 _FAILED = 10.0  # residual of a stride that fails, in each component
 _PENALTY = 10.0  # slope of the penalty on a control (in units of its scale) out of bounds

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Range, Shape
 from template_control.compiled import compiled, inner
@@ -23,6 +22,9 @@ from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.return_map import RESULTS, one_stride
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 _MOST = 100_000  # steps
 _Number = Annotated[int, Range(1, 1000)]
@@ -110,7 +112,7 @@ def _steps(
 @compiled
 def _many(
     kernel: Kernel, z: Array, controls: Array, goal: Array, limit: int, scratch: Scratch
-) -> tuple[IntArray, BoolArray]:
+) -> tuple[IntArray, NDArray[np.bool_]]:
     """:func:`_steps` for every row of ``z``, ``controls`` and ``goal``."""
     steps, converges = np.zeros(z.shape[0], np.int64), np.zeros(z.shape[0], np.bool_)
     result = np.empty(RESULTS)
@@ -135,7 +137,7 @@ class StepsToFall:
     """
 
     steps: IntArray
-    converges: BoolArray
+    converges: NDArray[np.bool_]
     last: Array
 
 

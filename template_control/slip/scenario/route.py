@@ -12,8 +12,8 @@ from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, Speed
@@ -26,6 +26,8 @@ from template_control.slip.gaits.gait import Gait as PeriodicGait
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.section import VLO, Section, section_of
 from template_control.slip.parameters import SlipParameters
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from template_control import storage
-from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -30,6 +30,8 @@ from template_control.slip.maps.section import APEX, PADDED, VLO, section_of
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import MOST_STRIDES, Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
+
+Array = NDArray[np.float64]
 
 FORMAT = "template-control scenario 2"
 _LAYOUT = storage.Layout(
@@ -85,11 +87,11 @@ class ScenarioRecord:
 
     time: Array
     state: Array
-    node: IntArray
+    node: NDArray[np.int64]
     toes: Array
     stiffness: Array
     foothold: Array
-    stride: IntArray
+    stride: NDArray[np.int64]
     section_time: Array
     section_state: Array
     wanted_speed: Array
@@ -97,7 +99,7 @@ class ScenarioRecord:
     predicted: Array
     controls: Array
     residual: Array
-    reached: BoolArray
+    reached: NDArray[np.bool_]
     solve_seconds: Array
     metadata: dict[str, Any]
 

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
-from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.view.style import interval
+
+Array = NDArray[np.float64]
 
 _ZIGZAGS = 12
 _CARRYING = 0.005  # of the weight: what the plant counts as a contact
@@ -33,7 +35,7 @@ class Playback:
     """
 
     record: Record
-    rows: IntArray
+    rows: NDArray[np.int64]
     clock: Array
 
 
@@ -70,7 +72,7 @@ def playback(
     return Playback(record, np.searchsorted(middles, moments), clock)
 
 
-def carrying(record: Record) -> BoolArray:
+def carrying(record: Record) -> NDArray[np.bool_]:
     """(T, n) whether the ground carries each foot."""
     return np.asarray(record.contact_force[:, :, 1] > _CARRYING * record.weight)
 
@@ -85,7 +87,7 @@ def stances(record: Record) -> list[list[tuple[int, int]]]:
     return found
 
 
-def pushing(record: Record) -> BoolArray:
+def pushing(record: Record) -> NDArray[np.bool_]:
     """(T, 2) whether the template's rear and its front leg push."""
     return np.asarray(np.linalg.norm(record.template_force, axis=2) > _CARRYING * record.weight)
 

@@ -110,6 +110,7 @@ def written_and_read(experiment, tmp_path):
         ("--seed 3", "seed", 3),
         ("--turn 0.1 --turn 0.2@3", "course.turns", ((3.0, 0.2),)),
         ("--step-width 0.2", "course.step_width", 0.2),
+        ("--side-speed 0.1", "course.side_speed", 0.1),
         ("--steps 7", "steps", 7),
         ("--record-every 3", "record_every", 3),
     ],
@@ -189,7 +190,10 @@ POSE = {
     "pose.com": [0.0, 0.97], "pose.com_velocity": [1.0, 0.0],
     "pose.feet": [[0.0, 0.0], [0.1, 0.1]], "pose.feet_velocity": [[0.0, 0.0], [2.0, 0.0]],
 }  # fmt: skip
-NEEDS_MORE = ("world.ground_step.", "world.terrain.friction", "planner.path")
+NEEDS_MORE = (
+    "world.ground_step.", "world.terrain.friction", "planner.path", "motion.velocities",
+    "motion.duration",
+)  # fmt: skip
 """Keys of tables that have other keys which must be given with them."""
 
 
