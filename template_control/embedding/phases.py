@@ -104,18 +104,43 @@ _SINGLE_STANCE = PhaseControl(
 # A step from a stand may go back, and nearly rest over its foot: directions give no time.
 _STEPPING = replace(_SINGLE_STANCE, clock=Clock.TIME, follow_curve=True)
 
+
+def running_phases(
+    flight: tuple[Task, ...], stance: PhaseControl, double: PhaseControl
+) -> dict[Phase | str, PhaseControl]:
+    """Entries of a run, and of the strides between walking and running.
+
+    Args:
+        flight: tasks in flight.
+        stance: control of a run's stances.
+        double: control of the double stance that leads into a run.
+    """
+    landed = replace(stance, replan_at_touchdown=True)
+    return {
+        Phase.F: PhaseControl(
+            tasks=flight,
+            swings=(Leg.REAR, Leg.FRONT),
+            clock=Clock.TIME,
+            momentum_speed=False,
+            estimate_load=False,
+            swing=RUNNING_SWING,
+        ),
+        "SS_sc^r": landed,
+        "SS_sd^r": stance,
+        "DS_sc^wr": replace(double, replan_at_touchdown=True),
+        "DS_sd^wr": double,
+        "SS_sc^wr": landed,
+        "SS_sd^wr": stance,
+        "SS_sc^rw": landed,
+        "SS_sd^rw": stance,
+    }
+
+
 PHASES: Phases = {
-    Phase.F: PhaseControl(
-        # The CoM is ballistic, and the trunk can only be turned against the legs.
-        tasks=(PostureTask(0.01), FootTask(Leg.REAR), FootTask(Leg.FRONT)),
-        swings=(Leg.REAR, Leg.FRONT),
-        clock=Clock.TIME,
-        momentum_speed=False,
-        estimate_load=False,
-        swing=RUNNING_SWING,
+    # In flight the CoM is ballistic, and the trunk can only be turned against the legs.
+    **running_phases(
+        (PostureTask(0.01), FootTask(Leg.REAR), FootTask(Leg.FRONT)), _RUNNING_STANCE, _UNTRIMMED
     ),
-    "SS_sc^r": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^r": _RUNNING_STANCE,
     Phase.SS: _SINGLE_STANCE,
     Phase.DS: PhaseControl(
         tasks=(ComTask((1.0, 3.0)), PostureTask()), unload_legs=(Leg.REAR,), trim_momentum=True
@@ -124,12 +149,6 @@ PHASES: Phases = {
     "DS_sc^wp": replace(_UNTRIMMED, rolling_contact=True, use_pre_impact_velocity=True),
     "DS_sd^wp": replace(_UNTRIMMED, rolling_contact=True),
     "SS_bv^wp": replace(_SINGLE_STANCE, rolling_contact=True),
-    "DS_sc^wr": replace(_UNTRIMMED, replan_at_touchdown=True),
-    "DS_sd^wr": _UNTRIMMED,
-    "SS_sc^wr": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^wr": _RUNNING_STANCE,
-    "SS_sc^rw": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^rw": _RUNNING_STANCE,
     "DS_ar^s": _STANDING,
     "DS_br^ws": replace(_STANDING, estimate_load=False),
     "DS_ar^sw": _LIFTING_OFF,

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.phases import RUNNING_SWING, Clock, PhaseControl, Phases
+from template_control.embedding.phases import RUNNING_SWING, PhaseControl, Phases, running_phases
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.swing import SwingOptions
 from template_control.estimation.filters import NoiseFilterOptions
@@ -46,8 +46,8 @@ _RUNNING_STANCE = PhaseControl(
 )
 
 FREE_PHASES: Phases = {
-    Phase.F: PhaseControl(
-        tasks=(
+    **running_phases(
+        (
             OrientationTask((0.01, 0.01, 0.001)),
             FootTask(Leg.REAR),
             SideFootTask(Leg.REAR),
@@ -55,14 +55,9 @@ FREE_PHASES: Phases = {
             SideFootTask(Leg.FRONT),
             SpareJointTask(),
         ),
-        swings=(Leg.REAR, Leg.FRONT),
-        clock=Clock.TIME,
-        momentum_speed=False,
-        estimate_load=False,
-        swing=RUNNING_SWING,
+        _RUNNING_STANCE,
+        _DOUBLE,
     ),
-    "SS_sc^r": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^r": _RUNNING_STANCE,
     Phase.SS: PhaseControl(
         # As in the plane; and the CoM's y is left to the place of the feet.
         tasks=(
@@ -78,12 +73,6 @@ FREE_PHASES: Phases = {
     # A planner with push-off leaves the trim nothing to do.
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,
-    "DS_sc^wr": replace(_DOUBLE, replan_at_touchdown=True),
-    "DS_sd^wr": _DOUBLE,
-    "SS_sc^wr": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^wr": _RUNNING_STANCE,
-    "SS_sc^rw": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^rw": _RUNNING_STANCE,
 }
 """Walking and running. Nodes of other gaits find the entry of their phase."""
 

@@ -15,7 +15,7 @@ from template_control.checks.ranges import NotNegative
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.phases import RUNNING_SWING, Clock, PhaseControl, Phases
+from template_control.embedding.phases import RUNNING_SWING, PhaseControl, Phases, running_phases
 from template_control.robot.biped import Biped
 from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Leg, Phase
@@ -46,26 +46,15 @@ _DOUBLE = PhaseControl(
 )
 
 TROT_PHASES: Phases = {
-    Phase.F: PhaseControl(
-        tasks=(OrientationTask((0.01, 0.01, 0.001)), *_pair(Leg.REAR), *_pair(Leg.FRONT)),
-        swings=(Leg.REAR, Leg.FRONT),
-        clock=Clock.TIME,
-        momentum_speed=False,
-        estimate_load=False,
-        swing=RUNNING_SWING,
+    **running_phases(
+        (OrientationTask((0.01, 0.01, 0.001)), *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+        _RUNNING_STANCE,
+        _DOUBLE,
     ),
-    "SS_sc^r": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^r": _RUNNING_STANCE,
     Phase.SS: _STANCE,
     Phase.DS: replace(_DOUBLE, trim_momentum=True),
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,
-    "DS_sc^wr": replace(_DOUBLE, replan_at_touchdown=True),
-    "DS_sd^wr": _DOUBLE,
-    "SS_sc^wr": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^wr": _RUNNING_STANCE,
-    "SS_sc^rw": replace(_RUNNING_STANCE, replan_at_touchdown=True),
-    "SS_sd^rw": _RUNNING_STANCE,
 }
 """Walking and running trot. Nodes of other gaits find the entry of their phase."""
 
