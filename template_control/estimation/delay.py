@@ -81,11 +81,11 @@ class DelayCompensation:
     """Prediction of the state in which the torques of this tick will act.
 
     The torques of tick j act in the step after tick j + d. So the acceleration of the joints in
-    the step before tick k is the one expected at tick k - 1 - d, but for errors of the model:
+    the step before tick k is the one expected at tick k - 1 - d, but for errors of the model::
 
         d = argmin sum_k e^(-age_k / memory) |(v_k - v_{k-1}) / dt - a_{k-1-d}|^2,
 
-    each error clipped, over whole ticks d. The state when the torques act is then
+    each error clipped, over whole ticks d. The state when the torques act is then::
 
         v + dt (a_{k-d} + ... + a_{k-1}),
         q + d dt v + dt^2 ((d - 1/2) a_{k-d} + ... + 1/2 a_{k-1}).

@@ -39,7 +39,7 @@ class Biped(Robot):
 
     Attributes are those of :class:`~.robot.Robot`, and these.
 
-    Attributes (constant):
+    Attributes that are constant:
         path: the URDF file.
         urdf: its text, as Pinocchio and PyBullet load it.
         model: the Pinocchio model.
@@ -60,7 +60,7 @@ class Biped(Robot):
             world [m], cosine and sine of the heading, y of the trunk's hips in it [m]; of a planar
             one the world.
 
-    Attributes (written by :meth:`update`; views that the next call overwrites):
+    Attributes of the last update:
         com, com_velocity: (2,) [m, m/s].
         com_jacobian: (2, nv) maps v to the CoM's velocity.
         com_bias: (2,) dJ/dt v of this Jacobian [m/s^2].

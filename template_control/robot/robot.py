@@ -36,11 +36,13 @@ class FrameTerms(NamedTuple):
 class Robot(ABC):
     """Model of a robot, and its dynamics at the last :meth:`update`.
 
+    What :meth:`update` writes are views that its next call overwrites.
+
     Args:
         model: Pinocchio's.
         contacts: number of points of it that may touch the ground.
 
-    Attributes (constant):
+    Attributes that are constant:
         base_dof: unactuated degrees of freedom, the first ones.
         base_joints: Pinocchio's joints that they belong to.
         directions: rows of a contact: 2 in the plane, 3 in space. The last one is up.
@@ -57,7 +59,7 @@ class Robot(ABC):
         joint_friction: (nu,) URDF ``friction``: dry, at most this much [N m]. Plants have it; no
             term of the model does.
 
-    Attributes (written by :meth:`update`; views that the next call overwrites):
+    Attributes of the last update:
         mass_matrix: (nv, nv) M(q).
         nonlinear_effects: (nv,) C(q, v) v + g(q), and the joints' damping [N, N m].
         joint_angle, joint_velocity: (nu,) of the actuated joints [rad, rad/s].

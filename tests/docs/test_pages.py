@@ -9,20 +9,21 @@ PAGES = sorted(DOCS.rglob("*.md"))
 OTHERS = [
     ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "robots/README.md")
 ]
-# Guides whose programs are run from top to bottom. Those of the others run for minutes.
+# Pages whose programs are run from top to bottom. Those of other guides run for minutes.
 RUN = (
-    "architecture",
-    "engines",
-    "floating_base",
-    "options",
-    "parameter_study",
-    "public_robots",
-    "running",
-    "your_floating_robot",
-    "your_gait",
-    "your_planner",
-    "your_plant",
-    "your_robot",
+    "start",
+    "guides/architecture",
+    "guides/engines",
+    "guides/floating_base",
+    "guides/options",
+    "guides/parameter_study",
+    "guides/public_robots",
+    "guides/running",
+    "guides/your_floating_robot",
+    "guides/your_gait",
+    "guides/your_planner",
+    "guides/your_plant",
+    "guides/your_robot",
 )
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(DOCS).as_posix())
 
@@ -86,9 +87,12 @@ def test_named_sources_are_there(page):
 
 
 def test_the_index_names_every_page():
-    text = (DOCS / "README.md").read_text()
-    named = set(re.findall(r"\]\(([\w/]+\.md)\)", text))
-    assert named == {p.relative_to(DOCS).as_posix() for p in PAGES} - {"README.md"}
+    """In its tables for readers, and in its trees for the site."""
+    text = (DOCS / "index.md").read_text()
+    pages = {p.relative_to(DOCS).as_posix() for p in PAGES} - {"index.md"}
+    assert set(re.findall(r"\]\(([\w/]+\.md)\)", text)) == pages
+    trees = "\n".join(re.findall(r"```\{toctree\}(.*?)```", text, flags=re.DOTALL))
+    assert sorted(re.findall(r"^([\w/]+)$", trees, re.MULTILINE)) == sorted(p[:-3] for p in pages)
 
 
 def test_every_picture_is_shown():
@@ -101,10 +105,10 @@ def test_every_picture_is_shown():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("guide", RUN)
-def test_a_guide_runs_as_printed_from_top_to_bottom(guide, tmp_path, run_block):
+@pytest.mark.parametrize("page", RUN)
+def test_a_page_runs_as_printed_from_top_to_bottom(page, tmp_path, run_block):
     (tmp_path / "examples").symlink_to(EXAMPLES)
-    text = (DOCS / "guides" / f"{guide}.md").read_text()
+    text = (DOCS / f"{page}.md").read_text()
     found = re.findall(r"```(python|sh)\n(.*?)```", text, flags=re.DOTALL)
     assert found
     for language, block in found:

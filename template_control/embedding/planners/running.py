@@ -116,7 +116,11 @@ where the smallest difference counts."""
 
 
 class RunningPlanner(Planner):
-    """min |(P(z, u) + d - z*) / tolerance|^2 + |(u - u_g) / change|^2 over bounded u.
+    """Planner of a run by its controls of one stride.
+
+    It minimises over bounded u::
+
+        |(P(z, u) + d - z*) / tolerance|^2 + |(u - u_g) / change|^2
 
     Args:
         gait: to settle on.

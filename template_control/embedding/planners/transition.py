@@ -96,7 +96,11 @@ RUN_TO_WALK = TransitionOptions(
 
 
 class TransitionPlanner(Planner):
-    """min |(P(z, u) - z*) / tolerance|^2 + |(u - u_0) / change|^2 over bounded u.
+    """Planner of a stride from one gait to another.
+
+    It minimises over bounded u::
+
+        |(P(z, u) - z*) / tolerance|^2 + |(u - u_0) / change|^2
 
     Args:
         stride: kind of the stride, a key of the automaton's ``starts``.
