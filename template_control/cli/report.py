@@ -17,8 +17,9 @@ from template_control.cli.plots import TEMPLATE, add_figure_options, draw
 from template_control.errors import TemplateControlError
 from template_control.plant.c_library import stdout_to_stderr
 from template_control.run.experiment import STEPS, Experiment, PreparedExperiment
+from template_control.run.live import QP_FAILURES
 from template_control.run.record import Record, RunInterrupted, one_line, recorded
-from template_control.run.simulation import QP_FAILURES, simulate
+from template_control.run.simulation import simulate
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
 from template_control.terminal import figures_table, progress_bar, show

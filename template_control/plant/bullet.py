@@ -188,16 +188,12 @@ class BulletPlant:
 
     def _configure(self, joints: int) -> None:
         p, c, body = self._engine, self.client, self.body
-        friction = self.options.friction
         damping = dict(zip(self._actuated, self.robot.joint_damping, strict=True))
         # One property a call: a combined call silently drops some of them.
-        for ground, own in self._ground.items():
-            share = 1.0 if own is None else own / friction
-            p.changeDynamics(ground, -1, lateralFriction=share, physicsClientId=c)
+        for ground in self._ground:
             p.changeDynamics(ground, -1, restitution=0.0, physicsClientId=c)
         for link in range(-1, joints):
             for name, value in (
-                ("lateralFriction", friction),  # Bullet multiplies the two bodies' values
                 ("restitution", 0.0),
                 ("linearDamping", 0.0),
                 ("angularDamping", 0.0),
@@ -222,6 +218,21 @@ class BulletPlant:
             p.setJointMotorControl2(
                 body, joint, p.VELOCITY_CONTROL, force=dry.get(joint, 0.0), physicsClientId=c
             )
+        self.set_friction(self.options.friction)
+
+    def set_friction(self, friction: float) -> None:
+        """Change the friction of the ground, but not of pieces of it that have their own.
+
+        Args:
+            friction: Coulomb coefficient between foot and ground.
+        """
+        p, c = self._engine, self.client
+        # Bullet multiplies the two bodies' values.
+        for ground, own in self._ground.items():
+            share = 1.0 if own is None else own / friction
+            p.changeDynamics(ground, -1, lateralFriction=share, physicsClientId=c)
+        for link in range(-1, p.getNumJoints(self.body, physicsClientId=c)):
+            p.changeDynamics(self.body, link, lateralFriction=friction, physicsClientId=c)
 
     @property
     def time_step(self) -> float:

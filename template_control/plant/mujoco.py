@@ -15,6 +15,7 @@ from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_mass_matrix
 from template_control.plant.bullet import AXES, PlantOptions
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
+from template_control.plant.terrain import pieces
 from template_control.robot.biped import Biped
 from template_control.robot.terms import FLOATING_DOF
 
@@ -92,6 +93,9 @@ class MujocoPlant:
         self._trunk = self.model.body(TRUNK).id
         shapes = [self.model.geom(i).name for i in range(self.model.ngeom)]
         self._feet = {shapes.index(f"{FOOT}{i}"): i for i in range(len(robot.feet))}
+        _, stand_out = pieces(options.ground)  # the first shapes, after the plane
+        own = [False, *(piece.friction is not None for piece in stand_out)]
+        self._common_ground = [i for i, has_own in enumerate(own) if not has_own]
         self._trunk_shapes = {i for i, name in enumerate(shapes) if name.startswith(TRUNK)}
         self._force = np.zeros(6)
         self._forces = np.zeros((len(robot.feet), robot.directions))
@@ -107,6 +111,10 @@ class MujocoPlant:
         for unit, column in zip(np.eye(self.model.nv), columns, strict=True):
             self._engine.mj_mulM(self.model, self.data, column, unit)
         return columns / self.options.mass_scale
+
+    def set_friction(self, friction: float) -> None:
+        """See :meth:`~.bullet.BulletPlant.set_friction`."""
+        self.model.geom_friction[self._common_ground, 0] = friction
 
     @property
     def time_step(self) -> float:

@@ -2,6 +2,9 @@ from .experiment import Experiment as Experiment
 from .experiment import PreparedExperiment as PreparedExperiment
 from .experiment import perturbed_start as perturbed_start
 from .facts import Facts as Facts
+from .hand import Hand as Hand
+from .live import LiveRun as LiveRun
+from .live import Tick as Tick
 from .options import FallOptions as FallOptions
 from .options import HeadingCommand as HeadingCommand
 from .options import Push as Push

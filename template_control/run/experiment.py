@@ -14,7 +14,7 @@ import numpy as np
 
 from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Count, Index, NotNegative
+from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
 from template_control.embedding.free.trot import TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
@@ -31,7 +31,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_route import robot_route
-from template_control.embedding.robot_template import check_apex, template_for
+from template_control.embedding.robot_template import check_apex
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import PlantOptions
@@ -45,7 +45,7 @@ from template_control.robot.start import Pose
 from template_control.run.options import FallOptions, HeadingCommand, Push, check_pushes
 from template_control.run.sensing import SensorOptions
 from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
-from template_control.run.velocity import VelocityCommand, VelocityProfile
+from template_control.run.velocity import VelocityCommand, VelocityProfile, velocity_route
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import StrideKind
@@ -74,7 +74,7 @@ class Experiment(Checked):
     Attributes:
         robot: a shipped robot's name or a URDF's path; or its options; or the model.
         motion: a gait to keep, or a scenario, which is put on the robot's template, or a route, or
-            velocities of a floating-base robot; None: the gait of the planner, or the robot's own
+            velocities; None: the gait of the planner, or the robot's own
             walk. A walk breaks into another stride where it cannot go on, and walks again
             (:class:`~template_control.embedding.recovery.Recovery`).
         planner: its options; or a planner; or one for each kind of stride of a route. None: ahead
@@ -85,6 +85,8 @@ class Experiment(Checked):
             default.
         world: options of a plant, or a plant of one's own: the run resets it, and leaves it open.
         pushes: on the trunk.
+        frictions: times from the run's start, rising [s], and the friction of the ground from each
+            of them on; a plant needs ``set_friction`` for it, which PyBullet's and MuJoCo's have.
         sensors: what the controller gets to know of the state: all of it, with noise; or what
             encoders, IMU and contacts make of it. The plant and the record have the true one.
         delay: from a measurement to the torques computed from it [s], a whole number of
@@ -106,7 +108,7 @@ class Experiment(Checked):
     Raises:
         ParameterError: if a value is of a wrong type or out of its range, the world is no plant,
             the delay is not a whole number of physics steps up to 1 s, a push comes after the last
-            step, or there is both a start and a seed.
+            step, the times of frictions do not rise, or there is both a start and a seed.
     """
 
     robot: RobotSpec | Biped | str = field(default_factory=RobotSpec)
@@ -117,6 +119,7 @@ class Experiment(Checked):
         default_factory=default_plant
     )
     pushes: tuple[Push, ...] = ()
+    frictions: tuple[tuple[NotNegative, Positive], ...] = ()
     sensors: SensorOptions | ImuOptions = field(default_factory=SensorOptions)
     delay: NotNegative = 0.0
     start: tuple[float, float, float] | None = None
@@ -138,6 +141,9 @@ class Experiment(Checked):
             check_pushes(self.pushes, self.steps)
         if self.seed is not None and self.start is not None:
             raise ParameterError("a seed does not go with a start: leave one out")
+        times = [time for time, _ in self.frictions]
+        if sorted(set(times)) != times:
+            raise ParameterError(f"Experiment.frictions has the times {times}: give rising ones")
         step = self.world.time_step
         whole = abs(self.delay / step - self.delay_ticks) < 1e-6
         if not (whole and self.delay <= _LONGEST_DELAY):
@@ -238,7 +244,7 @@ class Experiment(Checked):
         ready(WALK)  # before the gait is looked for, which would compile a part of it alone
         motion, steps, velocity = e.motion, e.steps, None
         if isinstance(motion, VelocityProfile | VelocityCommand):
-            velocity, motion = motion, _velocity_route(robot, motion, e.course)
+            velocity, motion = velocity_route(robot, motion, e.course)
         if isinstance(motion, GaitSpec):
             gait = _gait(motion, robot, e.tuning.torque_scale)
             if motion.from_stand or motion.to_stand:
@@ -259,7 +265,9 @@ class Experiment(Checked):
             _check_strictly(found, planner)
         same = {f.name: getattr(e, f.name) for f in fields(e)}
         new = {"robot": robot, "motion": found, "planner": planner, "start": start, "steps": steps}
-        rest = {"seed": None, "strict": False, "velocity": velocity}
+        profile = e.motion if isinstance(e.motion, VelocityProfile) else None
+        changes = None if profile is None or profile.foreseen else profile
+        rest = {"seed": None, "strict": False, "velocity": velocity, "changes": changes}
         return PreparedExperiment(**{**same, **new, **rest})
 
     def _kept(self, motion: Gait | None) -> tuple[Gait, Planner]:
@@ -323,13 +331,16 @@ class PreparedExperiment(Experiment):
         robot: the model; its last update is overwritten by a run.
         motion: the gait that is kept, or the route.
         planner: of this gait, or of each kind of stride of this route.
-        velocity: what the route's speed is of; None: the course is the experiment's.
+        velocity: what the route's speed is of, a command that a run sets where the motion is a
+            profile that is not foreseen; None: the course is the experiment's.
+        changes: the profile that this command follows; None: it follows none.
     """
 
     robot: Biped
     motion: Gait | Route
     planner: Planner | Planners
     velocity: VelocityProfile | VelocityCommand | None = None
+    changes: VelocityProfile | None = None
 
     def prepare(self) -> PreparedExperiment:
         """Itself."""
@@ -395,7 +406,7 @@ def _gait(spec: GaitSpec, robot: Biped, torque_scale: float) -> WalkingGait | Ru
 def _check_plane(robot: Biped, e: Experiment) -> None:
     """Refuse what only a floating-base robot can have."""
     had = "has no course" if e.course != HeadingCommand() else ""
-    if isinstance(e.motion, VelocityProfile | VelocityCommand):
+    if isinstance(e.motion, VelocityProfile) and any(any(row[2:]) for row in e.motion.velocities):
         had = "has no velocity to the left"
     if any(push.direction for push in e.pushes):
         had = "a push has a direction"
@@ -404,19 +415,6 @@ def _check_plane(robot: Biped, e: Experiment) -> None:
             f"{robot.name} is held in its plane, and {had}: leave it out, or take a floating-base"
             " robot"
         )
-
-
-def _velocity_route(
-    robot: Biped, velocity: VelocityProfile | VelocityCommand, course: HeadingCommand
-) -> Route:
-    """Walk at the forward speeds of a velocity command."""
-    if course.turning_rate or course.turns or course.side_speed:
-        raise ParameterError("a course does not go with velocities, which turn: leave one out")
-    return SpeedRoute(
-        template_for(robot),
-        lambda time: velocity.at(time)[0],
-        getattr(velocity, "duration", None),
-    )
 
 
 def _with_stands(spec: GaitSpec, gait: WalkingGait | RunningGait, e: Experiment) -> Scenario:

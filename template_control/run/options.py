@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import cos, sin
 from typing import Annotated
 
 import numpy as np
@@ -26,6 +28,7 @@ class Push(Checked):
         phase: time from this step's VLO to the push, over the gait's step duration.
         duration: how long the force acts [s].
         direction: of a free robot, from forward to the left [rad].
+        time: from the run's start to the push [s]; None: the push comes at ``step`` and ``phase``.
     """
 
     impulse: float
@@ -33,6 +36,25 @@ class Push(Checked):
     phase: Phase = 0.0
     duration: Positive = 0.1
     direction: float = 0.0
+    time: NotNegative | None = None
+
+    def force(self) -> tuple[float, float]:
+        """Force while the push acts, forward and to the left [N]."""
+        force = self.impulse / self.duration
+        return force * cos(self.direction), force * sin(self.direction)
+
+    def begins(self, begun: Sequence[tuple[float, float]]) -> float | None:
+        """Time of the push from the run's start [s]; None where its step has not begun.
+
+        Args:
+            begun: when each step began, and the duration of its gait's steps [s].
+        """
+        if self.time is not None:
+            return self.time
+        if self.step >= len(begun):
+            return None
+        time, duration = begun[self.step]
+        return time + self.phase * duration
 
 
 @dataclass(frozen=True)
@@ -63,7 +85,7 @@ def check_pushes(pushes: tuple[Push, ...], steps: int) -> None:
     A ParameterError names the push that would never come.
     """
     for push in pushes:
-        if push.step >= steps:
+        if push.time is None and push.step >= steps:
             raise ParameterError(
                 f"a push is in step {push.step}, and the run has steps 0 to {steps - 1}: give an"
                 " earlier step or a longer run"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from math import prod
 from time import perf_counter
 from typing import Any
@@ -173,6 +174,7 @@ class Recorder:
         controller: whose ticks are recorded; it has started.
         every: keep every n-th tick (timings and statistics use all of them).
         conditions: plain data for the record's metadata, such as ``plant``, the world's name.
+        keep: forget ticks when so many later ones, and a block of 1024, are recorded; None: none.
 
     Raises:
         ParameterError: if the controller has not started.
@@ -188,6 +190,7 @@ class Recorder:
         controller: EmbeddingController,
         every: Count = 1,
         conditions: Mapping[str, Any] | None = None,
+        keep: Count | None = None,
     ) -> None:
         if not controller.reports:
             raise ParameterError("a Recorder records a controller that has started: start it first")
@@ -202,7 +205,9 @@ class Recorder:
             name: slice(end - width, end)
             for name, end, width in zip(self._shapes, ends, widths, strict=True)
         }
-        self._block = np.empty((_BLOCK, ends[-1]))
+        self._keep = keep
+        self._block, self._full = np.empty((2, _BLOCK, ends[-1]))
+        self._rows = 0  # of the block that is full
         self._seen = np.zeros(1, SNAPSHOT)
         self._robot = robot.data, robot.joint_places, robot.heading_frame
         self._block_start = 0  # tick of the block
@@ -210,9 +215,10 @@ class Recorder:
         self._kept: dict[int, Array] = {}
         self._clocks: dict[int, Array] = {}
         self._counted: dict[int, Counts] = {}
+        self._starts: dict[int, float] = {}  # [s]
         self._first = self._before = self._begins = controller.time  # [s]
         self._step = 0.0  # of the last tick [s]
-        self.ticks = 0
+        self.ticks = self._forgotten = 0
         # Before the run, which would be lost if this failed after it.
         self._about = {**about(controller), **(conditions or {})}
         self._begun = perf_counter()
@@ -270,12 +276,27 @@ class Recorder:
     def _close_block(self) -> None:
         """Count the ticks of the block, keep its samples, and begin anew."""
         first = self._block_start
+        if first == self.ticks and self._kept:
+            return
         block = self._block[: self.ticks - first]
         named = self._named(block)
         self._counted[first] = count(named, self.controller.qp.torque_limit)
         self._kept[first] = block[-first % self.every :: self.every].copy()
         self._clocks[first] = np.column_stack([named[name] for name in _CLOCKS])
+        self._starts[first] = float(block[0, 0]) if len(block) else self._first
         self._block_start = self.ticks
+        self._block, self._full, self._rows = self._full, self._block, len(block)
+        if self._keep is not None:
+            self._forget(self.ticks - self._keep)
+
+    def _forget(self, tick: int) -> None:
+        """Forget the blocks that end before a tick."""
+        for first, after in pairwise(list(self._kept)):
+            if after > tick:
+                break
+            for parts in (self._kept, self._clocks, self._counted, self._starts):
+                del parts[first]
+            self._forgotten, self._first = after, self._starts[after]
 
     def _named(self, rows: Array) -> dict[str, Array]:
         """Columns of some rows by their names, each in its shape."""
@@ -283,6 +304,17 @@ class Recorder:
             name: rows[:, self._places[name]].reshape(-1, *shape)
             for name, shape in self._shapes.items()
         }
+
+    def latest(self, count: int) -> dict[str, Array]:
+        """The last ticks, sampled or not, as the record's fields name their columns.
+
+        Args:
+            count: of ticks, at most 1024; there may be fewer.
+        """
+        rows = self._block[: self.ticks - self._block_start][-count:]
+        if len(rows) < count:
+            rows = np.concatenate((self._full[: self._rows][len(rows) - count :], rows))
+        return self._named(rows)
 
     def statistics(self) -> Statistics:
         """Statistics over all ticks, sampled or not."""
@@ -312,6 +344,8 @@ class Recorder:
             if name in fields and name not in _CLOCKS
         }
         c, reports = self.controller, self.controller.reports
+        if self._forgotten:
+            reports = [r for r in reports if r.time >= self._first] or reports[-1:]
         sections = list(dict.fromkeys(r.section.name for r in reports))
         strides = list(dict.fromkeys(r.goal.stride for r in reports))
         metadata = {
@@ -322,7 +356,7 @@ class Recorder:
             "error": error,
             "wall_seconds": perf_counter() - self._begun,
             "duration": round(self._before + self._step - self._first, 9),
-            "ticks": self.ticks,
+            "ticks": self.ticks - self._forgotten,
             "sections": sections,
             "strides": strides,
         }

@@ -1,4 +1,4 @@
-"""Velocity commands of a floating base: forward, to the left, and turning."""
+"""Velocity commands: forward, and of a floating base to the left, and turning."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from typing import ClassVar
 from template_control.checks.checked import Checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, Speed
+from template_control.embedding.robot_template import template_for
 from template_control.errors import ParameterError
-from template_control.run.options import SideSpeed, TurningRate
+from template_control.robot.biped import Biped
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.run.options import HeadingCommand, SideSpeed, TurningRate
+from template_control.slip.scenario.route import SpeedRoute
 
 Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
@@ -17,7 +21,7 @@ Velocity = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class VelocityProfile(Checked):
-    """Velocities of a floating base by time, each kept until the next.
+    """Velocities by time, each kept until the next; of a planar robot all are forward.
 
     The motion of an :class:`~template_control.run.Experiment`: the robot walks at any speed of its
     family of gaits. Footholds and heading follow from one step to the next; the forward speed
@@ -26,7 +30,9 @@ class VelocityProfile(Checked):
     Attributes:
         velocities: times, rising from 0 [s], each with the mean velocity forward and to the left
             [m/s], and the turning rate to the left [rad/s].
-        duration: of the run [s].
+        duration: of the run [s]; None: the profile does not end the run.
+        foreseen: whether a step is planned for the velocity that is wanted at its end. If not, the
+            robot learns of a velocity when its time has come, as from a :class:`VelocityCommand`.
 
     Raises:
         ParameterError: if the first time is not 0, or the times do not rise.
@@ -35,7 +41,8 @@ class VelocityProfile(Checked):
     kind: ClassVar[str] = "velocity"
 
     velocities: tuple[tuple[NotNegative, Speed, SideSpeed, TurningRate], ...]
-    duration: Positive
+    duration: Positive | None = None
+    foreseen: bool = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -55,7 +62,7 @@ class VelocityProfile(Checked):
 
 
 class VelocityCommand:
-    """A velocity of a floating base that may be set at any time.
+    """A velocity that may be set at any time; of a planar robot it is forward.
 
     The motion of an :class:`~template_control.run.Experiment` without an end. What is set holds
     from the next VLO on.
@@ -89,3 +96,34 @@ class VelocityCommand:
     def at(self, time: float) -> Velocity:
         """The present velocity, whatever the ``time`` [s]."""
         return self._velocity
+
+
+def velocity_route(
+    robot: Biped, motion: VelocityProfile | VelocityCommand, course: HeadingCommand
+) -> tuple[VelocityProfile | VelocityCommand, SpeedRoute]:
+    """Route at the forward speeds of a motion, and the velocities that it and the heading read.
+
+    These are the motion's, or where it is not foreseen those of a command, which the run sets.
+
+    Args:
+        robot: its last update is overwritten.
+        motion: the velocities.
+        course: of the experiment.
+
+    Raises:
+        ParameterError: if the course has a velocity too, or when a planar robot is to go elsewhere
+            than forward.
+    """
+    if course.turning_rate or course.turns or course.side_speed:
+        raise ParameterError("a course does not go with velocities, which turn: leave one out")
+    foreseen = isinstance(motion, VelocityCommand) or motion.foreseen
+    velocity = motion if foreseen else VelocityCommand(*motion.at(0.0))
+    planar = not isinstance(robot, FloatingBaseBiped)
+
+    def forward(time: float) -> float:
+        speed, *others = velocity.at(time)
+        if planar and any(others):
+            raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
+        return speed
+
+    return velocity, SpeedRoute(template_for(robot), forward, getattr(motion, "duration", None))

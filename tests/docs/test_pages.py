@@ -13,6 +13,7 @@ OTHERS = [
 RUN = (
     "start",
     "guides/architecture",
+    "guides/drive",
     "guides/engines",
     "guides/floating_base",
     "guides/options",

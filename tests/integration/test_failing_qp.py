@@ -13,7 +13,7 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.cli.report import failures_text
 from template_control.robustness.severity_sweep import trial
-from template_control.run.simulation import QpFailures
+from template_control.run.live import QpFailures
 from template_control.run.summary import summarise
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.dynamics.stride import simulate_stride
@@ -29,11 +29,11 @@ def _weak(scale):
 @pytest.mark.parametrize(("scale", "fails"), [(0.05, True), (1.0, False)])
 def test_a_run_in_which_the_qp_fails_says_so_at_once(robot, default_gait, caplog, scale, fails):
     options = _weak(scale)
-    with caplog.at_level(logging.WARNING, "template_control.run.simulation"):
+    with caplog.at_level(logging.WARNING, "template_control.run.live"):
         record = tc.simulate(replace(options, robot=robot, planner=tc.LqrPlanner(default_gait)))
     share = float(np.mean(~record.solved))
     assert (share > 0.5) is fails
-    told = [m for m in caplog.records if m.name.endswith("simulation.failures")]
+    told = [m for m in caplog.records if m.name.endswith("live.failures")]
     assert len(told) == fails
     assert summarise(record, None)["qp_failed_share"] == pytest.approx(share)
     if fails:

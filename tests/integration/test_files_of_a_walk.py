@@ -7,7 +7,7 @@ from places import ROOT
 
 import template_control as tc
 from template_control.plant.bullet import BulletPlant
-from template_control.run import simulation
+from template_control.run.live import LiveRun
 
 MOST = 45
 RECORDING = {"run/recorder.py", "run/statistics.py"}
@@ -19,7 +19,7 @@ def entered(monkeypatch):
     library, files, loop, read = (
         ROOT / "template_control",
         set(),
-        simulation._loop,
+        LiveRun.finish,
         BulletPlant.read,
     )
 
@@ -38,7 +38,7 @@ def entered(monkeypatch):
             sys.setprofile(None)
 
     monkeypatch.setattr(BulletPlant, "read", first_tick)
-    monkeypatch.setattr(simulation, "_loop", to_the_last)
+    monkeypatch.setattr(LiveRun, "finish", to_the_last)
     return files
 
 

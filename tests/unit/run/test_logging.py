@@ -40,7 +40,8 @@ def weak_walk(robot, default_gait, caplog):
 
 def test_start_end_and_fall_are_told(weak_walk):
     record, messages = weak_walk
-    told = [(m.levelname, m.getMessage()) for m in messages if m.name.endswith("run.simulation")]
+    ends = ("run.simulation", "run.live")
+    told = [(m.levelname, m.getMessage()) for m in messages if m.name.endswith(ends)]
     assert told[0][0] == "INFO"
     assert "pybullet" in told[0][1]
     assert ("WARNING", f"{record.robot_name} fell: {record.fall_reason}") in told

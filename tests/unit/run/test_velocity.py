@@ -50,8 +50,9 @@ def test_the_command_line_says_velocities(understood):
 
 
 def test_what_does_not_go_with_velocities_is_refused():
-    with pytest.raises(ParameterError, match="is held in its plane"):
-        tc.Experiment("five-link", motion=PROFILE).prepare()
+    for motion in (PROFILE, tc.run.VelocityCommand(0.5, 0.1)):
+        with pytest.raises(ParameterError, match="is held in its plane"):
+            tc.Experiment("five-link", motion=motion).prepare()
     bolt = tc.load_floating_robot("bolt")
     for course in (HeadingCommand(turning_rate=0.1), HeadingCommand(side_speed=0.1)):
         with pytest.raises(ParameterError, match="a course does not go with velocities"):

@@ -14,9 +14,10 @@ from template_control.errors import ParameterError
 from template_control.plant.plant import Plant
 from template_control.robot.spec import RobotSpec
 from template_control.robustness.campaign import CampaignConfig
-from template_control.run import simulation
 from template_control.run.experiment import Experiment
+from template_control.run.live import LiveRun
 from template_control.run.record import load_record
+from template_control.run.simulation import simulate
 from template_control.run.specs import GaitSpec
 from template_control.slip.similarity import Scale, scaled
 
@@ -40,13 +41,13 @@ LINES = {
 @pytest.fixture
 def held(monkeypatch):
     """What each run holds: plant, controller and options."""
-    found, loop = [], simulation._loop
+    found, finish = [], LiveRun.finish
 
-    def looking(plant, backend, senses, controller, recorder, o, **until):
-        found.append((plant, controller, o))
-        return loop(plant, backend, senses, controller, recorder, o, **until)
+    def looking(run, progress):
+        found.append((run.plant, run.controller, run._o))
+        return finish(run, progress)
 
-    monkeypatch.setattr(simulation, "_loop", looking)
+    monkeypatch.setattr(LiveRun, "finish", looking)
     return found
 
 
@@ -127,4 +128,4 @@ def test_tuning_of_the_other_kind_of_robot_is_refused(free):
     name, had = type(tuning).__name__, "walks free" if free else "is held in its plane"
     experiment = Experiment(RobotSpec("bolt", free=free), controller=tuning)
     with pytest.raises(ParameterError, match=f"{had}, and its embedding has {name}: give"):
-        simulation.simulate(experiment)
+        simulate(experiment)
