@@ -128,7 +128,9 @@ class EmbeddingController:
         self.swings = o.swings(robot, scale)
         self.feet = Feet(self.swings.other, self.references.foot, tick["feet"])
         com = self.references.com
-        self.path_clock = PathClock(self.parameters, o.replan, com, tick["path"])
+        self.path_clock = PathClock(
+            self.parameters, o.replan, com, tick["path"], robot.half_length
+        )
         weight = robot.mass * robot.gravity
         self.contacts = ContactMonitor(o.contacts, weight, tick["contacts"], robot.groups)
         standing = self.contacts.standing
@@ -216,7 +218,8 @@ class EmbeddingController:
         self.learners.lean.reset()
         self.frame.reset()
         if self.lateral is not None:
-            self.lateral.begin(planner.gait, in_flight=not node.stance)
+            others = (other.gait for other in self.supervisor.planners.values())
+            self.lateral.begin((planner.gait, *others), in_flight=not node.stance)
         self._enter(node.name)
         self.feet.begin(rear)
         half = 0.5 * planner.gait.step_duration
@@ -233,7 +236,7 @@ class EmbeddingController:
         self.contacts.begin()
         self._read()
         self._decide(section)
-        self._slope_unknown = len(self.mode.stance) > 1
+        self._slope_unknown = len(self.mode.stance) > 1 and self.frame.turns
         self._publish()
 
     def tick(

@@ -31,21 +31,23 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
 
     Springs push with k (l0 - l). Where none are, both legs carry m (g_y + y'') so that the centre
     of pressure is x - y (x'' + g_x) / (g_y + y''), or the foot next to it; each force acts along
-    its leg. The assist of two legs moves load from one to the other, so that it lifts nothing.
+    its leg. Of feet that bear the centre of pressure ahead and behind too, either one's share is
+    1/2 in the middle of both, and falls to 0 at the other end of the ground that they bear it on. The assist of two legs moves load from one to the other, so that it lifts nothing.
 
     Args:
         meta_row: (7,) toes and stiffnesses of the path's segment; NaN for legs without springs.
         toe: where x of the CoM is taken from [m].
         com: (6,) x and y of the template's CoM, and their first and second derivatives.
-        body: (5,) m, g_y and g_x of gravity towards the ground and back along it, l0, and the
-            assist of two legs [kg, m/s^2, m/s^2, m, m/s^2].
+        body: (6,) m, g_y and g_x of gravity towards the ground and back along it, l0, the assist
+            of two legs, and the half length of a foot [kg, m/s^2, m/s^2, m, m/s^2, m].
         forces: overwritten; zero for a leg in the air.
     """
     com_x, com_y, rest_length = com[0] + toe, com[1], body[3]
     if np.isnan(meta_row[5]):
         lift = max(body[1] + com[5], 1e-6)  # legs do not pull
         rear, front = meta_row[3], meta_row[4]
-        share = (com_x - com_y * (com[4] + body[2]) / lift - rear) / (front - rear)
+        share = com_x - com_y * (com[4] + body[2]) / lift - (rear - body[5])
+        share /= front - rear + 2.0 * body[5]
         share = min(max(share, 0.0), 1.0)
         for leg in range(2):
             load = body[0] * lift * (share if leg == 1 else 1.0 - share)

@@ -196,6 +196,7 @@ MODE = np.dtype(
         ("trim_momentum", _I),
         ("estimate_load", _I),  # and a task gives the feedback
         ("unloads", _I, (2,)),  # whether each leg has its normal force kept near the template's
+        ("unloading", _F),  # time over which it gives its load up before it lifts off [s]; 0: none
     ],
     align=True,
 )
@@ -242,6 +243,7 @@ def _mode(node: Node, number: int, control: PhaseControl, nv: int, trimmed: bool
         data[name] = getattr(control, name)
     data["estimate_load"] = control.estimate_load and tasks.follows_com
     data["unloads"][list(control.unload_legs)] = 1
+    data["unloading"] = control.unloading
     return Mode(
         node=node,
         control=control,
@@ -291,7 +293,8 @@ PATH = np.dtype(
         ("fresh", _I),  # whether the path begins at this tick
         ("forces", _F, (2, 2)),  # leg forces of the template there, rear and front [N]
         # -- the plan, written when it changes --
-        ("body", _F, (5,)),  # m, g towards the ground and back along it, l0, assist of two legs
+        # m, g towards the ground and back along it, l0, assist of two legs, half a foot's length
+        ("body", _F, (6,)),
         ("event_times", _F, (NUM_EVENTS,)),  # of each event's next occurrence [s]; inf: none
         ("landing_x", _F, (2,)),  # of each foot's next foothold [m]; NaN: none
         ("landing_time", _F, (2,)),  # [s]; inf: never
@@ -364,18 +367,24 @@ class PathClock:
 
     ``time`` is along the path [s]. Ticks write ``reference`` (6,), the template's CoM x (relative
     to its rear toe), y, and two derivatives; ``forces`` (2, 2) are its leg forces there [N], rear
-    and front. ``data`` (1,) are of ``PATH``.
+    and front. ``data`` (1,) are of ``PATH``, ``half_length`` is a foot's [m].
     """
 
     time = Number("time")
 
     def __init__(
-        self, parameters: SlipParameters, options: ReplanOptions, reference: Array, data: Any
+        self,
+        parameters: SlipParameters,
+        options: ReplanOptions,
+        reference: Array,
+        data: Any,
+        half_length: float,
     ) -> None:
         self.reference, self.data = reference, data
         self.forces: Array = data["forces"][0]
         self._body: Array = data["body"][0]
         self._body[0], self._body[3] = parameters.mass, parameters.rest_length
+        self._body[5] = half_length
         for name in ("patience", "interval", "speed"):
             data[name] = getattr(options, name)
         self.restart()

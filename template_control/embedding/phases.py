@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from template_control.checks.checked import Checked
+from template_control.checks.ranges import NotNegative
 from template_control.embedding.swing import SwingOptions
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Leg, Phase
+from template_control.slip.similarity import TIME, tuned
 from template_control.whole_body.task import Task
 from template_control.whole_body.tasks import ComTask, FootTask, MomentumTask, PostureTask
 
@@ -40,6 +42,8 @@ class PhaseControl(Checked):
             this needs a stance foot.
         unload_legs: legs whose normal force is kept near the template's, so that they have no
             load left to lift off with.
+        unloading: time over which these legs give up a load that is not the template's, before
+            they lift off [s]; 0: their load is the template's.
         estimate_load: whether the load estimate observes this phase.
         trim_momentum: whether the momentum trim acts in this phase.
         swing: shape of the swings that begin in this phase; None: the robot's.
@@ -60,6 +64,7 @@ class PhaseControl(Checked):
     clock: Clock = Clock.DIRECTION
     momentum_speed: bool = True
     unload_legs: tuple[Leg, ...] = ()
+    unloading: NotNegative = tuned(0.0, TIME)
     estimate_load: bool = True
     trim_momentum: bool = False
     swing: SwingOptions | None = None

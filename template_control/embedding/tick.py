@@ -99,6 +99,7 @@ QUIET, EVENTFUL, DIVERGED = 0, 1, 2
 """Results of :func:`sense`: nothing to decide; an event, or a plan that is due; no finite state."""
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
+_LIFTOFFS = (int(Event.REAR_LIFTOFF), int(Event.FRONT_LIFTOFF))  # by leg
 _REAR = 0
 _SIDE = 1
 
@@ -384,7 +385,11 @@ def _bear(t: Any, r: Any, qp: Any, want: Any, directions: int) -> None:
         for _ in range(share):
             qp.cap[at] = np.inf
             if mode.unloads[leg]:
-                qp.cap[at] = unload_cap(forces[leg, 1], r.mass * r.gravity) / share
+                load = forces[leg, 1]
+                if mode.unloading > 0.0:
+                    due = t.path.event_times[_LIFTOFFS[leg]] - t.path.time
+                    load = r.mass * r.gravity * max(due / mode.unloading, 0.0)
+                qp.cap[at] = unload_cap(load, r.mass * r.gravity) / share
             qp.force[at, 0] = forces[leg, 0] / share
             qp.force[at, directions - 1] = forces[leg, 1] / share
             if directions > UP:

@@ -170,6 +170,15 @@ class Biped(Robot):
         self.hips = now["hips"][0, ::UP]
 
     @property
+    def half_length(self) -> float:
+        """By how far ahead of its middle a template leg's foot bears, and behind [m].
+
+        0 of a foot that is a point.
+        """
+        ahead = self.spread[:, 0]
+        return 0.5 * min(float(np.ptp(ahead[list(group)])) for group in self.groups)
+
+    @property
     def foot_jacobian(self) -> Array:
         """See the class."""
         return self._means(self.contact_jacobian[:, :: _SAGITTAL[self.directions]])

@@ -170,6 +170,19 @@ class PlanarBackend(RobotBackend):
 _REAR = 0  # the left foot stands where a run begins
 
 
+def _square_stand(z: Array, width: float) -> FloatingBasePose:
+    """At rest on both feet, next to each other and ``width`` [m] apart; ``z`` (3,) is at rest."""
+    feet = np.zeros((2, 3))
+    feet[:, 1] = 0.5 * width * np.array(SIDES)
+    return FloatingBasePose(
+        com=np.array([0.0, 0.0, z[1]]),
+        com_velocity=np.zeros(3),
+        feet=feet,
+        feet_velocity=np.zeros((2, 3)),
+        rear=_REAR,
+    )
+
+
 class FloatingBackend(RobotBackend):
     """See :class:`RobotBackend`."""
 
@@ -194,18 +207,30 @@ class FloatingBackend(RobotBackend):
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`: at VLO or an apex, in the sideways motion of the gait.
 
-        A ParameterError if the run begins elsewhere, or the options have a planar pose.
+        Or at rest, where the feet bear the robot by themselves. A ParameterError if they do not, or
+        if the options have a planar pose.
         """
         route, motion = controller.supervisor.route, controller.lateral
-        if o.pose is not None or route.section not in (VLO, APEX) or motion is None:
+        assert motion is not None
+        if o.pose is not None:
             raise ParameterError(
-                f"{self.robot.name} has a floating base: its run begins at VLO or an apex, without"
-                " a pose"
+                f"{self.robot.name} has a floating base, and the run a pose of the plane: leave it"
+                " out"
+            )
+        if route.section is REST and not self.robot.half_length:
+            raise ParameterError(
+                f"{self.robot.name} cannot stand on two feet that are points: let its run begin at"
+                " VLO or an apex"
             )
         z = route.start if o.start is None else np.array(o.start)
         first = controller.supervisor.begin(route.section)
         planner = first[0]
         lateral = motion.planner
+        if route.section is REST:
+            motion.command = o.heading
+            q, v = floating_state_in(self.robot, _square_stand(z, lateral.wish.width))
+            controller.start(_REAR, first=first)
+            return q, v
         side_speed, rate = o.heading(0.0)
         lateral.wish = LateralWish(
             o.course.step_width or lateral.wish.width,

@@ -292,14 +292,14 @@ class Experiment(Checked):
         if planner is None and self.free and isinstance(motion, SpeedRoute):
             planner = FREE_AHEAD
         if planner is None:
-            return motion, default_planners(motion)
+            return motion, default_planners(motion, half_length=robot.half_length)
         if isinstance(planner, Mapping):
             return motion, planner
         if isinstance(planner, AheadOptions):
             planner = AheadPlanner(motion.parameters, planner, first_speed(motion))
         elif isinstance(planner, _SPECS):
             planner = _planner(planner, walking_gait(motion.parameters, first_speed(motion)))
-        return motion, default_planners(motion, planner)
+        return motion, default_planners(motion, planner, half_length=robot.half_length)
 
     @checked
     def save(self, path: str | Path) -> Path:

@@ -227,20 +227,24 @@ class LateralPlanner:
             return None
         return Placement(*(now[name].copy() for name in Placement._fields))
 
-    def reset(self, gait: Gait) -> None:
-        """Begin anew with a gait; nothing is learnt yet."""
+    def reset(self, gait: Gait | None) -> None:
+        """Begin anew with a gait, or with none; nothing is learnt yet."""
         self._planar = None
         self.lessons.clear()
         self.data["placed"] = 0
         self._landed, self._due = None, np.inf
         self.walk(gait)
 
-    def walk(self, gait: Gait) -> None:
-        """Take the periodic motion of a gait, walked or walked towards, and of what is learnt."""
-        if gait is not self._gait:
+    def walk(self, gait: Gait | None) -> None:
+        """Take the periodic motion of a gait, walked or walked towards, and of what is learnt.
+
+        None: of the gait so far, if there is one.
+        """
+        if gait is not None and gait is not self._gait:
             self._gait = gait
             self._lateral = lateral_gait(gait, self._unscaled)
-        self.cycle = lateral_cycle(self._lateral, self.wish, self.learnt.offset)
+        if self._gait is not None:
+            self.cycle = lateral_cycle(self._lateral, self.wish, self.learnt.offset)
 
     def end_step(self, stance: Side, foot: float, com: Array) -> None:
         """Learn from a nominal step that has ended at a section.
@@ -272,6 +276,8 @@ class LateralPlanner:
 
         That foot stands, or stood last.
         """
+        if self._gait is None:
+            return
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
         self.data["second_step"] = self.cycle.steps[stance.other.row]
         for name, value in self._aim._asdict().items():

@@ -6,7 +6,7 @@ sees x and z in the heading frame. Here that frame is turned, and the feet are p
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import atan2, cos, inf, sin
 from typing import Any
@@ -96,15 +96,15 @@ class LateralMotion:
         ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
         return cls(robot, planner, feet, references, BEYOND * scale.length, ramps)
 
-    def begin(self, gait: Gait, in_flight: bool) -> None:
-        """Begin a run with the gait of its first stride; nothing is learnt yet.
+    def begin(self, gaits: Iterable[Gait], in_flight: bool) -> None:
+        """Begin a run with the first gait that has steps; nothing is learnt yet.
 
         It turns at once, unless it begins in flight.
         """
         self._now[:] = self.command(0.0)
         if in_flight:
             self._now[1] = 0.0
-        self.planner.reset(gait)
+        self.planner.reset(next((gait for gait in gaits if gait.step_length), None))
         for foot in range(2):
             self._stands(foot)
 
@@ -177,6 +177,8 @@ class LateralMotion:
         robot is in then.
         """
         planner, gait = self.planner, supervisor.planner.gait
+        if not gait.step_length:
+            return self._stand(node, supervisor)
         side_ramp, walk_ramp, run_ramp = self._ramps
         most = gait.step_duration * np.array([side_ramp, walk_ramp if node.stance else run_ramp])
         self._now += np.clip(self.command(time) - self._now, -most, most)
@@ -207,6 +209,19 @@ class LateralMotion:
         for name in ("turn", "bank", "spin"):
             planner.data[name] = 0.0  # a walk's feet turn it
         node = follow(early_touchdown(supervisor.decision, decide, look, self._reach))
+        planner.expect(supervisor.time_of(Event.TOUCHDOWN))
+        return node
+
+    def _stand(self, node: Node, supervisor: StrideSupervisor) -> Node:
+        """A stride that leads to a stand, or from it to a walk: it goes straight on.
+
+        A foot that lands in it goes to where the last gait's would.
+        """
+        planner = self.planner
+        self._now[:] = 0.0
+        planner.wish = replace(planner.wish, aside=0.0, turn=0.0)
+        planner.walk(None)
+        planner.aim(SIDES[self._feet.landed])
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node
 

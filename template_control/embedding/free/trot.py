@@ -15,12 +15,20 @@ from template_control.checks.ranges import NotNegative
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.phases import RUNNING_SWING, PhaseControl, Phases, running_phases
+from template_control.embedding.phases import (
+    RUNNING_SWING,
+    Clock,
+    PhaseControl,
+    Phases,
+    running_phases,
+)
+from template_control.embedding.standing.supports import UNLOADING
 from template_control.robot.biped import Biped
 from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.slip.lateral.gait import LateralOptions
 from template_control.slip.similarity import LENGTH, tuned
+from template_control.whole_body.stand_task import StandTask
 from template_control.whole_body.task import Task
 from template_control.whole_body.tasks import ComTask, FootTask, OrientationTask, SideFootTask
 
@@ -45,6 +53,16 @@ _DOUBLE = PhaseControl(
     unload_legs=(Leg.REAR,),
 )
 
+# Four feet stand, and hold the CoM's y too.
+_STANDING = PhaseControl(
+    tasks=(ComTask((10.0, 10.0)), StandTask(), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+    clock=Clock.TIME,
+    follow_curve=True,
+)
+_COMING_TO_REST = replace(_STANDING, estimate_load=False)
+_LIFTING_OFF = replace(_COMING_TO_REST, unload_legs=(Leg.REAR,), unloading=UNLOADING)
+_STEPPING = replace(_STANCE, clock=Clock.TIME, follow_curve=True)
+
 TROT_PHASES: Phases = {
     **running_phases(
         (OrientationTask((0.01, 0.01, 0.001)), *_pair(Leg.REAR), *_pair(Leg.FRONT)),
@@ -55,8 +73,18 @@ TROT_PHASES: Phases = {
     Phase.DS: replace(_DOUBLE, trim_momentum=True),
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,
+    "DS_ar^s": _STANDING,
+    "DS_br^ws": _COMING_TO_REST,
+    "DS_ar^sw": _LIFTING_OFF,
+    "DS_bl^ww": _LIFTING_OFF,
+    "DS_al^sf": _LIFTING_OFF,
+    "SS_bt^sf": _STEPPING,
+    "DS_br^sf": _COMING_TO_REST,
+    "DS_al^sb": replace(_LIFTING_OFF, unload_legs=(Leg.FRONT,)),
+    "SS_bt^sb": _STEPPING,
+    "DS_br^sb": _COMING_TO_REST,
 }
-"""Walking and running trot. Nodes of other gaits find the entry of their phase."""
+"""Standing, walking and running trot. Nodes of other gaits find the entry of their phase."""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from template_control.checks.checked import checked
+from template_control.checks.ranges import NotNegative
 from template_control.embedding.planners.ahead import AheadPlanner
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner, Planners
@@ -30,7 +31,7 @@ from template_control.slip.maps.section import APEX, REST
 from template_control.slip.scenario.route import Route, SpeedRoute, SteadyRoute
 from template_control.slip.scenario.scenario import Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
-from template_control.slip.similarity import REFERENCE
+from template_control.slip.similarity import REFERENCE, Scale
 
 # A slow stride lasts 1.3 sqrt(l0 / g); a run that is behind its profile must be able to catch up.
 _STRIDE = 1.9
@@ -61,8 +62,11 @@ def first_speed(route: Route) -> float:
     return float(route.start[0])
 
 
-def _standing(route: Route) -> Planners:
-    """The planners of a scenario that stands, or a route that begins so; others need none."""
+def _standing(route: Route, half_length: float) -> Planners:
+    """The planners of a scenario that stands, or a route that begins so; others need none.
+
+    ``half_length`` is of the template legs' feet [m].
+    """
     p, family = route.parameters, None
     if isinstance(route, ScenarioRoute) and route.scenario.stands:
         height = route.scenario.stand_height
@@ -71,12 +75,15 @@ def _standing(route: Route) -> Planners:
         height = float(route.start[1])
     else:
         return {}
-    relative = height / p.rest_length * REFERENCE.rest_length
-    return standing_planners(p, StandingOptions(height=relative), family)
+    unit = Scale.of(p).length
+    options = StandingOptions(height=height / unit, half_length=half_length / unit)
+    return standing_planners(p, options, family)
 
 
 @checked
-def default_planners(route: Route, walking: Planner | None = None) -> Planners:
+def default_planners(
+    route: Route, walking: Planner | None = None, *, half_length: NotNegative = 0.0
+) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 
     That is walking steps for a route that begins at VLO, running ones for one at an apex, and
@@ -86,6 +93,8 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     Args:
         route: whose template and first target they are for.
         walking: plans the walking steps instead of the library's own planner.
+        half_length: by how far ahead of its middle a template leg's foot bears, and behind [m], as
+            the robot says; 0: it is a point.
 
     Raises:
         GaitError: if there is no gait at the speed the route begins with.
@@ -99,7 +108,7 @@ def default_planners(route: Route, walking: Planner | None = None) -> Planners:
     if route.section == APEX:
         return {StrideKind.RUN: RunningPlanner(runs(speed))}
     scenario = route.scenario if isinstance(route, ScenarioRoute) else None
-    standing = _standing(route)
+    standing = _standing(route, half_length)
     if route.section == REST and scenario is None:
         return standing
     if isinstance(route, SpeedRoute) or (isinstance(route, ScenarioRoute) and route.pushes_off):

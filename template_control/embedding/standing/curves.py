@@ -42,11 +42,14 @@ class StandingOptions(Checked):
         slack: the centre of pressure may be this far outside the feet [m]; the QP keeps it
             inside, and the CoM a little off its curve.
         reach: longest way from a foot on the ground to the CoM, over l0.
+        half_length: by how far ahead of its middle, and behind, a foot bears the centre of pressure
+            [m]; 0: it is a point.
     """
 
     height: Positive = tuned(STAND_HEIGHT, LENGTH)
     slack: NotNegative = tuned(0.005, LENGTH)
     reach: Positive = tuned(1.025)
+    half_length: NotNegative = tuned(0.0, LENGTH)
 
 
 @checked

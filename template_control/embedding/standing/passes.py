@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.standing.curves import STAND, BetweenFeet, StandingOptions
+from template_control.embedding.standing.supports import OverFeet
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
@@ -40,6 +41,7 @@ CLOSING = 0.25
 """Distance of the feet after a step from a stand, and where a walk ends, over l0."""
 # For the reference template.
 _SINGLE = (0.15, 0.5)  # shortest and longest way of the CoM in single stance before VLO [s]
+_LIFTED = 0.03  # the shortest one of a pair of feet, which has nothing to pass on its way [s]
 _LANDING = (0.16, 0.35)  # bounds of the shortest time from VLO to a touchdown [s]
 _SWIFTNESS = 3.2  # mean speed of the foot to its foothold between them, over the CoM's at VLO
 # Of a step from a stand.
@@ -113,7 +115,8 @@ class PassTable:
 
     def feet(self, toes: tuple[float, float]) -> BetweenFeet:
         """Both feet on the ground, at x of the rear and the front one [m]."""
-        return BetweenFeet(toes, self.parameters, self.options)
+        kind = OverFeet if self.options.half_length else BetweenFeet
+        return kind(toes, self.parameters, self.options)
 
     def between(self, wanted: float, present: float) -> list[float]:
         """Speeds at VLO that are tried, the best first [m/s].
@@ -164,7 +167,8 @@ class PassTable:
         back = replace(self.parameters, slope=-self.parameters.slope)
         simulator = StrideSimulator(back, AUTOMATON)
         past = simulator.run(self._node, [0.0, height, speed, -vertical], u)
-        shortest, longest = (time * self.scale.time for time in _SINGLE)
+        single = (_LIFTED if self.options.half_length else _SINGLE[0], _SINGLE[1])
+        shortest, longest = (time * self.scale.time for time in single)
         # Whatever ends the stride: before it the leg pushes.
         longest = min(longest, 0.98 * past.duration)
         x, y, dx, dy, ddx, ddy = past.sample(np.linspace(shortest, longest, _APPROACHES)).T

@@ -1,0 +1,175 @@
+"""Plan of the centre of pressure through a list of phases, each with its feet on the ground.
+
+One horizontal direction at a time. The CoM at x, over a centre of pressure p and at a height y that
+is known in time, has
+
+    x'' = w^2 (x - p),   w^2 = (g + y'') / y.
+
+A phase is cut into pieces of a constant p_k each. Of all p_k within what the feet of their phases
+bear, those are taken that have the least
+
+    sum dt_k (p_k - wish_k)^2 + sum T^2 / dt_k (p_k - p_(k-1))^2
+        + R (|x_N - x*|^2 + |x'_N - x'*|^2 / w_N^2),
+
+a quadratic program with bounds, which :func:`bounded` solves.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.compiled import compiled
+from template_control.warm_up import Part
+
+Array = NDArray[np.float64]
+
+SMOOTH = 0.1
+"""T, over which p is to change [s, of the reference template]."""
+ARRIVE = 2000.0
+"""R, what an error at the end costs [s, of the reference template]."""
+_ROUNDS = 30  # of the active set
+_HELD = 1e-9  # [m]: a bound that is nearer holds
+
+
+class Pieces(NamedTuple):
+    """Pieces of the phases, in order; arrays are (n,).
+
+    Attributes:
+        duration: of each [s].
+        rate: w of each [1/s].
+        low, high: between which its p has to be [m].
+        wish: where p is liked best [m].
+    """
+
+    duration: Array
+    rate: Array
+    low: Array
+    high: Array
+    wish: Array
+
+
+@compiled
+def bounded(matrix: Array, right: Array, low: Array, high: Array, x: Array) -> None:
+    """Write the x (n,) with the least x' matrix x / 2 - right' x between bounds.
+
+    By a primal-dual active set: the bounds that hold are guessed, the free part is solved for, and
+    what violates a bound, or is pulled away from it, changes sides. ``matrix`` (n, n) is positive
+    definite, so that few rounds suffice.
+    """
+    n = x.shape[0]
+    side = np.zeros(n, np.int64)  # -1: at its lower bound, 1: at its upper one
+    work, part = np.empty((n, n)), np.empty(n)
+    for _ in range(_ROUNDS):
+        for i in range(n):
+            if side[i] == 0:
+                for j in range(n):
+                    work[i, j] = matrix[i, j] if side[j] == 0 else 0.0
+                part[i] = right[i]
+                for j in range(n):
+                    if side[j] != 0:
+                        part[i] -= matrix[i, j] * (low[j] if side[j] < 0 else high[j])
+            else:
+                for j in range(n):
+                    work[i, j] = 1.0 if i == j else 0.0
+                part[i] = low[i] if side[i] < 0 else high[i]
+        _solve(work, part)
+        changed = False
+        for i in range(n):
+            x[i] = part[i]
+        for i in range(n):
+            if side[i] == 0:
+                new = -1 if x[i] < low[i] - _HELD else 1 if x[i] > high[i] + _HELD else 0
+            else:
+                pull = right[i]
+                for j in range(n):
+                    pull -= matrix[i, j] * x[j]
+                new = side[i] if pull * side[i] > 0.0 else 0
+            if new != side[i]:
+                side[i], changed = new, True
+        if not changed:
+            break
+    for i in range(n):
+        x[i] = min(max(x[i], low[i]), high[i])
+
+
+@compiled
+def _solve(a: Array, b: Array) -> None:
+    """Overwrite ``b`` (n,) with the solution of a x = b, by elimination; ``a`` is overwritten.
+
+    No pivots are sought: ``a`` is positive definite but for rows of the unit matrix.
+    """
+    n = b.shape[0]
+    for k in range(n):
+        for i in range(k + 1, n):
+            if a[i, k] == 0.0:
+                continue
+            f = a[i, k] / a[k, k]
+            for j in range(k, n):
+                a[i, j] -= f * a[k, j]
+            b[i] -= f * b[k]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            b[i] -= a[i, j] * b[j]
+        b[i] /= a[i, i]
+
+
+@compiled
+def pressure(
+    pieces: Pieces, start: Array, end: Array, first: float, prices: tuple[float, float], p: Array
+) -> float:
+    """Write the centres of pressure ``p`` (n,) of the pieces; how far the end is missed [m].
+
+    ``start`` and ``end`` (2,) are x and x' [m, m/s]; ``first`` is p before the first piece [m], NaN
+    where it may jump; ``prices`` are T and R [s]. The miss is |x_N - x*| + |x'_N - x'*| / w_N.
+    """
+    n = p.shape[0]
+    smooth, arrive = prices
+    # x_N = free + sum gain_k p_k, the same of x'_N / w_N.
+    gain, free = np.empty((2, n)), np.empty(2)
+    last = pieces.rate[n - 1]
+    free[0], free[1] = start[0], start[1]
+    for k in range(n):
+        w, dt = pieces.rate[k], pieces.duration[k]
+        c, s = np.cosh(w * dt), np.sinh(w * dt)
+        for j in range(k):
+            ahead, speed = gain[0, j], gain[1, j]
+            gain[0, j], gain[1, j] = c * ahead + s / w * speed, w * s * ahead + c * speed
+        gain[0, k], gain[1, k] = 1.0 - c, -w * s
+        free[0], free[1] = c * free[0] + s / w * free[1], w * s * free[0] + c * free[1]
+    for j in range(n):
+        gain[1, j] /= last
+    left0, left1 = end[0] - free[0], (end[1] - free[1]) / last
+    matrix, right = np.zeros((n, n)), np.empty(n)
+    for i in range(n):
+        for j in range(n):
+            matrix[i, j] = arrive * (gain[0, i] * gain[0, j] + gain[1, i] * gain[1, j])
+        matrix[i, i] += pieces.duration[i]
+        right[i] = arrive * (gain[0, i] * left0 + gain[1, i] * left1)
+        right[i] += pieces.duration[i] * pieces.wish[i]
+        price = smooth * smooth / pieces.duration[i]
+        if i > 0:
+            matrix[i, i] += price
+            matrix[i - 1, i - 1] += price
+            matrix[i, i - 1] -= price
+            matrix[i - 1, i] -= price
+        elif not np.isnan(first):
+            matrix[0, 0] += price
+            right[0] += price * first
+    bounded(matrix, right, pieces.low, pieces.high, p)
+    for j in range(n):
+        left0 -= gain[0, j] * p[j]
+        left1 -= gain[1, j] * p[j]
+    return abs(left0) + abs(left1)
+
+
+def plans() -> None:
+    """A plan, made to compile it."""
+    one = np.ones(2)
+    pressure(Pieces(one, one, -one, one, one), one, one, 0.0, (SMOOTH, ARRIVE), np.empty(2))
+
+
+PRESSURE = (Part(plans, 1.5),)
+"""Compiled functions of a plan of the centre of pressure."""
