@@ -128,9 +128,7 @@ class EmbeddingController:
         self.swings = o.swings(robot, scale)
         self.feet = Feet(self.swings.other, self.references.foot, tick["feet"])
         com = self.references.com
-        self.path_clock = PathClock(
-            self.parameters, o.replan, com, tick["path"], robot.half_length
-        )
+        self.path_clock = PathClock(self.parameters, o.replan, com, tick["path"], robot.half_length)
         weight = robot.mass * robot.gravity
         self.contacts = ContactMonitor(o.contacts, weight, tick["contacts"], robot.groups)
         standing = self.contacts.standing

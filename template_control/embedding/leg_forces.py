@@ -32,7 +32,8 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
     Springs push with k (l0 - l). Where none are, both legs carry m (g_y + y'') so that the centre
     of pressure is x - y (x'' + g_x) / (g_y + y''), or the foot next to it; each force acts along
     its leg. Of feet that bear the centre of pressure ahead and behind too, either one's share is
-    1/2 in the middle of both, and falls to 0 at the other end of the ground that they bear it on. The assist of two legs moves load from one to the other, so that it lifts nothing.
+    1/2 in the middle of both, and 0 at the other end of the ground that they bear it on. The assist
+    of two legs moves load from one to the other, so that it lifts nothing.
 
     Args:
         meta_row: (7,) toes and stiffnesses of the path's segment; NaN for legs without springs.

@@ -66,6 +66,7 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
         lambda speed: suited_height(speed / unit) * p.rest_length,
         vlo_height=_family_height(p) if push_off else None,
         walks=StrideKind.WALK_PUSH_OFF if push_off else StrideKind.WALK,
+        bears=robot.half_length > 0.0,
     )
 
 

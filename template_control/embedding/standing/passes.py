@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.embedding.standing.curves import STAND, BetweenFeet, StandingOptions
+from template_control.embedding.standing.pressure import PRESSURE
 from template_control.embedding.standing.supports import OverFeet
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Slot, StrideKind
@@ -93,7 +94,7 @@ class PassTable:
     def __init__(
         self, parameters: SlipParameters, options: StandingOptions, family: GaitsBySpeed
     ) -> None:
-        ready(STAND)
+        ready(PRESSURE if options.half_length else STAND)
         self.parameters, self.options, self.family = parameters, options, family
         self.scale = Scale.of(parameters)
         self._simulator = StrideSimulator(parameters, AUTOMATON)

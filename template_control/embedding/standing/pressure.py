@@ -165,11 +165,129 @@ def pressure(
     return abs(left0) + abs(left1)
 
 
+class Ground(NamedTuple):
+    """Ground under both feet, and how its use is priced.
+
+    Attributes:
+        rear, front: x of the feet [m].
+        low, high: x between which both together bear the centre of pressure [m].
+        gravity: g [m/s^2].
+        reach: longest way from a foot to the CoM [m].
+        slack: excess that costs nothing [m].
+        pace: price of a second more or less than ``calm`` [m/s].
+        calm: duration that is liked best [s].
+        unloading: time before the end over which the rear foot gives up its load [s]; 0: it stays.
+        smooth, arrive: T and R [s].
+    """
+
+    rear: float
+    front: float
+    low: float
+    high: float
+    gravity: float
+    reach: float
+    slack: float
+    pace: float
+    calm: float
+    unloading: float
+    smooth: float
+    arrive: float
+
+
+_LIGHTEST = 0.05  # of the weight: legs do not pull
+_TERMS = 6
+
+
+@compiled
+def best_pressure(
+    start: Array, ends: Array, durations: Array, ground: Ground, jumps: bool, p: Array, rates: Array
+) -> tuple[float, float, int, int]:
+    """Cost and excess [m] of the best curve: excess beyond the slack, and time.
+
+    The height is a quintic, between the states x, y, each position, velocity and acceleration, of
+    ``start`` (2, 3) and of ``ends`` (n, 2, 3); ``durations`` (d,) are tried to each of these [s].
+    Where p ``jumps``, it may at once be anywhere. The excess is the miss of the end, or by how far
+    a leg would be longer than its reach. Centres of pressure ``p`` (k,) and w ``rates`` (k,) of
+    the pieces are overwritten; also returns the numbers of the end and of the duration.
+    """
+    n = p.shape[0]
+    best, least, chosen, lasting = np.inf, np.inf, 0, 0
+    rise, low, high = np.empty(_TERMS), np.empty(n), np.empty(n)
+    wish, lasts, rate, found = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    for i in range(durations.shape[0]):
+        t = durations[i]
+        time = ground.pace * (t + ground.calm * ground.calm / t)
+        if time >= best:
+            continue
+        for e in range(ends.shape[0]):
+            _quintic(start[1], ends[e, 1], t, rise)
+            goal = ground.front if ground.unloading > 0.0 else ends[e, 0, 0]
+            for k in range(n):
+                lasts[k] = t / n
+                y, _, lift = _at(rise, (k + 0.5) * t / n)
+                lift = max(ground.gravity + lift, _LIGHTEST * ground.gravity)
+                rate[k] = np.sqrt(lift / max(y, _LIGHTEST * ground.reach))
+                wish[k], left = goal, 1.0
+                if ground.unloading > 0.0:
+                    left = min((n - k - 1) * t / n / ground.unloading, 1.0)
+                    low[k] = goal + left * (ground.low - goal)
+                    high[k] = goal + left * (ground.high - goal)
+                else:
+                    low[k], high[k] = ground.low, ground.high
+            pieces = Pieces(lasts, rate, low, high, wish)
+            first = np.nan if jumps else start[0, 0] - start[0, 2] / rate[0] ** 2
+            prices = (ground.smooth, ground.arrive)
+            excess = pressure(pieces, start[0], ends[e, 0], first, prices, found)
+            x, v = start[0, 0], start[0, 1]
+            for k in range(n):
+                x, v = _after(x, v, rate[k], found[k], lasts[k])
+                y, _, _ = _at(rise, (k + 1) * t / n)
+                away = max(x - ground.rear, ground.front - x)
+                excess = max(excess, np.sqrt(away * away + y * y) - ground.reach)
+            cost = max(excess - ground.slack, 0.0) + time
+            if cost < best:
+                best, least, chosen, lasting = cost, excess, e, i
+                for k in range(n):
+                    p[k], rates[k] = found[k], rate[k]
+    return best, least, chosen, lasting
+
+
+@compiled
+def _after(x: float, v: float, w: float, p: float, dt: float) -> tuple[float, float]:
+    """Position and velocity after a piece."""
+    c, s = np.cosh(w * dt), np.sinh(w * dt)
+    return p + c * (x - p) + s / w * v, w * s * (x - p) + c * v
+
+
+@compiled
+def _quintic(start: Array, end: Array, t: float, c: Array) -> None:
+    """Write the coefficients (6,) of the quintic of a duration [s], constant term first."""
+    p, v, a = start[0], start[1], start[2]
+    d = end[0] - p - v * t - 0.5 * a * t * t
+    w, h = (end[1] - v - a * t) * t, (end[2] - a) * t * t
+    c[0], c[1], c[2] = p, v, 0.5 * a
+    c[3] = (10.0 * d - 4.0 * w + 0.5 * h) / t**3
+    c[4] = (-15.0 * d + 7.0 * w - h) / t**4
+    c[5] = (6.0 * d - 3.0 * w + 0.5 * h) / t**5
+
+
+@compiled
+def _at(c: Array, t: float) -> tuple[float, float, float]:
+    """Value of a polynomial, and its first two derivatives."""
+    p = d = dd = 0.0
+    for n in range(c.shape[0] - 1, -1, -1):
+        dd = dd * t + d
+        d = d * t + p
+        p = p * t + c[n]
+    return p, d, 2.0 * dd
+
+
 def plans() -> None:
     """A plan, made to compile it."""
-    one = np.ones(2)
-    pressure(Pieces(one, one, -one, one, one), one, one, 0.0, (SMOOTH, ARRIVE), np.empty(2))
+    states, one = np.ones((1, 2, 3)), np.ones(2)
+    ground = Ground(0.0, 1.0, 0.0, 1.0, 9.81, 1.0, 0.0, 1.0, 1.0, 0.1, SMOOTH, ARRIVE)
+    best_pressure(states[0], states, one, ground, False, one.copy(), one.copy())
 
 
-PRESSURE = (Part(plans, 1.5),)
+PRESSURE = (Part(plans, 6.5),)
 """Compiled functions of a plan of the centre of pressure."""

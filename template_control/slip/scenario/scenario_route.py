@@ -134,6 +134,9 @@ class ScenarioRoute:
         apex_height: y wanted at apex [m] by dx/dt there [m/s]; None: the scenario's.
         vlo_height: y wanted at VLO [m] by dx/dt there [m/s]; None: the scenario's.
         walks: kind of its walking steps, "wp" with push-off.
+        bears: whether feet bear the centre of pressure around them, so that a stand starts and
+            stops at the walk's own speed. Over feet that are points a change of speed takes a
+            stride of its own, and a step closes the feet.
     """
 
     @checked
@@ -143,9 +146,11 @@ class ScenarioRoute:
         apex_height: Callable[[float], float] | None = None,
         vlo_height: Callable[[float], float] | None = None,
         walks: WalkingStride = StrideKind.WALK,
+        *,
+        bears: bool = False,
     ) -> None:
         self.scenario = scenario
-        self.walks = walks
+        self.walks, self._bears = walks, bears
         self._vlo_height = vlo_height or (lambda speed: scenario.vlo[0])
         self._apex_height = apex_height or (lambda speed: scenario.apex_height)
         self.parameters = scenario.parameters
@@ -197,7 +202,8 @@ class ScenarioRoute:
         s = self.scenario
         segment = s.segments[here.index]
         kind = _STRIDES[section, segment.gait]
-        if section is REST and self._progress.kind == StrideKind.WALK_TO_STAND:
+        stopped = section is REST and self._progress.kind == StrideKind.WALK_TO_STAND
+        if stopped and not self._bears:
             kind = StrideKind.STEP_FORWARD  # the last step of a walk is a long one
         if kind in (StrideKind.WALK_TO_STAND, StrideKind.WALK):
             here, kind = self._reached(here, kind, float(z[0]), now)
@@ -230,10 +236,10 @@ class ScenarioRoute:
         """The stride at VLO with ``speed``: one to another speed comes first where it must."""
         segment = self.scenario.segments[here.index]
         if segment.gait == STAND:
-            slow = speed <= _STOPPABLE * self._unit
+            slow = self._bears or speed <= _STOPPABLE * self._unit
             return replace(here, walking=False), kind if slow else StrideKind.CHANGE_SPEED
-        if not self.scenario.stands:
-            return here, kind
+        if self._bears or not self.scenario.stands:
+            return replace(here, walking=True), kind
         if abs(speed - here.wanted(segment, now)) <= _BEHIND * self._unit:
             return replace(here, walking=True), kind
         return here, StrideKind.CHANGE_SPEED
