@@ -42,18 +42,21 @@ class Exit(NamedTuple):
 _BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
 _BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
 _BETWEEN_FEET = ("DS_ar^s", "DS_br^ws", "DS_br^sf")
+_CURVED = (*_BETWEEN_FEET, "DS_bl^ww")
 _STEPS = (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK)
 
 EXITS: tuple[Exit, ...] = (
     *(Exit(node, StrideKind.WALK_TO_RUN, entry) for node, entry in RUN_ON.items()),
     *(Exit(node, StrideKind.CHANGE_SPEED, "DS_bl^ww") for node in _BOTH_STAND),
     *(Exit(node, StrideKind.WALK_TO_STAND, "DS_br^ws") for node in _BOTH_STAND),
+    Exit("DS_bl^ww", StrideKind.WALK_TO_STAND, "DS_br^ws"),
     *(Exit(node, StrideKind.STEP_BACK, "SS_bt^sb") for node in _BEFORE_VLO),
     *(Exit(node, step, AUTOMATON.starts[step]) for node in _BETWEEN_FEET for step in _STEPS),
 )
 """All of them. A fast walk runs. The springs of a slow one would throw it back: a curve in time
 carries the CoM while both feet stand, on or to rest; the foot that is up is set down behind again.
-Where both feet stand and the CoM cannot come to rest, a step is made."""
+Where both feet stand and the CoM cannot come to rest, a step is made; where it cannot come to
+another speed, it comes to rest."""
 
 
 def entry(node: str, left: str, stride: str) -> str | None:
@@ -68,9 +71,9 @@ def entry(node: str, left: str, stride: str) -> str | None:
     return next(ways, None)
 
 
-def steps_from(node: str) -> list[str]:
-    """Kinds of the steps that can be made from a stand in ``node``, the first one first."""
-    return [way.stride for way in EXITS if way.node == node and node in _BETWEEN_FEET]
+def ways_to_rest(node: str) -> list[Exit]:
+    """Ways to a stand from a ``node`` in which a curve carries the CoM, the first one first."""
+    return [way for way in EXITS if way.node == node and node in _CURVED]
 
 
 _WALKS = (StrideKind.WALK, StrideKind.WALK_PUSH_OFF)

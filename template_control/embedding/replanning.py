@@ -24,7 +24,7 @@ from template_control.embedding.planners.planner import (
     rest_decided,
 )
 from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
-from template_control.embedding.recovery import Recovery, entry, steps_from
+from template_control.embedding.recovery import Recovery, entry, ways_to_rest
 from template_control.embedding.rollout import TemplateRollout
 from template_control.embedding.state import TemplateState
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -411,22 +411,22 @@ def _break_into(rollout: TemplateRollout, s: Situation) -> Decision | None:
 def curve_or_step(
     rollout: TemplateRollout, s: Situation, state: Array
 ) -> tuple[StrideGoal, Decision, Stride]:
-    """The curve of the stride's planner from here, or else the first step that leads to rest.
+    """The curve of the stride's planner from here, or else the first one that leads to rest.
 
     The robot is in a node where a curve carries it; ``state`` (4,) is x, y, dx/dt, dy/dt. Returns
-    goal and decision that hold from now on, and the stride from here: where a step is made instead,
-    the goal's stride and the first node are others.
+    goal and decision that hold from now on, and the stride from here: where another one is made
+    instead, such as a step, the goal's stride and the first node are that one's.
     """
     planners = rollout.planners
     node, planner = s.node.name, planners.of(s.goal)
     decision, stride = rollout.curve(node, s.sensed, state, planner, s.decision)
-    for kind in () if decision.feasible else steps_from(node):
-        other = planners.planners.get(kind)
+    for way in () if decision.feasible else ways_to_rest(node):
+        other = planners.planners.get(way.stride)
         if other is None:
             continue
-        start = rollout.automaton.starts[kind]
-        first = decided(other.decide, Context(REST.of(state), cause=Cause.RECOVERY))
-        instead, step = rollout.curve(start, s.sensed, state, other, first)
+        first = Decision(other.gait.controls, other.gait.state.copy(), True, True, False)
+        instead, rest = rollout.curve(way.entry, s.sensed, state, other, first)
         if instead.feasible:
-            return replace(s.goal, stride=kind), instead, step
+            goal = replace(s.goal, stride=way.stride, target=other.gait.state)
+            return goal, instead, rest
     return s.goal, decision, stride

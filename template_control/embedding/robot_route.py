@@ -18,7 +18,7 @@ from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.gaits.walking_by_speed import family_speeds, speed_range
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.scenario.scenario import Scenario, Segment
+from template_control.slip.scenario.scenario import STAND, Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.slip.similarity import Scale, scaled
 
@@ -39,9 +39,16 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
             the nearest speed where a segment wants what cannot be had.
 
     Raises:
-        ScenarioError: if the start, or a segment of another walk, wants a speed that no gait of
-            the robot has, or a segment a change of speed that is beyond a stride's reach.
+        ScenarioError: if a segment stands, and the robot cannot; if the start, or a segment of
+            another walk, wants a speed that no gait of the robot has, or a segment a change of
+            speed that is beyond a stride's reach.
     """
+    if scenario.stands and not isinstance(robot, PlanarBiped) and not robot.half_length:
+        number = next(i for i, s in enumerate(scenario.segments, 1) if s.gait == STAND)
+        raise ScenarioError(
+            f"segment {number} stands: {robot.name} has a floating base and cannot stand on two"
+            " feet that are points; leave the stands out, or take a robot with four legs"
+        )
     own = scenario.on(template_for(robot))
     p = own.parameters
     unit = p.speed_unit

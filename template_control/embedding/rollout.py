@@ -164,6 +164,10 @@ class RoutePlanners:
         if last is not None and last.goal.stride != goal.stride:
             asked(planner.forget)
         decision, start = self.plan(section, z, goal)
+        instead = None if decision.feasible else self._instead(goal)
+        if instead is not None:
+            goal, planner = instead, self.of(instead)
+            decision, start = self.plan(section, z, goal)
         seconds = time.perf_counter() - begin
         report = SectionReport(
             time=now,
@@ -177,6 +181,19 @@ class RoutePlanners:
             plan_seconds=seconds,
         )
         return report, start, wanted is not None
+
+    def _instead(self, goal: StrideGoal) -> StrideGoal | None:
+        """The stride after one that cannot be made, where it begins at the same section.
+
+        A stride to another speed, say, is left out: the walk goes on. None: there is no such.
+        """
+        if goal.then is None or goal.then == goal.stride or goal.then not in self.planners:
+            return None
+        begin, end = self.automaton.sections(self.automaton.starts[goal.stride])
+        after = self.automaton.sections(self.automaton.starts[goal.then])
+        if begin is not end or after[0] is not begin or after[1] is not end:
+            return None
+        return replace(goal, stride=goal.then, then=None)
 
     def padded_target(self, goal: StrideGoal) -> Array:
         """(3,) dx/dt, y, dy/dt where a goal leads to."""

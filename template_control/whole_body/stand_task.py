@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import NotNegative, Share
+from template_control.checks.ranges import NotNegative
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.terms import UP
 from template_control.slip.similarity import PER_ACCELERATION_SQUARED, tuned
 from template_control.whole_body.task import References, Rows
 
 _SIDE = 1  # y, to the left
+_GAIN = 1.5  # k: larger, and a foot that slides a little is rocked on
+_SHARE = 0.9  # of the way from the middle to the outermost contact on which p stays
 
 
 @dataclass(frozen=True)
@@ -31,13 +33,9 @@ class StandTask(Checked):
 
     Attributes:
         weight: [s^4/m^2].
-        gain: k.
-        share: of the way from the middle to the outermost contact on which p stays.
     """
 
     weight: NotNegative = tuned(10.0, PER_ACCELERATION_SQUARED)
-    gain: NotNegative = tuned(1.5)
-    share: Share = tuned(0.9)
 
     @property
     def weights(self) -> tuple[float, ...]:
@@ -51,13 +49,13 @@ class StandTask(Checked):
         stands = references.stands[: len(robot.feet)] > 0
         sides = s.contact[stands, _SIDE]
         low, high = float(sides.min()), float(sides.max())
-        middle, half = 0.5 * (low + high), 0.5 * self.share * (high - low)
+        middle, half = 0.5 * (low + high), 0.5 * _SHARE * (high - low)
         height = float(s.com[UP] - s.contact[stands, UP].mean())
         moment = robot.mass * height
         speed = float(s.com_velocity[_SIDE] - s.momentum[0] / moment)
         rate = sqrt(robot.gravity / height)
         capture = float(s.com[_SIDE]) + speed / rate - middle
-        pressure = middle + float(np.clip((1.0 + self.gain) * capture, -half, half))
+        pressure = middle + float(np.clip((1.0 + _GAIN) * capture, -half, half))
         rows.jacobian[0] = s.com_jacobian[_SIDE] - s.momentum_jacobian[0] / moment
         turning = s.momentum_bias[0] - s.momentum[0] * s.com_velocity[UP] / height
         rows.bias[0] = s.com_bias[_SIDE] - turning / moment

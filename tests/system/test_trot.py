@@ -5,9 +5,13 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
+from template_control.embedding.robot_route import robot_route
+from template_control.errors import ScenarioError
+from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.run.options import Push
 from template_control.run.specs import GaitSpec
+from template_control.slip.scenario.scenario import Scenario, Segment
 
 
 def trot(name, gait, speed, steps, **options):
@@ -87,3 +91,43 @@ def test_commands_show_a_trot(tmp_path, capsys):
     film = ["replay", str(tmp_path / "run.npz"), "--end", "0.3"]
     assert main([*film, "--html", str(tmp_path / "trot.html")]) == 0
     assert main([*film, "--gif", str(tmp_path / "trot.gif")]) == 0
+
+
+def going(*segments, **options):
+    """Go2 through a scenario that begins at rest."""
+    scenario = Scenario(segments=segments, start=(0.5, 0.98, 0.0), vlo=(0.98, 0.0))
+    robot = tc.load_floating_robot("go2")
+    return tc.simulate(tc.Experiment(robot, motion=scenario, **options))
+
+
+@pytest.mark.slow(seconds=9)
+@pytest.mark.parametrize("world", [PlantOptions(), MujocoOptions()], ids=["bullet", "mujoco"])
+def test_it_starts_trots_and_stops(world):
+    stand = Segment("stand", duration=0.4)
+    record = going(stand, Segment("walk", speed=0.5, steps=3), stand, world=world)
+    assert not record.fell, record.fall_reason
+    assert record.solved.all()
+    assert np.abs(record.attitude).max() < 0.02
+    moving = record.section_state[record.section_state[:, 0] > 0.1, 0]
+    np.testing.assert_allclose(moving, 0.5, rtol=0.06)
+    assert len(moving) == 4, "the start leads to the walk's own speed, and the stop from it"
+    last = record.time > record.time[-1] - 0.2
+    assert np.ptp(record.com[last], axis=0).max() < 1e-3
+    assert (record.contact_force[-1, :, 1] > 10.0).all(), "all four feet bear"
+
+
+@pytest.mark.slow(seconds=4)
+@pytest.mark.parametrize("direction", [0.0, 90.0, 225.0])
+def test_a_stand_is_pushed(direction):
+    push = Push(7.0, step=1, phase=0.1, duration=0.06, direction=np.radians(direction))
+    record = going(Segment("stand", duration=1.8), pushes=(push,))
+    assert not record.fell, record.fall_reason
+    assert set(record.stride.tolist()) == {0}, "it makes no step"
+    assert np.abs(record.com[-1] - record.com[0]).max() < 0.01
+    assert np.abs(record.attitude).max() < 0.05
+
+
+def test_point_feet_do_not_stand():
+    segments = (Segment("walk", speed=0.5, steps=2), Segment("stand", duration=1.0))
+    with pytest.raises(ScenarioError, match="segment 2 stands: bolt has a floating base"):
+        robot_route(tc.load_floating_robot("bolt"), Scenario(segments=segments))

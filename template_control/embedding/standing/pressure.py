@@ -285,7 +285,7 @@ def _at(c: Array, t: float) -> tuple[float, float, float]:
 def plans() -> None:
     """A plan, made to compile it."""
     states, one = np.ones((1, 2, 3)), np.ones(2)
-    ground = Ground(0.0, 1.0, 0.0, 1.0, 9.81, 1.0, 0.0, 1.0, 1.0, 0.1, SMOOTH, ARRIVE)
+    ground = Ground._make((0.0, 1.0, 0.0, 1.0, 9.81, 1.0, 0.0, 1.0, 1.0, 0.1, SMOOTH, ARRIVE))
     best_pressure(states[0], states, one, ground, False, one.copy(), one.copy())
 
 

@@ -26,6 +26,7 @@ from template_control.slip.similarity import Scale
 Array = NDArray[np.float64]
 
 _PIECES = 20  # of a curve
+_PASSING = 2.0  # longest time to a foot that is passed, over that at the present speed
 # Of the ground under the feet that a plan uses: folding legs ask for a little more.
 _SHARE = 0.8
 # For the reference template.
@@ -43,21 +44,29 @@ class OverFeet(BetweenFeet):
 
     def to_rest(self, start: Array, lands: bool = False) -> Found:
         """See :meth:`.BetweenFeet.to_rest`."""
-        return self._best(start, self.at_rest(self.place(PLACE))[None], lands, 0.0)[0]
+        return self._best(start, self.at_rest(self.place(PLACE))[None], lands, 0.0, np.inf)[0]
 
     def to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
         """See :meth:`.BetweenFeet.to_liftoff`; the rear foot has no load left at the end."""
-        return self._best(start, ends, lands, UNLOADING)
+        (x, speed, _), (height, *_) = start.tolist()
+        rate = float(np.sqrt(self.parameters.gravity / max(height, self.margin)))
+        # Once the capture point is past the foot that stays, the CoM is not thrown back again.
+        passes = speed > 0.0 and x + speed / rate > self.toes[1]
+        longest = _PASSING * max(self.toes[1] - x, 0.0) / speed if passes else np.inf
+        return self._best(start, ends, lands, UNLOADING, longest)
 
-    def _best(self, start: Array, ends: Array, lands: bool, unloading: float) -> tuple[Found, int]:
+    def _best(
+        self, start: Array, ends: Array, lands: bool, unloading: float, longest: float
+    ) -> tuple[Found, int]:
         """The best curve to one of several ends, and the end's number.
 
-        ``unloading`` is of the reference template [s].
+        It takes at most ``longest`` [s]; ``unloading`` is of the reference template [s].
         """
         unit, rules = Scale.of(self.parameters).time, self._rules
         middle, half = self.place(PLACE), _SHARE * self.options.half_length
         ground = Ground(
-            *map(float, self.toes),
+            rear=float(self.toes[0]),
+            front=float(self.toes[1]),
             low=min(middle - half, rules.low),
             high=max(middle + half, rules.high),
             gravity=self.parameters.gravity,
@@ -71,6 +80,7 @@ class OverFeet(BetweenFeet):
         )
         p, rates = np.empty(_PIECES), np.empty(_PIECES)
         durations = _DURATIONS * unit
+        durations = durations[durations <= max(longest, durations[0])]
         cost, excess, end, i = best_pressure(start, ends, durations, ground, lands, p, rates)
         curve = _curve(start, ends[end], float(durations[i]), p, rates)
         return Found(curve, excess, cost), end

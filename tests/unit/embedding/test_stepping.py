@@ -6,7 +6,7 @@ import pytest
 import template_control as tc
 from template_control.embedding import gaits_by_speed, standing_planners, standing_pose
 from template_control.embedding.planners.planner import Context
-from template_control.embedding.recovery import steps_from
+from template_control.embedding.recovery import ways_to_rest
 from template_control.embedding.standing.passes import CLOSING
 from template_control.run.options import Push
 from template_control.slip import Event
@@ -87,7 +87,7 @@ def test_a_step_is_made_where_the_feet_do_not_hold(planners, speed, holds, kind)
     assert stand.feasible == holds
     fit = [
         other
-        for other in steps_from(node)
+        for other in (way.stride for way in ways_to_rest(node))
         if planners[other]
         .curve(AUTOMATON.starts[other], start, toes, planners[other].decide(Context(z)))[0]
         .feasible

@@ -1,0 +1,114 @@
+"""Centre of pressure through a list of phases, and the curves over feet that it gives."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from template_control.embedding.com_path import derivatives
+from template_control.embedding.standing.curves import StandingOptions
+from template_control.embedding.standing.pressure import Pieces, bounded, pressure
+from template_control.embedding.standing.supports import OverFeet
+from template_control.slip.parameters import SlipParameters
+
+P = SlipParameters()
+OPTIONS = StandingOptions(half_length=0.5)
+G = P.gravity
+
+
+def problem(rng, n):
+    """Phases of changing bounds, and where they begin and end."""
+    low = rng.uniform(-0.3, 0.0, n)
+    pieces = Pieces(
+        rng.uniform(0.01, 0.04, n),
+        rng.uniform(2.8, 3.4, n),
+        low,
+        low + rng.uniform(0.0, 0.4, n),
+        rng.uniform(-0.3, 0.3, n),
+    )
+    return pieces, rng.uniform(-0.1, 0.1, 2), rng.uniform(-0.2, 0.2, 2)
+
+
+def end(pieces, start, p):
+    """x and x' / w after the pieces."""
+    x, v = start
+    for w, dt, at in zip(pieces.rate, pieces.duration, p, strict=True):
+        c, s = np.cosh(w * dt), np.sinh(w * dt)
+        x, v = at + c * (x - at) + s / w * v, w * s * (x - at) + c * v
+    return np.array([x, v / pieces.rate[-1]])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_plan_is_the_bounded_least_squares_solution(seed):
+    """Of the costs as they stand in the module, by SciPy."""
+    rng = np.random.default_rng(seed)
+    n, smooth, arrive, first = 12, 0.1, 50.0, 0.05
+    pieces, start, goal = problem(rng, n)
+    free = end(pieces, start, np.zeros(n))
+    gain = np.array([end(pieces, np.zeros(2), one) for one in np.eye(n)]).T
+    change = smooth / np.sqrt(pieces.duration)[:, None] * (np.eye(n) - np.eye(n, k=-1))
+    begun = np.zeros(n)
+    begun[0] = smooth / np.sqrt(pieces.duration[0]) * first
+    still = np.sqrt(pieces.duration)
+    aim = goal / (1.0, pieces.rate[-1])
+    rows = np.vstack((np.diag(still), change, np.sqrt(arrive) * gain))
+    wanted = np.concatenate((still * pieces.wish, begun, np.sqrt(arrive) * (aim - free)))
+    best = lsq_linear(rows, wanted, (pieces.low, pieces.high), tol=1e-14).x
+    p = np.empty(n)
+    miss = pressure(pieces, start, goal, first, (smooth, arrive), p)
+    np.testing.assert_allclose(p, best, atol=1e-6)
+    assert ((p <= pieces.low) | (p >= pieces.high)).any()
+    assert miss == pytest.approx(np.abs(end(pieces, start, p) - aim).sum())
+
+
+def test_bounds_that_meet_hold():
+    matrix, right = np.array([[2.0, -1.0], [-1.0, 2.0]]), np.array([1.0, 1.0])
+    x = np.empty(2)
+    bounded(matrix, right, np.array([0.2, -9.0]), np.array([0.2, 9.0]), x)
+    np.testing.assert_allclose(x, [0.2, 0.6])
+
+
+def samples(found):
+    """Time, x, y and the centre of pressure all along a curve."""
+    rows, begun = [], 0.0
+    for piece in found.pieces:
+        for t in np.linspace(0.0, piece.duration, 5):
+            (x, _, ddx), (y, _, ddy) = derivatives(piece.coefficients, np.array(t))
+            rows.append((begun + t, x, y, x - y * ddx / (G + ddy)))
+        begun += piece.duration
+    return np.array(rows).T
+
+
+@pytest.mark.parametrize("toes", [(0.0, 0.0), (-0.15, 0.2)])
+def test_a_start_ends_where_the_rear_foot_has_no_load(toes):
+    feet = OverFeet(toes, P, OPTIONS)
+    rest = feet.at_rest(feet.place(0.5))
+    liftoff = np.array([[toes[1] - 0.02, 0.7, 0.0], [0.96, 0.1, 0.0]])
+    found, number = feet.to_liftoff(rest, liftoff[None], False)
+    assert number == 0
+    assert feet.fits(found)
+    _, x, y, p = samples(found)
+    middle = sum(toes) / 2
+    assert middle - 0.5 < p.min() < middle - 0.1, "back first"
+    assert p.max() < middle + 0.5
+    assert p[-1] == pytest.approx(toes[1], abs=0.02)
+    np.testing.assert_allclose([x[-1], y[-1]], liftoff[:, 0], atol=0.005)
+    assert np.abs(np.diff(x)).max() < 0.05, "pieces follow each other"
+
+
+def test_a_fast_walk_comes_to_rest_between_its_feet():
+    feet = OverFeet((0.0, 0.3), P, OPTIONS)
+    found = feet.to_rest(np.array([[0.12, 1.1, 0.0], [0.96, 0.0, 0.0]]), True)
+    assert feet.fits(found)
+    _, x, y, p = samples(found)
+    np.testing.assert_allclose([x[-1], y[-1]], [0.15, OPTIONS.height], atol=0.005)
+    assert 0.15 < p.max() < 0.65
+    fast = feet.to_rest(np.array([[0.12, 2.2, 0.0], [0.96, 0.0, 0.0]]), True)
+    assert not feet.fits(fast), "its capture point is beyond the feet"
+
+
+def test_a_com_that_is_about_to_pass_is_not_thrown_back():
+    feet = OverFeet((0.0, 0.0), P, OPTIONS)
+    liftoff = np.array([[-0.05, 0.9, 0.0], [0.96, 0.1, 0.0]])
+    late = np.array([[-0.1, 1.0, 0.0], [0.95, 0.2, 0.0]])
+    found, _ = feet.to_liftoff(late, liftoff[None], False)
+    assert samples(found)[0][-1] < 0.25
