@@ -37,6 +37,7 @@ _COMMANDS = {
         "cli.motion:GO",
         "take a robot through a scenario of gaits and speeds, the template beside it",
     ),
+    "drive": ("cli.drive", "drive a robot in the browser: command, push and watch it"),
     "robots": ("cli.robots", "list the shipped robots, with the template scaled to each"),
     "replay": ("cli.replay", "show a recorded run in the browser, or write it as a page or a film"),
     "plots": ("cli.plots", "draw the figures of a recorded run"),

@@ -13,11 +13,11 @@ from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
 from template_control.run.record import Record, load_record
 from template_control.terminal import plain_console
+from template_control.view.browser import PORTS
 from template_control.view.replay.playback import FRAME_RATES, SPEEDS
 from template_control.view.replay.replay import (
     GIF_FPS,
     GIF_SECONDS,
-    PORTS,
     replay,
     save_film,
     save_html,

@@ -1,6 +1,8 @@
 from .figures import FIGURES as FIGURES
 from .figures import plot as plot
 from .figures import save_figures as save_figures
+from .live.drive import Drive as Drive
+from .live.drive import drive as drive
 from .replay.replay import save_film as save_film
 from .replay.replay import save_html as save_html
 from .scenario_figures import save_route_figures as save_route_figures

@@ -17,7 +17,8 @@ from template_control.view.style import interval
 Array = NDArray[np.float64]
 
 _ZIGZAGS = 12
-_CARRYING = 0.005  # of the weight: what the plant counts as a contact
+CARRYING = 0.005
+"""Share of the weight that the plant counts as a contact."""
 _STANCE = 0.03  # [s] a shorter contact is a scuff, no foothold
 _MOST_FRAMES = 100_000
 
@@ -74,7 +75,7 @@ def playback(
 
 def carrying(record: Record) -> NDArray[np.bool_]:
     """(T, n) whether the ground carries each foot."""
-    return np.asarray(record.contact_force[:, :, 1] > _CARRYING * record.weight)
+    return np.asarray(record.contact_force[:, :, 1] > CARRYING * record.weight)
 
 
 def stances(record: Record) -> list[list[tuple[int, int]]]:
@@ -89,7 +90,7 @@ def stances(record: Record) -> list[list[tuple[int, int]]]:
 
 def pushing(record: Record) -> NDArray[np.bool_]:
     """(T, 2) whether the template's rear and its front leg push."""
-    return np.asarray(np.linalg.norm(record.template_force, axis=2) > _CARRYING * record.weight)
+    return np.asarray(np.linalg.norm(record.template_force, axis=2) > CARRYING * record.weight)
 
 
 def spring(radius: float) -> Array:
@@ -111,13 +112,13 @@ def coil(shape: Array, begin: Array, end: Array) -> Array:
     return np.asarray(begin[:, None] + np.stack((normal, span), axis=1) @ shape.T)
 
 
-def force_arrows(force: Array, record: Record) -> Array:
-    """The ground's force on each foot (T, feet, 2 or 3) [N] as an arrow [m], 0 without contact.
+def force_arrows(force: Array, on: NDArray[np.bool_], weight: float, length: float) -> Array:
+    """The ground's forces (..., d) [N] as arrows [m], zero where a foot is not ``on`` the ground.
 
-    The weight is 0.4 rest lengths long. An arrow longer than two weights, at an impact, is
-    cut to that.
+    The ``weight`` [N] is 0.4 of the rest ``length`` [m] long. An arrow longer than two weights, at
+    an impact, is cut to that.
     """
-    arrow = np.where(carrying(record)[..., None], force / record.weight, 0.0)
+    arrow = np.where(on[..., None], force / weight, 0.0)
     size = np.linalg.norm(arrow, axis=-1, keepdims=True)
     arrow = arrow * np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))
-    return np.asarray(0.4 * record.template.rest_length * arrow)
+    return np.asarray(0.4 * length * arrow)

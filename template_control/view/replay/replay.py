@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from template_control.checks.checked import checked
-from template_control.checks.ranges import Range
 from template_control.run.record import Record
 from template_control.storage import write_text
+from template_control.view.browser import PORTS
 from template_control.view.replay.film import write_film
 from template_control.view.replay.playback import Playback, playback
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 FPS = 30.0
 GIF_FPS, GIF_SECONDS = 20.0, 4.0
-PORTS = Range(1, 65535)
-"""Of the server."""
 
 
 @checked

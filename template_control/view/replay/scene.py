@@ -7,6 +7,7 @@ looks at its origin.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from meshcat.path import Path as ScenePath
 from numpy.typing import NDArray
 
 from template_control.plant.terrain import Terrain
-from template_control.run.record import FloatingRecord, Record
+from template_control.run.record import Record
 from template_control.view.replay.playback import (
     Playback,
     carrying,
@@ -105,16 +106,7 @@ def in_space(record: Record, sides: Array) -> Space:
 
     ``sides`` (feet,) is how far to the left a planar robot's feet are [m].
     """
-    if isinstance(record, FloatingRecord):
-        away = record.template_com - record.com
-        ahead = np.stack((np.cos(record.heading), np.sin(record.heading)), axis=1)
-        com, foot, force = record.space_com, record.space_foot, record.space_force
-        template = com + np.column_stack((away[:, :1] * ahead, away[:, 1]))
-        toes = foot
-    else:
-        points = (record.com, record.template_com, record.foot, record.contact_force)
-        com, template, toes, force = map(raised, points)
-        foot = toes + sides[:, None] * np.array([0.0, 1.0, 0.0])
+    com, template, toes, foot, force = points(vars(record), sides)
     samples = np.arange(len(record.time))
     of_legs = record.of_legs(toes)
     legs = [of_legs[samples, leg] for leg in (record.rear, 1 - record.rear)]
@@ -125,12 +117,30 @@ def in_space(record: Record, sides: Array) -> Space:
         places = foot[rows, i]
         places[:, 2] = [record.ground.height_at(x) for x in places[:, 0].tolist()]
         stood.append((places, since))
-    return Space(com, template, np.stack(legs, axis=1), foot, force_arrows(force, record), stood)
+    length = float(record.template.rest_length)
+    arrows = force_arrows(force, carrying(record), record.weight, length)
+    return Space(com, template, np.stack(legs, axis=1), foot, arrows, stood)
 
 
-def raised(points: Array) -> Array:
-    """(..., 3) points with y = 0 from (..., 2) x and height [m]."""
-    return np.stack((points[..., 0], np.zeros(points.shape[:-1]), points[..., 1]), axis=-1)
+def points(fields: Mapping[str, Any], sides: Array) -> tuple[Array, ...]:
+    """CoM, template's CoM, toes, feet, and the ground's forces on these, in three directions.
+
+    ``fields`` are those of a record, by name, ``sides`` (feet,) is how far to the left a planar
+    robot's feet are [m]. CoM and template are (T, 3), the others (T, n, 3).
+    """
+    if "space_com" in fields:
+        away, heading = fields["template_com"] - fields["com"], fields["heading"]
+        ahead = np.stack((np.cos(heading), np.sin(heading)), axis=1)
+        com, foot, force = fields["space_com"], fields["space_foot"], fields["space_force"]
+        return com, com + np.column_stack((away[:, :1] * ahead, away[:, 1])), foot, foot, force
+    names = "com", "template_com", "foot", "contact_force"
+    com, template, toes, force = (raised(fields[name]) for name in names)
+    return com, template, toes, toes + sides[:, None] * np.array([0.0, 1.0, 0.0]), force
+
+
+def raised(places: Array) -> Array:
+    """(..., 3) places with y = 0 from (..., 2) x and height [m]."""
+    return np.stack((places[..., 0], np.zeros(places.shape[:-1]), places[..., 1]), axis=-1)
 
 
 def turned_to(direction: Array) -> Array:

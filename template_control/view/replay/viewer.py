@@ -5,9 +5,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import html
-import os
 import time
-import webbrowser
 from collections.abc import Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -19,6 +17,7 @@ import meshcat
 import umsgpack
 
 from template_control.errors import RecordError
+from template_control.view.browser import show_in_browser
 from template_control.view.style import COM, TEMPLATE
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
@@ -116,9 +115,7 @@ class ReplayServer:
 
     def open_browser(self) -> bool:
         """Show the replay in the user's browser; False where there is no display."""
-        if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-            return False
-        return webbrowser.open(self.url, new=2)
+        return show_in_browser(self.url)
 
     def wait(self) -> None:
         """Serve until Ctrl-C."""

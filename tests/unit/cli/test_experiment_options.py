@@ -21,7 +21,7 @@ from template_control.robot.library import robot_path
 from template_control.robot.spec import RobotSpec
 from template_control.run.specs import GaitSpec, OwnPlanner
 
-COMMANDS = ("walk", "run", "go", "robustness", "campaign")
+COMMANDS = ("walk", "run", "go", "drive", "robustness", "campaign")
 WITHOUT_EXPERIMENT = {
     "robots", "replay", "plots", "slip", "gaits", "automaton", "keys", "warm-up", "reproduce",
 }  # fmt: skip
@@ -29,6 +29,7 @@ KEPT_ELSEWHERE = {
     "help", "config", "output", "json", "no_figures", "keys", "scenario",
     "figures", "format", "dpi", "start", "end", "no_title",
     "disturbance", "quick", "workers", "markdown", "trials", "mix", "severity", "draws",
+    "port", "fps", "no_browser",
 }  # fmt: skip
 LEAVES = {leaf.path: leaf for leaf in settings.leaves(tc.Experiment)}
 SCENARIO = tc.load_scenario("examples/walk_run_walk.toml")
@@ -192,7 +193,7 @@ POSE = {
 }  # fmt: skip
 NEEDS_MORE = (
     "world.ground_step.", "world.terrain.friction", "planner.path", "motion.velocities",
-    "motion.duration",
+    "motion.duration", "motion.foreseen",
 )  # fmt: skip
 """Keys of tables that have other keys which must be given with them."""
 

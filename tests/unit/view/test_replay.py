@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.view.replay.playback import force_arrows, playback, pushing, spring
+from template_control.view.replay.playback import (
+    carrying,
+    force_arrows,
+    playback,
+    pushing,
+    spring,
+)
 from template_control.view.replay.robot_visuals import load_visuals, placements
 from template_control.view.replay.scene import in_space, scene_commands
 
@@ -131,7 +137,8 @@ def test_the_scene_moves_with_the_run(record):
 
 def test_arrows_follow_the_force_only_where_a_foot_carries(record):
     force = record.contact_force
-    arrows = force_arrows(force, record)
+    length = record.template.rest_length
+    arrows = force_arrows(force, carrying(record), record.weight, length)
     idle = force[:, :, 1] <= 0.0
     assert np.all(arrows[idle] == 0.0)
     carries = force[:, :, 1] > 100.0

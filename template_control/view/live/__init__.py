@@ -1,0 +1,1 @@
+"""Page on which a robot is driven while it walks."""

@@ -1,0 +1,283 @@
+"""Controls and plots of a page on which a robot is driven."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import radians
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.embedding.robot_template import default_gait, template_for, walking_speeds
+from template_control.errors import GaitError
+from template_control.robot.biped import Biped
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.slip.gaits.walking_by_speed import family_speeds
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
+
+Array = NDArray[np.float64]
+
+_SIDEWAYS = 0.03  # of sqrt(g l0), largest speed to the left: five-link-3d and Bolt kept it
+_TURNING = 0.1  # of sqrt(g / l0), largest rate of the heading
+_PUSH = 0.04  # of m sqrt(g l0), size of a push at first: 10 N s for five-link
+_FRICTIONS = (0.05, 1.2)
+_STEP = 0.05  # of the speed by a key [m/s, of the reference template's sqrt(g l0)]
+_WINDOW = 8.0  # [s] of the plots
+_HEIGHT = 130  # of a plot [px]
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """What a robot may be asked for on the page.
+
+    Attributes:
+        speeds: slowest and fastest [m/s].
+        first: speed that it starts with [m/s].
+        left: largest speed to the left [m/s]; 0 of a planar robot.
+        turning: largest rate of the heading [rad/s]; 0 of a planar robot.
+        push: impulse of a push at first [N s].
+    """
+
+    speeds: tuple[float, float]
+    first: float
+    left: float
+    turning: float
+    push: float
+
+    @classmethod
+    def of(cls, robot: Biped) -> Ranges:
+        """Those of a robot, whose last update is overwritten."""
+        p = template_for(robot)
+        try:
+            low, high = walking_speeds(robot)
+        except GaitError:
+            low, high = family_speeds(p)
+        free, unit = isinstance(robot, FloatingBaseBiped), p.speed_unit
+        gait = default_gait(robot)
+        push = _PUSH * p.mass * unit
+        digits = 1 - int(np.floor(np.log10(push)))
+        return cls(
+            speeds=(float(np.ceil(100.0 * low)) / 100.0, float(np.floor(100.0 * high)) / 100.0),
+            first=round(min(max(gait.mean_speed, low), high), 2),
+            left=round(_SIDEWAYS * unit, 2) if free else 0.0,
+            turning=round(_TURNING * p.gravity / unit, 2) if free else 0.0,
+            push=round(push, digits),
+        )
+
+
+@dataclass(frozen=True)
+class Deeds:
+    """What the page's controls do; each is called by another thread than the loop's.
+
+    Attributes:
+        velocity: forward and to the left [m/s], turning [rad/s].
+        push: impulse [N s] and direction from forward to the left [rad].
+        friction: of the ground.
+        speed: seconds of the run per second.
+        pause: halts the run, or lets it go on.
+        tick, step: of a halted run, one.
+        reset: begins anew.
+        save: keeps what was driven.
+    """
+
+    velocity: Callable[[float, float, float], None]
+    push: Callable[[float, float], None]
+    friction: Callable[[float], None]
+    speed: Callable[[float], None]
+    pause: Callable[[], None]
+    tick: Callable[[], None]
+    step: Callable[[], None]
+    reset: Callable[[], None]
+    save: Callable[[], None]
+
+
+class Controls:
+    """Sliders, buttons and keys.
+
+    Args:
+        gui: viser's, of a server.
+        ranges: of the robot.
+        deeds: what they do.
+        friction: of the ground at first; None: it cannot be changed.
+    """
+
+    def __init__(self, gui: Any, ranges: Ranges, deeds: Deeds, friction: float | None) -> None:
+        self._gui, self._ranges, self._deeds = gui, ranges, deeds
+        self._friction = friction
+        self.status = gui.add_markdown("")
+        with gui.add_folder("Walk"):
+            self._add_walk()
+        with gui.add_folder("Push"):
+            self._add_pushes()
+        with gui.add_folder("Time"):
+            self._add_time()
+        with gui.add_folder("Keys", expand_by_default=False):
+            gui.add_markdown(
+                "W, S: faster, slower; A, D: turn; I, K, J, L: push ahead, back, to the left, to"
+                " the right; space: pause or go on; T: a tick; N: a step; R: reset"
+            )
+        self._add_keys()
+
+    def _slide(self, label: str, limits: tuple[float, float], first: float, step: float) -> Any:
+        return self._gui.add_slider(label, *limits, step, min(max(first, limits[0]), limits[1]))
+
+    def _add_walk(self) -> None:
+        r = self._ranges
+        self.speed = self._slide("speed [m/s]", r.speeds, r.first, 0.01)
+        self._velocity = [self.speed]
+        if r.left:
+            self._velocity += [
+                self._slide("to the left [m/s]", (-r.left, r.left), 0.0, 0.01),
+                self._slide("turning [rad/s]", (-r.turning, r.turning), 0.0, 0.01),
+            ]
+        for slider in self._velocity:
+            slider.on_update(lambda _: self._want())
+        self._ground = None
+        if self._friction is not None:
+            self._ground = self._slide("friction", _FRICTIONS, self._friction, 0.01)
+            ground = self._ground
+            ground.on_update(lambda _: self._deeds.friction(float(ground.value)))
+
+    def _want(self) -> None:
+        values = [float(slider.value) for slider in self._velocity]
+        forward, left, turning = [*values, 0.0, 0.0][:3]
+        self._deeds.velocity(forward, left, turning)
+
+    def _add_pushes(self) -> None:
+        free, first = bool(self._ranges.left), self._ranges.push
+        self._impulse = self._gui.add_number("impulse [N s]", first, min=0.0, step=first / 10.0)
+        names = {"ahead": 0.0, "back": 180.0}
+        if free:
+            names |= {"left": 90.0, "right": -90.0}
+        buttons = self._gui.add_button_group("push", tuple(names))
+        buttons.on_click(lambda _: self._push(names[buttons.value]))
+        if free:
+            angle = self._gui.add_slider("direction [deg]", -180.0, 180.0, 5.0, 45.0)
+            other = self._gui.add_button("push in this direction")
+            other.on_click(lambda _: self._push(float(angle.value)))
+
+    def _push(self, degrees: float) -> None:
+        impulse = float(self._impulse.value)
+        if abs(degrees) == 180.0:
+            self._deeds.push(-impulse, 0.0)
+        else:
+            self._deeds.push(impulse, radians(degrees))
+
+    def _add_time(self) -> None:
+        d = self._deeds
+        pace = self._slide("times real time", (0.05, 2.0), 1.0, 0.05)
+        pace.on_update(lambda _: d.speed(float(pace.value)))
+        deeds = {
+            "pause": d.pause,
+            "tick": d.tick,
+            "step": d.step,
+            "reset": d.reset,
+            "save": d.save,
+        }
+        buttons = self._gui.add_button_group("run", tuple(deeds))
+        buttons.on_click(lambda _: deeds[buttons.value]())
+
+    def _add_keys(self) -> None:
+        d = self._deeds
+        turn = self._ranges.turning / 5.0
+        keys: list[tuple[str, str, Callable[[], None]]] = [
+            ("faster", "W", lambda: self._nudge(0, _STEP)),
+            ("slower", "S", lambda: self._nudge(0, -_STEP)),
+            ("push ahead", "I", lambda: self._push(0.0)),
+            ("push back", "K", lambda: self._push(180.0)),
+            ("pause or go on", "space", d.pause),
+            ("one tick", "T", d.tick),
+            ("one step", "N", d.step),
+            ("reset", "R", d.reset),
+        ]
+        if turn:
+            keys += [
+                ("turn left", "A", lambda: self._nudge(2, turn)),
+                ("turn right", "D", lambda: self._nudge(2, -turn)),
+                ("push to the left", "J", lambda: self._push(90.0)),
+                ("push to the right", "L", lambda: self._push(-90.0)),
+            ]
+        for label, key, deed in keys:
+            command = self._gui.add_command(label, hotkey=key)
+            command.on_trigger(lambda _, deed=deed: deed())
+
+    def _nudge(self, which: int, by: float) -> None:
+        slider = self._velocity[which]
+        slider.value = min(max(slider.value + by, slider.min), slider.max)  # which calls _want
+
+    def reset(self) -> None:
+        """Put what is wanted, and the ground, back to what it was at first."""
+        self.speed.value = self._ranges.first
+        for slider in self._velocity[1:]:
+            slider.value = 0.0
+        if self._ground is not None:
+            self._ground.value = self._friction
+
+
+@dataclass(frozen=True)
+class _Plot:
+    """A plot over time: its title, its lines with their colours, and the least range of y."""
+
+    title: str
+    lines: tuple[tuple[str, str], ...]
+    range: tuple[float, float] | None = None
+
+
+def _plots(fastest: float) -> tuple[_Plot, ...]:
+    """Plots of a robot whose fastest speed is so much [m/s]."""
+    speeds = ("wanted", TEMPLATE), ("walked", COM)
+    return (
+        _Plot("mean speed of the last step [m/s]", speeds, (0.0, 1.2 * fastest)),
+        _Plot("torque over its limit, largest", (("left", LEFT), ("right", RIGHT)), (0.0, 1.0)),
+        _Plot("vertical force over weight", (("ground", COM), ("template", TEMPLATE))),
+    )
+
+
+class Plots:
+    """Plots of the last seconds; ``gui`` is viser's, ``fastest`` the robot's speed [m/s]."""
+
+    def __init__(self, gui: Any, fastest: float) -> None:
+        self._rows: deque[tuple[float, ...]] = deque()
+        self._shown = _plots(fastest)
+        empty = np.array([0.0, 1e-3])
+        self._plots = [
+            gui.add_uplot(
+                data=(empty, *(0.0 * empty for _ in plot.lines)),
+                series=(
+                    {"label": "s"},
+                    *({"label": name, "stroke": color, "width": 1.5} for name, color in plot.lines),
+                ),
+                title=plot.title,
+                scales={
+                    "x": {"time": False, "auto": True},
+                    "y": {"auto": True} if plot.range is None else {"range": plot.range},
+                },
+                legend={"live": False},
+                height=_HEIGHT,
+            )
+            for plot in self._shown
+        ]
+
+    def clear(self) -> None:
+        """Forget all values."""
+        self._rows.clear()
+
+    def add(self, time: float, values: tuple[float, ...]) -> None:
+        """Add a value for each line, in the order of the plots; times [s] rise."""
+        self._rows.append((time, *values))
+        while self._rows[0][0] < time - _WINDOW:
+            self._rows.popleft()
+
+    def draw(self) -> None:
+        """Send what the plots show."""
+        if len(self._rows) < 2:
+            return
+        columns = np.array(self._rows).T
+        first = 1
+        for handle, plot in zip(self._plots, self._shown, strict=True):
+            last = first + len(plot.lines)
+            handle.data = (columns[0], *columns[first:last])
+            first = last

@@ -1,0 +1,284 @@
+"""3-D scene of a run that goes on, in viser's nodes.
+
+All that moves is moved by the place and the turn of its node: viser's page applies these at once,
+and other properties, such as a line's points, a frame later. The camera stands still, and the world
+moves backward past it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from math import cos, sin
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+
+from template_control.plant.terrain import Terrain
+from template_control.run.record import FloatingRecord, Record
+from template_control.view.live.frame import Body, Frame
+from template_control.view.replay.playback import spring
+from template_control.view.replay.robot_visuals import foot_sides, load_visuals
+from template_control.view.replay.scene import plates, raised, smoothed, turned_to
+from template_control.view.style import COM, TEMPLATE, feet_shown
+
+Array = NDArray[np.float64]
+
+_GROUND, _LINES, _PUSH = "#dde1e6", "#b4bac2", "#c22f3d"
+_SEEN = 12.0  # of l0: the ground to all sides of the robot
+_RENEWED = 6.0  # of l0: so far the robot goes on a ground before it gets another one
+_SHADE = 0.85  # of a shape's colour: white ones are to be seen on white
+_TRUNK = 0.42  # opacity: the CoM and the template are in the trunk, and to be seen
+_TRAIL, _TRAILED = 60, 2  # points of the CoM's trail, and frames between them
+_FOOTHOLDS = 6  # of each foot
+# From afar with a narrow view: little perspective, so that lengths can be compared.
+_PLANAR_EYE, _FLOATING_EYE, _VIEW = (1.6, -9.0, 1.0), (4.5, -7.5, 2.6), 0.24
+_NONE = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class _Span:
+    """A node of what is one metre long, straight up; ``grows`` says whether its width does too."""
+
+    node: Any
+    grows: bool
+
+    def reach(self, begin: Array, span: Array, visible: bool) -> None:
+        """Let it reach along ``span`` (3,) from ``begin`` (3,) [m]."""
+        self.node.visible = visible
+        if visible:
+            size = float(np.linalg.norm(span))
+            self.node.position, self.node.wxyz = begin, _turned(span)
+            self.node.scale = size if self.grows else (1.0, 1.0, size)
+
+
+def _turned(direction: Array) -> Array:
+    """Quaternion w, x, y, z that turns the vertical into a direction (3,)."""
+    return np.asarray(turned_to(direction[None])[0][[3, 0, 1, 2]])
+
+
+class LiveScene:
+    """Scene of a robot, its template, and the ground.
+
+    Args:
+        scene: viser's, of a server; all that is in it is removed.
+        record: of the run so far; its robot and its facts are drawn.
+        ground: that the robot walks on.
+    """
+
+    def __init__(self, scene: Any, record: Record, ground: Terrain) -> None:
+        scene.reset()
+        scene.set_up_direction("+z")
+        scene.configure_default_lights(cast_shadow=False)
+        model, shapes, visuals = load_visuals(record)
+        self.body = Body.of(record, foot_sides(model, record.feet))
+        self._scene, self._terrain = scene, ground
+        self._model, self._data = model, model.createData()
+        self._length = length = self.body.length
+        self._floating = isinstance(record, FloatingRecord)
+        self._size = length + _spread(record)
+        self._world = scene.add_frame("/world", show_axes=False)
+        self._place: tuple[float, float] | None = None  # middle of the ground that is drawn
+        hip = model.getJointId(record.joints[record.legs[0][0]])
+        self._joints = self._add_robot(shapes, visuals, trunk=model.parents[hip])
+        self._com = self._ball("com", 0.025, COM)
+        self._template = self._ball("template", 0.016, TEMPLATE)
+        self._legs = [self._add_leg(name) for name in ("rear_leg", "front_leg")]
+        colors = [color for _, color in feet_shown(record)]
+        self._forces = [self._add_arrow(f"force_{i}", color) for i, color in enumerate(colors)]
+        self._push = self._add_arrow("push", _PUSH)
+        self._holds = [self._add_holds(i, color) for i, color in enumerate(colors)]
+        self._stood = np.zeros(len(colors), dtype=bool)
+        self._path: deque[Array] = deque(maxlen=_TRAIL)
+        self._trail = scene.add_line_segments(
+            "/world/trail", np.zeros((1, 2, 3)), _rgb(COM), thickness=0.008 * length
+        )
+        self._frames = 0
+
+    def look(self, camera: Any) -> None:
+        """Put a camera where the robot is seen from the side; from ahead too if it may turn."""
+        eye = _FLOATING_EYE if self._floating else _PLANAR_EYE
+        camera.position = tuple(self._size * x for x in eye)
+        camera.look_at, camera.fov = (0.0, 0.0, 0.0), _VIEW
+
+    def _add_robot(self, shapes: pin.GeometryModel, visuals: Any, trunk: int) -> dict[int, Any]:
+        """Nodes of the joints that have a shape, by joint."""
+        nodes: dict[int, Any] = {}
+        for shape, visual in zip(shapes.geometryObjects, visuals, strict=True):
+            joint = shape.parentJoint
+            path = f"/world/robot/{joint}"
+            if joint not in nodes:
+                nodes[joint] = self._scene.add_frame(path, show_axes=False)
+            place = pin.SE3ToXYZQUAT(shape.placement)
+            *color, opacity = visual.color
+            look = {
+                "color": tuple(round(255 * _SHADE * part) for part in color),
+                # With an opacity, be it 1, the page sorts shapes by their centres only.
+                "opacity": _TRUNK if joint == trunk else None if opacity >= 1.0 else opacity,
+                "flat_shading": True,
+                "position": place[:3],
+                "wxyz": place[[6, 3, 4, 5]],
+                "cast_shadow": False,
+            }
+            self._add_shape(f"{path}/{visual.name}", shape.geometry, look)
+        return nodes
+
+    def _add_shape(self, path: str, shape: Any, look: dict[str, Any]) -> None:
+        scene, kind = self._scene, type(shape).__name__
+        if kind == "Box":
+            scene.add_box(path, dimensions=tuple(2.0 * shape.halfSide), **look)
+        elif kind == "Sphere":
+            scene.add_icosphere(path, float(shape.radius), **look)
+        elif kind == "Cylinder":
+            height = float(2.0 * shape.halfLength)
+            scene.add_cylinder(path, float(shape.radius), height, radial_segments=20, **look)
+        else:
+            faces = (shape.tri_indices(i) for i in range(shape.num_tris))
+            triangles = np.array([(t[0], t[1], t[2]) for t in faces])
+            vertices = np.array(shape.vertices())
+            scene.add_mesh_simple(path, vertices, triangles, side="double", **look)
+
+    def _ball(self, name: str, radius: float, color: str) -> Any:
+        size = radius * self._length
+        return self._scene.add_icosphere(f"/world/{name}", size, _rgb(color), cast_shadow=False)
+
+    def _add_leg(self, name: str) -> _Span:
+        line = raised(spring(0.03 * self._length))
+        pairs = np.stack((line[:-1], line[1:]), axis=1)
+        node = self._scene.add_line_segments(
+            f"/world/{name}", pairs, _rgb(TEMPLATE), thickness=0.008 * self._length
+        )
+        return _Span(node, grows=False)
+
+    def _add_arrow(self, name: str, color: str) -> _Span:
+        vertices, faces = _arrow()
+        node = self._scene.add_mesh_simple(
+            f"/world/{name}", vertices, faces, color=_rgb(color), side="double", cast_shadow=False
+        )
+        node.visible = False
+        return _Span(node, grows=True)
+
+    def _add_holds(self, foot: int, color: str) -> deque[Any]:
+        """Marks of the last footholds of a foot, the oldest first."""
+        vertices, faces = plates(np.zeros((1, 3)), (0.05 * self._length, 0.1 * self._length))
+        marks: deque[Any] = deque()
+        for i in range(_FOOTHOLDS):
+            path, how = f"/world/foothold_{foot}_{i}", {"side": "double", "cast_shadow": False}
+            mark = self._scene.add_mesh_simple(path, vertices, faces, color=_rgb(color), **how)
+            mark.visible = False
+            marks.append(mark)
+        return marks
+
+    def draw(self, frame: Frame, push: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Show a moment; only what has changed is sent.
+
+        Args:
+            frame: the moment.
+            push: that is shown at the trunk, forward and to the left [N].
+        """
+        x, y, _ = frame.com.tolist()
+        level = float(smoothed(self._terrain, np.array([x]), self._length)[0])
+        self._world.position = (-x, -y, -level - 0.62 * self._length)
+        self._renew_ground(x, y)
+        pin.forwardKinematics(self._model, self._data, frame.q)
+        for joint, node in self._joints.items():
+            place = pin.SE3ToXYZQUAT(self._data.oMi[joint])
+            node.position, node.wxyz = place[:3], place[[6, 3, 4, 5]]
+        self._com.position, self._template.position = frame.com, frame.template
+        for leg, toe, loaded in zip(self._legs, frame.toes, frame.loaded.tolist(), strict=True):
+            leg.reach(frame.template, toe - frame.template, loaded)
+        feet = zip(self._forces, frame.foot, frame.arrow, frame.stands.tolist(), strict=True)
+        for arrow, foot, force, stands in feet:
+            arrow.reach(foot, force, stands)
+        self._draw_push(frame, push)
+        for i in np.flatnonzero(frame.stands & ~self._stood).tolist():
+            self._mark(i, frame.foot[i])
+        self._stood = frame.stands
+        self._frames += 1
+        if self._frames % _TRAILED == 0:
+            self._path.append(frame.com)
+            if len(self._path) > 1:
+                line = np.array(self._path)
+                self._trail.points = np.stack((line[:-1], line[1:]), axis=1)
+
+    def clear(self) -> None:
+        """Forget where the robot has been."""
+        self._path.clear()
+        for marks in self._holds:
+            for mark in marks:
+                mark.visible = False
+        self._stood[:] = False
+
+    def _draw_push(self, frame: Frame, push: tuple[float, float]) -> None:
+        along, left = push
+        c, s = cos(frame.heading), sin(frame.heading)
+        force = np.array([c * along - s * left, s * along + c * left, 0.0])
+        shown = bool(force.any())
+        span = force / np.linalg.norm(force) * 0.5 * self._length if shown else _NONE
+        self._push.reach(frame.com - span, span, shown)
+
+    def _mark(self, foot: int, place: Array) -> None:
+        """A foot has come down: its oldest mark goes there."""
+        marks = self._holds[foot]
+        marks.rotate(-1)
+        x, y, _ = place.tolist()
+        marks[-1].position = (x, y, self._terrain.height_at(x) + 0.002 * self._length)
+        marks[-1].visible = True
+
+    def _renew_ground(self, x: float, y: float) -> None:
+        """Draw the ground around a place [m], where the one that is drawn is too far away."""
+        length = self._length
+        if self._place is not None and np.hypot(x - self._place[0], y - self._place[1]) < (
+            _RENEWED * length
+        ):
+            return
+        self._place = x, y
+        line = np.array(self._terrain.line(x - _SEEN * length, x + _SEEN * length))
+        wide = _SEEN * length if self._floating else 1.5 * length
+        edges = [np.insert(line, 1, y + side, axis=1) for side in (-wide, wide)]
+        count = np.arange(len(line) - 1)
+        near = np.stack((count, count + 1, count + len(line)), axis=1)
+        far = near[:, [1, 1, 2]] + [0, len(line), 0]
+        how = {"side": "double", "cast_shadow": False}
+        self._scene.add_mesh_simple(
+            "/world/ground",
+            np.concatenate(edges),
+            np.concatenate((near, far)),
+            color=_rgb(_GROUND),
+            **how,
+        )
+        # A line every rest length shows that the camera travels.
+        first, last = np.ceil(line[[0, -1], 0] / length)
+        lines = np.arange(first, last) * length
+        heights = [self._terrain.height_at(place) for place in lines.tolist()]
+        centres = np.stack((lines, y + 0.0 * lines, np.array(heights) + 1e-3 * length), axis=-1)
+        stripes = plates(centres, (0.012 * length, 2.0 * wide))
+        self._scene.add_mesh_simple("/world/stripes", *stripes, color=_rgb(_LINES), **how)
+
+
+def _spread(record: Record) -> float:
+    """Largest distance of a contact from the middle of its template leg's [m]."""
+    foot = record.foot[0]
+    groups = (foot[list(group)] for group in record.groups)
+    return float(max(np.abs(places - places.mean(axis=0)).max() for places in groups))
+
+
+def _rgb(color: str) -> tuple[int, int, int]:
+    red, green, blue = (round(255 * part) for part in to_rgb(color))
+    return red, green, blue
+
+
+def _arrow(sides: int = 10) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices and faces of an arrow one metre long, straight up."""
+    turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    ring = np.stack((np.cos(turn), np.sin(turn), 0.0 * turn), axis=1)
+    shaft, head = 0.06 * ring, 0.15 * ring
+    up = np.array([0.0, 0.0, 1.0])
+    vertices = np.concatenate((shaft, shaft + 0.7 * up, head + 0.7 * up, up[None]))
+    i, j = np.arange(sides), (np.arange(sides) + 1) % sides
+    tip = np.full(sides, 3 * sides)
+    faces = [(i, j, i + sides), (j, j + sides, i + sides), (i + 2 * sides, j + 2 * sides, tip)]
+    return vertices, np.concatenate([np.stack(corners, axis=1) for corners in faces])

@@ -1,0 +1,133 @@
+"""Server of a page that steers: local, and closed to the pages of others."""
+
+from __future__ import annotations
+
+import io
+import logging
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import urlsplit
+
+from template_control.errors import MissingPackageError, ParameterError
+
+HOST = "127.0.0.1"
+PORTS = range(8080, 8180)
+"""Tried in turn where no port is asked for."""
+_ENDS = 10.0  # [s] that a server's thread may take to end
+# A browser opens connections ahead of use, and closes those that it does not need.
+_UNUSED = "opening handshake failed"
+_LOCAL = ("127.0.0.1", "localhost", "[::1]")
+
+
+def viser() -> Any:
+    """The package, an optional one.
+
+    Raises:
+        MissingPackageError: if it is not installed.
+    """
+    try:
+        import viser as package
+    except ImportError:
+        raise MissingPackageError(
+            "to drive a robot needs the package viser: pip install 'template-control[live]'"
+        ) from None
+    return package
+
+
+def is_own(host: str, origin: str | None) -> bool:
+    """True for a request of the page itself, or of a program.
+
+    A browser lets any page that it shows open a websocket here, and says in ``Origin`` whose page
+    it is. A page whose name was made to lead here has that name in ``Host``.
+
+    Args:
+        host: the request's ``Host``.
+        origin: its ``Origin``; None: it has none, and no browser has sent it.
+    """
+    if urlsplit(f"http://{host}").hostname not in [name.strip("[]") for name in _LOCAL]:
+        return False
+    return origin is None or urlsplit(origin).netloc == host
+
+
+@contextmanager
+def _closed_to_others() -> Iterator[None]:
+    """Let a server of viser's that starts meanwhile refuse what is not :func:`is_own`.
+
+    It has no option for it: it takes a request's ``Origin`` for granted.
+    """
+    import websockets.asyncio.server as server
+
+    serve = server.serve
+
+    def guarded(*args: Any, process_request: Callable[..., Any], **options: Any) -> Any:
+        def check(connection: Any, request: Any) -> Any:
+            hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+            if len(hosts) == 1 and is_own(hosts[0], *(origins or [None])):
+                return process_request(connection, request)
+            return connection.respond(HTTPStatus.FORBIDDEN, "this page is driven from itself\n")
+
+        return serve(*args, process_request=check, **options)
+
+    server.serve = guarded
+    try:
+        yield
+    finally:
+        server.serve = serve
+
+
+class PageServer:
+    """A server of viser's, for this machine only.
+
+    Args:
+        port: of the server; None: the first free one of :data:`PORTS`.
+
+    Raises:
+        MissingPackageError: if viser is not installed.
+        ParameterError: if no port is free.
+
+    Attributes:
+        viser: the server.
+        url: where a browser finds its page.
+    """
+
+    def __init__(self, port: int | None) -> None:
+        package = viser()
+        logging.getLogger("websockets.server").addFilter(_is_news)
+        chosen = _free_port(PORTS if port is None else [port])
+        others = set(threading.enumerate())
+        with _closed_to_others(), redirect_stdout(io.StringIO()):  # it prints a table
+            self.viser = package.ViserServer(host=HOST, port=chosen, verbose=False)
+        self._threads = set(threading.enumerate()) - others
+        self.url = f"http://{HOST}:{chosen}/"
+        if self.viser.get_port() != chosen:  # taken meanwhile: viser takes the next one
+            self.close()
+            raise ParameterError(f"port {chosen} was taken just now: start again")
+        self.viser.gui.configure_theme(show_share_button=False, show_logo=False)
+
+    def close(self) -> None:
+        """End the server, which prints a line about it as its threads end."""
+        with redirect_stdout(io.StringIO()):
+            self.viser.stop()
+            for thread in self._threads:
+                thread.join(_ENDS)
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    return record.getMessage() != _UNUSED
+
+
+def _free_port(ports: range | list[int]) -> int:
+    for port in ports:
+        with socket.socket() as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                trial.bind((HOST, port))
+                return port
+            except OSError as error:
+                reason = error.strerror
+    where = f"port {ports[0]}" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]}"
+    raise ParameterError(f"the page does not start on {where} ({reason}): give another --port")
