@@ -28,6 +28,9 @@ _WALK = (_TOUCHDOWN, 1.1 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_leng
 # Of the straight leg at touchdown, as five-link with l0 = 1 m; the test
 # test_the_reference_template_is_five_link_s holds it.
 _STRETCH = 0.903514524055713
+# Of legs that end in an ankle: more bent, the rear one comes to the ankle's stop late in double
+# stance, as its sole is level.
+_SOLE_STRETCH = 0.95
 _KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in all robots that ran
 _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
 _SHORTEST = 0.8  # of l0, at the bottom: shorter, and the knees come to their stops
@@ -81,15 +84,17 @@ def template_for(robot: Biped) -> SlipParameters:
     """The reference template scaled to a robot's mass and legs by dynamic similarity.
 
     l0 is such that the leg is stretched as far at the default gait's touchdown as the
-    five-link robot's, whose CoM is 1 m from its foot then; the stiffness keeps k l0 / (m g).
+    five-link robot's, whose CoM is 1 m from its foot then; the stiffness keeps k l0 / (m g). With
+    flat feet the leg is that from hip to ankle, and stretched a little further.
 
     Args:
         robot: its last update is overwritten.
     """
     q = robot.neutral()
     robot.update(q, np.zeros(robot.nv))
-    above_hip = float(robot.com[1] - robot.hip_height(q))
-    reach = _STRETCH * (robot.leg_length + robot.foot_radius)
+    above_hip = float(robot.com[1] - robot.hip_height(q)) + robot.ankle_height
+    stretch = _SOLE_STRETCH if robot.patches else _STRETCH
+    reach = stretch * (robot.leg_length + robot.foot_radius)
     sine, cosine = float(np.sin(_TOUCHDOWN)), float(np.cos(_TOUCHDOWN))
     length = above_hip * sine + float(np.sqrt(reach**2 - (above_hip * cosine) ** 2))
     weight = robot.mass * robot.gravity
@@ -193,7 +198,7 @@ def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
     time = gait.step_duration - double
     # The foot goes two steps while the hips move on.
     angle = (2.0 * gait.step_length - gait.mean_speed * time) / robot.leg_length
-    joint = robot.legs[0][-2]  # the knee comes last
+    joint = robot.hinges[0][0]
     hip = robot.base_dof + joint
     momentum = abs(float(robot.angular_momentum_jacobian[hip])) * _QUINTIC_SPEED * angle / time
     torque = float(robot.mass_matrix[hip, hip]) * _QUINTIC_ACCELERATION * angle / time**2
@@ -205,7 +210,7 @@ def _stance(robot: Biped, gait: WalkingGait) -> float:
     """The largest knee torque over its limit, of a leg without mass that pushes as the spring."""
     p = gait.parameters
     torque = stance_figures(gait)[0] * p.mass * p.gravity * p.rest_length / len(robot.groups[0])
-    return torque / min(float(robot.torque_limit[leg[-1]]) for leg in robot.legs)
+    return torque / min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
 
 
 def knee_torque(robot: Biped, gait: RunningGait) -> float:
@@ -255,6 +260,6 @@ def _bears(robot: Biped, speed: float, height: float, torque_scale: float) -> bo
         gait = running_gait(p, speed, height)
     except GaitError:
         return False
-    limit = torque_scale * min(float(robot.torque_limit[leg[1]]) for leg in robot.legs)
+    limit = torque_scale * min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
     folded = _shortest_leg(gait) < _SHORTEST * p.rest_length
     return not folded and knee_torque(robot, gait) <= _BEARABLE * limit

@@ -43,7 +43,7 @@ from template_control.embedding.swing import (
     spread_contacts,
     swing_step,
 )
-from template_control.robot.terms import LEGS, UP
+from template_control.robot.terms import LEGS, PATCH, UP
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.problem import solve_free
 from template_control.whole_body.tasks import write_rows
@@ -98,8 +98,10 @@ zero."""
 QUIET, EVENTFUL, DIVERGED = 0, 1, 2
 """Results of :func:`sense`: nothing to decide; an event, or a plan that is due; no finite state."""
 
-_TOUCHDOWN = int(Event.TOUCHDOWN)
+_TOUCHDOWN, _VLO = int(Event.TOUCHDOWN), int(Event.VLO)
 _LIFTOFFS = (int(Event.REAR_LIFTOFF), int(Event.FRONT_LIFTOFF))  # by leg
+_SIDE_GAIN = 2.0  # by which the centre of pressure moves beyond the capture point's error
+_SIDE_SHARE = 0.7  # of half a sole's width, by which it moves at most
 _REAR = 0
 _SIDE = 1
 
@@ -238,6 +240,9 @@ def advance(
         want.com_now[k] = s.state[k]
     want.com_now[0] -= s.toes[0]
     want.com_push = t.trim if mode.trim_momentum else 0.0
+    want.lead = t.path.offset
+    if arrays[4].shape[1] == PATCH:
+        _sway(t, r, want)
     want.pitch = advance_lean(t.lean, r.attitude[1] - t.frame.angle, dt) + t.frame.angle
     for leg in range(LEGS):
         want.feet[leg] = t.feet.roles[leg]
@@ -297,7 +302,7 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
             if mode.rolling_contact:
                 foothold = rolled(foothold, path.touchdown_angle, r.foot_radius)
             swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), dt)
-        hip = (r.hips[0], r.hips[UP])
+        hip = (r.hips[0] + r.toe_ahead, r.hips[UP] - r.ankle_height)
         want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], r.leg_length)
 
 
@@ -372,6 +377,38 @@ def _place_contacts(t: Any, r: Any, want: Any) -> None:
 
 
 @compiled
+def _sway(t: Any, r: Any, want: Any) -> None:
+    """Write how a robot on soles is to sway: as the template, and in single stance held to its gait.
+
+    The capture point xi = y + a s / w diverges with w = sqrt(a g / h), s the lateral speed with the
+    momentum, a the sway ratio. In the gait's periodic motion it is at X*_y + X*_v / w from the
+    stance foot at the section. The centre of pressure moves beyond it where it is off:
+
+        s' = sum_i f_i (y - y_i) / (m h) - (z'' + g) / h clip(k e),
+        e = xi - y_i - (X*_y + X*_v / w) exp(w t), t since the section, or -t until it.
+    """
+    mode, forces, height = t.mode, t.path.forces, t.sensed.state[1]
+    want.sway = 0.0
+    for leg in range(mode.stances):
+        foot = t.feet.roles[leg]
+        away = r.com[_SIDE] - r.foot_position[foot, _SIDE]
+        want.sway += forces[leg, 1] * away / (r.mass * height)
+    if mode.stances != 1:
+        return
+    lateral, foot, rate = t.lateral, t.feet.roles[0], np.sqrt(r.sway * r.gravity / height)
+    since = t.time - lateral.section_began
+    if mode.next_touchdown_leg < 0:
+        since = t.path.time - t.path.event_times[_VLO]
+    point = r.com[_SIDE] + side_speed(t, r) / rate - r.foot_position[foot, _SIDE]
+    wanted = (lateral.cycle[0] + lateral.cycle[1] / rate) * np.exp(rate * since)
+    if not np.isfinite(wanted):
+        return  # the path comes to no section
+    bound = _SIDE_SHARE * r.sole_half[r.group[foot, 0], _SIDE]
+    moved = min(max(_SIDE_GAIN * (point - wanted), -bound), bound)
+    want.sway -= (want.com[5] + r.gravity) / height * moved
+
+
+@compiled
 def _bear(t: Any, r: Any, qp: Any, want: Any, directions: int) -> None:
     """Write the template's forces on the contacts that stand, and how far they unload.
 
@@ -440,4 +477,5 @@ def side_speed(t: Any, r: Any) -> float:
     speed = r.com_velocity[_SIDE]
     if t.mode.momentum_speed:
         speed -= r.momentum[0] / (r.mass * t.sensed.state[1])
+        speed *= r.sway
     return speed

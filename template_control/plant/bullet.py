@@ -23,7 +23,7 @@ from template_control.plant.trunk import READ, read_trunk
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.spec import RobotSpec
-from template_control.robot.terms import FLOATING_DOF, PLANAR_DOF
+from template_control.robot.terms import FLOATING_DOF, PATCH, PLANAR_DOF
 from template_control.robot.urdf import link_masses
 from template_control.warm_up import ready
 
@@ -139,7 +139,7 @@ class BulletPlant:
         self._actuated = [by_name[name] for name in robot.joint_names]
         self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
         self._trunk = self._trunk_link()
-        self._forces = np.zeros((len(robot.feet), robot.directions))
+        self._forces = np.zeros((len(robot.feet), robot.contact_rows))
         self._trunk_lies = False
         self._stale = True  # whether the contacts of the last step are still to be asked for
         self._configure(len(info))
@@ -261,6 +261,8 @@ class BulletPlant:
     def contact_forces(self, out: Array) -> None:
         """Write the ground's force on each contact (n, d) [N], x first and up last, into ``out``.
 
+        Of soles (n, 6): then the moment about the world's origin [N m].
+
         Averages over the last physics step: the first sample of a touchdown is an impulse
         divided by that step.
         """
@@ -291,12 +293,19 @@ class BulletPlant:
                 continue
             # Normal force and direction (a wall pushes sideways), two of friction.
             normal, along, across = contact[9], contact[10], contact[12]
-            for i, axis in enumerate(axes):
-                forces[foot, i] += sign * (
+            force = [
+                sign
+                * (
                     normal * contact[7][axis]
                     + along * contact[11][axis]
                     + across * contact[13][axis]
                 )
+                for axis in axes
+            ]
+            for i, part in enumerate(force):
+                forces[foot, i] += part
+            if forces.shape[1] == PATCH:
+                forces[foot, 3:] += np.cross(contact[6], force)
 
     def step(self, torque: Array, push: float = 0.0) -> None:
         """Advance one physics step.

@@ -21,6 +21,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.legs import foot_frame
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import UNLIMITED
+from template_control.robot.sole import sole_balls
 from template_control.robot.terms import PLANAR_DOF
 
 Array = NDArray[np.float64]
@@ -38,8 +39,8 @@ _ROOT = 1  # Pinocchio's index of the free flyer
 def mjcf(robot: Biped, world: PlantOptions, contact_time: float) -> str:
     """The model as MuJoCo reads it; ``contact_time`` is the contacts' time constant [s].
 
-    The joints have the names of Pinocchio's, the feet's spheres are ``foot0`` and ``foot1``, and
-    the trunk's body and shapes begin with ``trunk``. Feet and a planar robot's trunk meet the
+    The joints have the names of Pinocchio's, the feet's spheres are ``foot0`` and ``foot1``, of soles
+    ``foot0_0`` to ``foot1_3``, and the trunk's body and shapes begin with ``trunk``. Feet and a planar robot's trunk meet the
     ground; the other links, and the robot itself, do not.
     """
     root = Element("mujoco", model="plant")
@@ -60,8 +61,12 @@ def mjcf(robot: Biped, world: PlantOptions, contact_time: float) -> str:
     bodies = add_robot(ground, robot, world)
     for i, foot in enumerate(robot.feet):
         frame = robot.model.frames[foot_frame(robot.model, foot)]
-        centre = _text(frame.placement.translation)
-        _add_ball(bodies[frame.parentJoint], f"{FOOT}{i}", centre, robot.foot_radius)
+        balls = {f"{FOOT}{i}": (frame.placement.translation, robot.foot_radius)}
+        if robot.patches:
+            found = sole_balls(robot.urdf, robot.model, foot)
+            balls = {f"{FOOT}{i}_{k}": ball for k, ball in enumerate(found)}
+        for name, (centre, radius) in balls.items():
+            _add_ball(bodies[frame.parentJoint], name, _text(centre), radius)
     if isinstance(robot, PlanarBiped):
         for i, (x, z) in enumerate(trunk_corners(robot).T):
             centre = _text(np.array((x, 0.0, z)) @ robot.trunk_axes)

@@ -17,7 +17,7 @@ from template_control.plant.bullet import AXES, PlantOptions
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.plant.terrain import pieces
 from template_control.robot.biped import Biped
-from template_control.robot.terms import FLOATING_DOF
+from template_control.robot.terms import FLOATING_DOF, PATCH, UP
 
 Array = NDArray[np.float64]
 
@@ -92,13 +92,18 @@ class MujocoPlant:
         self._actuated = self._v[-len(robot.joint_names) :]
         self._trunk = self.model.body(TRUNK).id
         shapes = [self.model.geom(i).name for i in range(self.model.ngeom)]
-        self._feet = {shapes.index(f"{FOOT}{i}"): i for i in range(len(robot.feet))}
+        self._feet = {
+            shape: i
+            for i in range(len(robot.feet))
+            for shape, name in enumerate(shapes)
+            if name.partition("_")[0] == f"{FOOT}{i}"
+        }
         _, stand_out = pieces(options.ground)  # the first shapes, after the plane
         own = [False, *(piece.friction is not None for piece in stand_out)]
         self._common_ground = [i for i, has_own in enumerate(own) if not has_own]
         self._trunk_shapes = {i for i, name in enumerate(shapes) if name.startswith(TRUNK)}
         self._force = np.zeros(6)
-        self._forces = np.zeros((len(robot.feet), robot.directions))
+        self._forces = np.zeros((len(robot.feet), robot.contact_rows))
         self._trunk_lies = False
         self._stale = True  # whether the contacts of the last step are still to be gone through
         check_mass_matrix(robot, "MuJoCo", self._mass_matrix)
@@ -151,7 +156,8 @@ class MujocoPlant:
             return
         self._stale, self._trunk_lies = False, False
         self._forces[:] = 0.0
-        axes, contacts = AXES[self._forces.shape[1]], self.data.contact
+        rows = self._forces.shape[1]
+        axes, contacts = AXES[min(rows, UP + 1)], self.data.contact
         for i, shapes in enumerate(contacts.geom.tolist()):
             ours = 1 if shapes[1] in self._feet else 0
             foot = self._feet.get(shapes[ours])
@@ -161,7 +167,10 @@ class MujocoPlant:
             self._engine.mj_contactForce(self.model, self.data, i, self._force)
             # The contact's axes are the rows of its frame; its force acts on the second shape.
             force = (contacts.frame[i].reshape(3, 3).T @ self._force[:3])[axes]
-            self._forces[foot] += force if ours else -force
+            force = force if ours else -force
+            if rows == PATCH:
+                force = np.concatenate((force, np.cross(contacts.pos[i], force)))
+            self._forces[foot] += force
 
     def step(self, torque: Array, push: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`."""

@@ -55,7 +55,8 @@ class Plant(Protocol):
 
         Args:
             out: (n, 2) overwritten with x and y of each contact's force, in the order of the
-                robot's ``feet`` [N]; (n, 3) with x, y and z of a floating-base robot's.
+                robot's ``feet`` [N]; (n, 3) with x, y and z of a floating-base robot's. Of a robot
+                with soles (n, 6): the force, then its moment about the world's origin [N m].
         """
 
     def trunk_touches_ground(self) -> bool:

@@ -11,9 +11,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.robot.legs import HINGES, foot_frame, leg_joints, middle, straight_legs
+from template_control.robot.legs import (
+    add_foot_frame,
+    foot_frame,
+    leg_hinges,
+    leg_joints,
+    middle,
+    straight_legs,
+)
 from template_control.robot.requirements import add_feet, check_size
 from template_control.robot.robot import WORLD_ALIGNED, Robot
+from template_control.robot.sole import Patch
 from template_control.robot.terms import UP, sources
 from template_control.robot.urdf import with_masses
 from template_control.structured import Number
@@ -23,15 +31,16 @@ Array = NDArray[np.float64]
 SINGLE = ((0,), (1,))
 """Groups of a biped with point feet: each contact is a foot."""
 
-_BENT = np.array([-0.4, 0.8])  # of hip and knee [rad]
+_BENT = np.array([-0.4, 0.8, -0.4])  # of hip, knee and ankle [rad]
+_KNEE = 1  # place among the hinges of a leg
 _SAGITTAL = {2: 1, 3: UP}  # by directions: from forward to up
 
 
 class Biped(Robot):
     """A robot on two template legs, and its kinematics and dynamics at the last :meth:`update`.
 
-    It touches the ground at *contacts*, the lowest points of its foot spheres. A leg of the
-    template is a group of contacts, and its foot is their mean. A biped with point feet has two
+    It touches the ground at *contacts*, the lowest points of its foot spheres, or with patches, the
+    soles of flat feet, whose points here are their toes. A leg of the template is a group of contacts, and its foot is their mean. A biped with point feet has two
     groups of one; of a quadruped that trots either diagonal pair is a virtual leg (Raibert).
 
     Sagittal quantities have two entries, x forward and y up: of a planar robot in the world, of a
@@ -45,12 +54,17 @@ class Biped(Robot):
         model: the Pinocchio model.
         feet: names of the contacts' frames; of a biped left then right.
         groups: the contacts of each of the two template legs.
-        foot_radius: radius of the foot spheres [m].
+        foot_radius: radius of the foot spheres; 0 of flat feet [m].
+        patches: of flat feet, the soles; () of point feet.
         walk: touchdown angle [rad] and speed at VLO over sqrt(g l0) of its default gait, or
             None where none is better than the library's.
         legs: for each foot, the indices into ``joint_names`` of its joints, hip first.
-        leg_length: from hip to the foot sphere's centre, with a knee as straight as its range lets
-            it be [m].
+        hinges: for each foot, those of them that swing and bend the leg: hip and knee, of flat feet
+            also the ankle.
+        leg_length: from hip to the foot sphere's centre or to the ankle, with a knee as straight as
+            its range lets it be [m].
+        ankle_height: of flat feet, over the sole; 0 of point feet [m].
+        toe_ahead: of flat feet, of the ankle; 0 of point feet [m].
         spread: (n, 2) x and y of each contact from its foot, where the legs hang down [m].
         joint_sign: (nu,) 1 of a hip or knee that turns about +y, -1 about -y; of joints above the
             hip the sign of their axis' y.
@@ -69,7 +83,7 @@ class Biped(Robot):
         angular_momentum_bias: that row's time derivative times v [N m].
         contact_position: (n, d) lowest point of each foot sphere, in all ``directions`` [m].
         contact_velocity: (n, d) of the material point there [m/s].
-        contact_jacobian: (n, d, nv) maps v to each contact's velocity.
+        contact_jacobian: (n, d, nv) maps v to each contact's velocity; (n, 6, nv) of patches.
         contact_bias: (n, d) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
         foot_position: (2, 2) of each template leg's foot, the mean of its contacts [m].
         foot_velocity: (2, 2) [m/s].
@@ -87,8 +101,12 @@ class Biped(Robot):
     groups: tuple[tuple[int, ...], ...]
     foot_radius: float
     walk: tuple[float, float] | None
+    patches: tuple[Patch, ...]
     legs: tuple[tuple[int, ...], ...]
+    hinges: tuple[tuple[int, ...], ...]
     leg_length: float
+    ankle_height = Number("ankle_height")
+    toe_ahead = Number("toe_ahead")
     spread: Array
     joint_sign: Array
     leg_mass: float
@@ -121,18 +139,22 @@ class Biped(Robot):
         walk: tuple[float, float] | None = None,
         *,
         groups: tuple[tuple[int, ...], ...] = SINGLE,
+        patches: tuple[Patch, ...] = (),
     ) -> None:
-        super().__init__(model, len(feet))
+        super().__init__(model, len(feet), patches=bool(patches))
         first = 1 + self.base_joints
         self.path, self.urdf = path, urdf
         self.feet, self.foot_radius, self.walk, self.groups = feet, foot_radius, walk, groups
+        self.patches, flat = patches, bool(patches)
         now = self.data[0]
         for leg, group in enumerate(groups):
             now["members"][leg], now["group"][leg, : len(group)] = len(group), group
         self._foot_ids = tuple(foot_frame(model, foot) for foot in feet)
         self._leg_joints = leg_joints(model, feet, self.base_joints)
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
-        straight = straight_legs(model, self._leg_joints, self._foot_ids)
+        self._hinges = tuple(leg_hinges(model, leg, flat) for leg in self._leg_joints)
+        self.hinges = tuple(tuple(j - first for j in leg) for leg in self._hinges)
+        straight = straight_legs(model, self._leg_joints, self._foot_ids, flat)
         self.leg_length, self._neutral = straight.reach, straight.q
         check_size(path, self.mass, self.leg_length, foot_radius)
         self.joint_sign = np.sign(straight.axes[1, self.base_dof :])
@@ -146,9 +168,26 @@ class Biped(Robot):
         self.heading_frame: Array = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
         self.data["foot_radius"], self.data["leg_length"] = foot_radius, self.leg_length
         self._sources = sources(model, data, self._foot_ids, self._joint_limits)
+        self._take_patches()
         self._look()
         self.spread = np.zeros((len(feet), 2))
         self._prepare()
+
+    def _take_patches(self) -> None:
+        """Write what is constant of the soles."""
+        now, data, model = self.data[0], self.model.createData(), self.model
+        now["sway"] = 1.0
+        if not self.patches:
+            return
+        for i, patch in enumerate(self.patches):
+            now["sole_centre"][i], now["sole_half"][i] = patch.centre, patch.half_sides
+        pin.framesForwardKinematics(model, data, self._neutral)
+        legs = zip(self._foot_ids, self._hinges, strict=True)
+        ahead, _, below = np.mean(
+            [data.oMf[toe].translation - data.oMi[ankle].translation for toe, (*_, ankle) in legs],
+            axis=0,
+        )
+        now["toe_ahead"], now["ankle_height"] = ahead, -below
 
     def _look(self) -> None:
         """Take the views that Python reads; Pinocchio keeps its arrays in place."""
@@ -163,7 +202,7 @@ class Biped(Robot):
         )
         contacts, every = len(self.feet), UP // step
         self.contact_position, self.contact_velocity, self.contact_bias = (
-            now[f"contact_{name}"][0, :contacts, ::every]
+            now[f"contact_{name}"][0, :contacts, : UP + 1 : every]
             for name in ("position", "velocity", "bias")
         )
         self.contact_jacobian = j.contact
@@ -210,10 +249,14 @@ class Biped(Robot):
         if masses:
             urdf = with_masses(self.path, urdf, masses)
             model = self._model_of(self.path, urdf)
-            add_feet(self.path, urdf, model, self.feet)
+            for foot, patch in zip(self.feet, self.patches, strict=False):
+                add_foot_frame(model, foot, patch.placement)
+            if not self.patches:
+                add_feet(self.path, urdf, model, self.feet)
         model.gravity.linear = np.array([0.0, 0.0, -(gravity or self.gravity)])
         rest = self.feet, self.foot_radius, self.walk
-        return type(self)(self.path, urdf, model, *rest, groups=self.groups)
+        own = {"patches": self.patches} if self.patches else {}
+        return type(self)(self.path, urdf, model, *rest, groups=self.groups, **own)
 
     @staticmethod
     @abstractmethod
@@ -252,12 +295,11 @@ class Biped(Robot):
             backward: bend them the other way.
         """
         q = self.neutral()
-        for leg in self._leg_joints:
-            joints = leg[-HINGES:]
+        for joints in self._hinges:
             places = [self.model.idx_qs[joint] for joint in joints]
             sign = self.joint_sign[[self.model.idx_vs[joint] - self.base_dof for joint in joints]]
-            ahead = sign[-1] * (middle(self.model, joints[-1]) - q[places[-1]]) >= 0.0
-            q[places] += (1.0 if ahead != backward else -1.0) * sign * _BENT
+            ahead = sign[_KNEE] * (middle(self.model, joints[_KNEE]) - q[places[_KNEE]]) >= 0.0
+            q[places] += (1.0 if ahead != backward else -1.0) * sign * _BENT[: len(joints)]
         return q
 
     @abstractmethod

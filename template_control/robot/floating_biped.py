@@ -25,14 +25,16 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
-from template_control.robot.legs import HINGES
 from template_control.robot.requirements import add_feet, check_floating, feet_of_legs
+from template_control.robot.sole import Sole, add_soles, find_soles, mirrored, with_balls
 from template_control.robot.terms import FLOATING_DOF, UP, Jacobians, Trunk, gather_floating
+from template_control.structured import Number
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import (
     check_joint_names,
     complete,
     drop_world,
+    joints_in_no_leg,
     lock,
     moving_joints,
     set_limits,
@@ -74,9 +76,9 @@ class SpaceTerms(NamedTuple):
         momentum_jacobian: (3, nv).
         momentum_bias: (3,) [N m].
         foot: (2, 3) of the template legs' feet, the means of their contacts [m].
-        contact: (n, 3) lowest points of the foot spheres [m].
-        contact_jacobian: (n, 3, nv).
-        contact_bias: (n, 3) [m/s^2].
+        contact: (n, 3) lowest points of the foot spheres, or toes of the soles [m].
+        contact_jacobian: (n, 3, nv); (n, 6, nv) of soles.
+        contact_bias: (n, 3) [m/s^2]; (n, 6) of soles.
         turning: (3,) angular velocity of the trunk [rad/s].
         turning_jacobian: (3, nv); its bias is 0.
     """
@@ -110,7 +112,7 @@ class SpaceTerms(NamedTuple):
             foot=now["foot_position"],
             contact=now["contact_position"][: len(j.contact)],
             contact_jacobian=j.contact,
-            contact_bias=now["contact_bias"][: len(j.contact)],
+            contact_bias=now["contact_bias"][: len(j.contact), : j.contact.shape[1]],
             turning=now["turning"],
             turning_jacobian=j.turning,
         )
@@ -130,6 +132,7 @@ class FloatingBaseBiped(Biped):
         foot_radius: of the foot spheres [m].
         walk: the robot's own gait, or None.
         groups: the contacts of each template leg.
+        patches: of flat feet, the soles.
 
     Attributes:
         heading: angle from the world's x to the heading frame's, to the left positive [rad].
@@ -138,12 +141,15 @@ class FloatingBaseBiped(Biped):
         space: all terms with three directions, in the heading frame.
         spare: of each leg with four hinges, the joint above the hip whose axis is nearest to the
             vertical: its index into ``joint_names``, and its angle in :meth:`neutral` [rad].
+        sway: of flat feet, dy/dt of the CoM over dy/dt - L_x / (m z) where the soles and the attitude
+            of the trunk rest, L the angular momentum about the CoM; 1 of point feet.
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
     """
 
     base_dof = FLOATING_DOF
     base_joints = _ROOT
     directions = 3
+    sway = Number("sway")
 
     @staticmethod
     def _model_of(path: Path, urdf: str) -> pin.Model:
@@ -153,7 +159,7 @@ class FloatingBaseBiped(Biped):
     def _prepare(self) -> None:
         model, data = self.model, self._data
         self.rotation: Array = data.oMi[_ROOT].rotation
-        self._hips = [data.oMi[leg[-HINGES]] for leg in self._leg_joints]
+        self._hips = [data.oMi[hip] for hip, *_ in self._hinges]
         self._in_leg = np.zeros((len(self._hips), 3))
         places, axes = zip(*((hip.translation, hip.rotation) for hip in self._hips), strict=True)
         self._trunk = tuple(Trunk(self.rotation, places, axes, self._in_leg))
@@ -174,7 +180,7 @@ class FloatingBaseBiped(Biped):
         self.spare = tuple(
             (joint, float(self._neutral[model.nq - len(self.joint_names) + joint]))
             for leg in self.legs
-            if len(leg) > _PLACING
+            if len(leg) > _PLACING and not self.patches
             for joint in [max(leg[:-HINGES], key=lambda j: abs(axes[FLOATING_DOF + j]))]
         )
         now = self.data[0]
@@ -182,9 +188,27 @@ class FloatingBaseBiped(Biped):
         for i, (joint, angle) in enumerate(self.spare):
             now["spare_joint"][i], now["spare_angle"][i] = joint, angle
         self.heading_frame[4] = now["hips"][1]  # of the trunk's origin
+        if self.patches:
+            now["sway"] = self._sway_ratio()
+            self.update(self._neutral, np.zeros(self.nv))
         for leg, group in enumerate(self.groups):
             contacts = list(group)
             self.spread[contacts] = (self.space.contact[contacts] - self.space.foot[leg])[:, :2]
+
+    def _sway_ratio(self) -> float:
+        """Ratio of dy/dt of the CoM to that with the momentum, dy/dt - L_x / (m z), in a sway.
+
+        It is that of the motion in which the soles and the attitude of the trunk rest: legs that
+        swing to the side with the trunk have an angular momentum about the CoM.
+        """
+        q = self.bent()
+        self.update(q, np.zeros(self.nv))
+        s = self.space
+        feet = s.contact_jacobian.reshape(-1, self.nv)
+        rows = np.concatenate((s.com_jacobian, s.turning_jacobian, feet))
+        v = np.linalg.lstsq(rows, np.eye(len(rows))[1], rcond=None)[0]
+        height = s.com[UP] - s.contact[:, UP].mean()
+        return 1.0 / (1.0 - float(s.momentum_jacobian[0] @ v) / (self.mass * float(height)))
 
     @classmethod
     @checked
@@ -200,10 +224,14 @@ class FloatingBaseBiped(Biped):
         locked: Mapping[str, float] | None = None,
         foot_offset: tuple[float, float, float] | None = None,
         lossless: bool = False,
+        flat_feet: bool = False,
+        sole: Sole | None = None,
     ) -> FloatingBaseBiped:
         """Load a URDF whose root link is the trunk: x forward, y left, z up.
 
-        Each leg ends in a hip and a knee about y; one joint or two may come before them.
+        Each leg ends in a hip and a knee about y; one joint or two may come before them. One with
+        a flat foot has hip, knee and ankle about y among joints about other axes, in any order;
+        where all are at 0 it is nearly straight and its sole level.
 
         Args:
             path: the URDF file.
@@ -218,10 +246,14 @@ class FloatingBaseBiped(Biped):
             foot_offset: of the spheres' centres from the foot links' origins, in the links' axes
                 [m]: a sole is below its ankle.
             lossless: whether the joints' damping and friction are left out.
+            flat_feet: whether a biped stands on soles, which are found from the feet's collision
+                shapes. Joints that are in no leg are then held at 0, unless ``locked`` says where.
+            sole: the left one, where it is not to be found.
 
         Raises:
             RobotError: if the file is missing, no URDF, no such robot, or lacks a foot; if a mass,
-                an inertia, a size or a limit is none; if a foot is in no group, or in two.
+                an inertia, a size or a limit is none; if a foot is in no group, or in two; if no
+                sole is found.
         """
         path = Path(path)
         tree = read_urdf(path)
@@ -231,15 +263,24 @@ class FloatingBaseBiped(Biped):
             set_limits(tree, limits.torque, limits.velocity)
             if limits.ranges:
                 set_ranges(path, tree, feet, limits.ranges)
-        if locked:
-            check_joint_names(path, tree, locked)
-            lock(path, tree, moving_joints(tree, locked), locked)
+        flat = flat_feet or sole is not None
+        if flat and foot_radius is not None:
+            raise RobotError(f"{path}: flat feet have no foot_radius: leave one of them out")
+        if locked or flat:
+            check_joint_names(path, tree, locked or ())
+            held = {*(locked or {}), *(joints_in_no_leg(tree, feet) if flat else ())}
+            lock(path, tree, moving_joints(tree, held), locked or {})
             take_points(path, tree)
         spheres(path, tree, feet, foot_radius, foot_offset)
         urdf = complete(path, tree)
         model = cls._model_of(path, urdf)
-        check_floating(path, model, feet)
+        check_floating(path, model, feet, flat)
         check_bodies(path, tree, model, _ROOT + 1)
+        if flat:
+            soles = find_soles(path, urdf, model, feet) if sole is None else mirrored(sole)
+            urdf = with_balls(urdf, model, feet, soles)
+            patches = add_soles(model, feet, soles)
+            return cls(path, urdf, model, tuple(feet), 0.0, walk, patches=patches)
         radius = add_feet(path, urdf, model, feet)
         legs = feet_of_legs(path, model, feet, groups)
         return cls(path, urdf, model, tuple(feet), radius, walk, groups=legs)

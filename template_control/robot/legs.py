@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-HINGES = 2  # hip and knee, the last joints of a leg
+HINGES = 2  # hip and knee, the last joints of a leg with a point foot
+_PARALLEL = 1e-6  # 1 - cosine of the angle between two axes
 _CENTRE = " sphere's centre"  # ends a frame's name
 _EXACT = 1e-13  # of an axis' direction
 _ITERATIONS = 30
@@ -42,23 +43,39 @@ class StraightLegs:
     axes: Array
 
 
+def leg_hinges(model: pin.Model, leg: Sequence[int], flat: bool = False) -> tuple[int, ...]:
+    """Pinocchio's joints that swing and bend a leg: hip and knee, its last two.
+
+    Of a leg with a flat foot those about the lateral axis where all joints are at 0: hip, knee and
+    ankle, among joints about other axes in any order.
+    """
+    if not flat:
+        return tuple(leg[-HINGES:])
+    axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
+    return tuple(j for j in leg if abs(abs(axes[model.idx_vs[j]]) - 1.0) <= _PARALLEL)
+
+
 def straight_legs(
-    model: pin.Model, legs: Sequence[Sequence[int]], feet: Sequence[int]
+    model: pin.Model, legs: Sequence[Sequence[int]], feet: Sequence[int], flat: bool = False
 ) -> StraightLegs:
     """The configuration with straight legs, from a model whose neutral trunk is upright.
 
     ``legs`` are Pinocchio's joints from the trunk on, the last two hip and knee; ``feet`` are
-    frames. Joints above the hip are turned until its axis is lateral, if they can.
+    frames. Joints above the hip are turned until its axis is lateral, if they can. A leg with a
+    ``flat`` foot has hip, knee and ankle as :func:`leg_hinges` finds them, ends at its ankle, and
+    stands on its sole, which is level where all joints are at 0.
     """
     data, q = model.createData(), pin.neutral(model)
-    for leg in legs:
+    for leg in () if flat else legs:
         _turn_lateral(model, data, q, leg)
     axes = np.array(pin.computeJointJacobians(model, data, q)[3:])
     pin.updateFramePlacements(model, data)
     lengths, reaches = [], []
-    for (*_, hip, knee), foot in zip(legs, feet, strict=True):
+    for leg, foot in zip(legs, feet, strict=True):
+        hip, knee, *ankle = leg_hinges(model, leg, flat)
         thigh = data.oMi[knee].translation - data.oMi[hip].translation
-        shank = data.oMf[foot].translation - data.oMi[knee].translation
+        end = data.oMi[ankle[0]] if ankle else data.oMf[foot]
+        shank = end.translation - data.oMi[knee].translation
         upper, lower = hypot(thigh[0], thigh[2]), hypot(shank[0], shank[2])
         lengths.append(upper + lower)
         lean = atan2(-thigh[0], -thigh[2])
@@ -67,6 +84,8 @@ def straight_legs(
             sign = np.sign(axes[1, model.idx_vs[joint]])
             place = model.idx_qs[joint]
             q[place] = _in_range(model, joint, q[place] - sign * angle)
+        for joint in ankle:
+            q[model.idx_qs[joint]] += np.sign(axes[1, model.idx_vs[joint]]) * (lean + bend)
         low, high = model.lowerPositionLimit[place], model.upperPositionLimit[place]
         bend = float(max(low - q[place], q[place] - high, 0.0))  # the knee's, at the least
         folded = sqrt(upper**2 + lower**2 + 2.0 * upper * lower * cos(bend))

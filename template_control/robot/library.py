@@ -30,6 +30,7 @@ class _Entry:
         planar: whether it is held in its sagittal plane, unless it is to be free.
         free: whether it can walk free.
         limits: of a robot that walks free, in place of the URDF's; None to keep those.
+        flat: whether it has flat feet.
     """
 
     file: str
@@ -42,6 +43,7 @@ class _Entry:
     planar: bool = True
     free: bool = False
     limits: JointLimits | None = None
+    flat: bool = False
 
 
 # Bolt's actuator, the module of the Open Dynamic Robot Initiative (Grimminger et al., "An open
@@ -112,6 +114,24 @@ _ENTRIES = {
         free=True,
         limits=_SOLO_ACTUATOR,
     ),
+    "g1": _Entry(
+        "g1_29dof_rev_1_0.urdf",
+        "Unitree's humanoid of example-robot-data, on flat feet, arms and waist held",
+        distribution="example-robot-data",
+        feet=("left_ankle_roll_link", "right_ankle_roll_link"),
+        planar=False,
+        free=True,
+        flat=True,
+    ),
+    "talos": _Entry(
+        "talos_reduced.urdf",
+        "PAL Robotics' humanoid of example-robot-data, on flat feet, arms and waist held",
+        distribution="example-robot-data",
+        feet=("leg_left_6_link", "leg_right_6_link"),
+        planar=False,
+        free=True,
+        flat=True,
+    ),
 }
 
 SHIPPED: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
@@ -122,6 +142,9 @@ ROBOTS: dict[str, str] = {name: SHIPPED[name] for name, e in _ENTRIES.items() if
 
 FLOATING_ROBOTS = tuple(name for name, entry in _ENTRIES.items() if entry.free)
 """Names that :func:`load_floating_robot` knows."""
+
+FLAT_FEET = tuple(name for name, entry in _ENTRIES.items() if entry.flat)
+"""Those of them that stand on soles."""
 
 QUADRUPEDS = tuple(name for name, entry in _ENTRIES.items() if len(entry.feet) > LEGS)
 """Those of them that have four legs."""
@@ -213,5 +236,10 @@ def load_floating_robot(name: str | Path) -> FloatingBaseBiped:
             " a URDF file"
         )
     return FloatingBaseBiped.from_urdf(
-        path, entry.feet, entry.foot_radius, limits=entry.limits, walk=entry.walk
+        path,
+        entry.feet,
+        entry.foot_radius,
+        limits=entry.limits,
+        walk=entry.walk,
+        flat_feet=entry.flat,
     )

@@ -15,6 +15,7 @@ from template_control.robot.legs import (
     HINGES,
     add_foot_frame,
     foot_frame,
+    leg_hinges,
     leg_joints,
     straight_legs,
 )
@@ -27,6 +28,7 @@ _CLOSE = 1e-4  # [m]
 _PARALLEL = 1e-6  # 1 - cosine of the angle between two axes
 _ROOT = 1  # Pinocchio's index of the free flyer
 _LEAST, _MOST = 3, 4  # joints of a floating-base robot's leg
+_FLAT, _SWINGING = 6, 3  # joints of one with a flat foot, and those of them about y
 # Mass over the cube of the leg's length [kg/m^3]: 20 of bolt, 110 of five-link; 100 times denser
 # and lighter ones than those that are built, and a unit of g, cm or mm is out of it.
 _DENSITY = (0.1, 2e4)
@@ -121,8 +123,13 @@ def check_guide(path: Path, model: pin.Model) -> None:
             )
 
 
-def check_floating(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
-    """Check that a robot with a free flyer has legs that can place their feet anywhere."""
+def check_floating(
+    path: Path, model: pin.Model, feet: Sequence[str], flat: bool = False
+) -> None:
+    """Check that a robot with a free flyer has legs that can place their feet anywhere.
+
+    Those with a ``flat`` foot also turn it as they like, but for one direction.
+    """
     if len(feet) not in (LEGS, 2 * LEGS):
         raise RobotError(
             f"{len(feet)} feet were named for {path}: a biped has two, a quadruped four"
@@ -140,6 +147,12 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
             f"{path}: the root link weighs nothing, and so does what is fixed to it: give the trunk"
             " an <inertial> with its mass"
         )
+    if flat:
+        _check_flat(path, model, feet, legs)
+        joints = [joint for leg in legs for joint in leg]
+        hints = {"effort": "its limit", "velocity": "its limit"}
+        _check_limits(path, model, joints, hints)
+        return
     most = _MOST if len(legs) == LEGS else _LEAST
     for leg, foot in zip(legs, feet, strict=True):
         if not _LEAST <= len(leg) <= most:
@@ -164,6 +177,27 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
         )
     hints = {"effort": "its limit", "velocity": "its limit"}
     _check_limits(path, model, joints, hints)
+
+
+def _check_flat(
+    path: Path, model: pin.Model, feet: Sequence[str], legs: Sequence[Sequence[int]]
+) -> None:
+    """Check that legs with flat feet have hip, knee and ankle, and joints to turn a sole."""
+    if len(feet) != LEGS:
+        raise RobotError(f"{path}: {len(feet)} flat feet were named: a biped has two")
+    for leg, foot in zip(legs, feet, strict=True):
+        names = [model.names[joint] for joint in leg]
+        if len(leg) != _FLAT:
+            raise RobotError(
+                f"{path}: {len(leg)} joints move flat foot {foot!r}, {names}: six are needed, by"
+                " which a sole can be placed and turned"
+            )
+        hinges = [model.names[joint] for joint in leg_hinges(model, leg, flat=True)]
+        if len(hinges) != _SWINGING:
+            raise RobotError(
+                f"{path}: with all joints at 0, {hinges} of flat foot {foot!r} turn about the"
+                f" lateral axis y: three are needed, hip, knee and ankle, of {names}"
+            )
 
 
 def feet_of_legs(

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from template_control.errors import DivergedError, RobotError
-from template_control.robot.terms import ROBOT_DATA, Jacobians, gather_joints
+from template_control.robot.terms import PATCH, ROBOT_DATA, Jacobians, gather_joints
 from template_control.structured import Number
 
 Array = NDArray[np.float64]
@@ -40,12 +40,14 @@ class Robot(ABC):
 
     Args:
         model: Pinocchio's.
-        contacts: number of points of it that may touch the ground.
+        contacts: number of points or patches of it that may touch the ground.
 
     Attributes that are constant:
         base_dof: unactuated degrees of freedom, the first ones.
         base_joints: Pinocchio's joints that they belong to.
-        directions: rows of a contact: 2 in the plane, 3 in space. The last one is up.
+        directions: of a contact's force: 2 in the plane, 3 in space. The last one is up.
+        contact_rows: rows of a contact: as many, or 6 of a patch, which also has an angular
+            velocity and a moment.
         name: of the robot.
         model: the Pinocchio model.
         nq, nv: numbers of a configuration and of a velocity.
@@ -74,10 +76,11 @@ class Robot(ABC):
     base_dof: int
     base_joints: int
     directions: int
+    contact_rows: int
     fastest = Number("fastest")
     soonest_stop = Number("soonest_stop")
 
-    def __init__(self, model: pin.Model, contacts: int = 0) -> None:
+    def __init__(self, model: pin.Model, contacts: int = 0, *, patches: bool = False) -> None:
         self.model, self.name = model, model.name or "the robot"
         self.nq, self.nv = model.nq, model.nv
         self.mass = float(pin.computeTotalMass(model))
@@ -93,7 +96,8 @@ class Robot(ABC):
         self.data = np.zeros(1, ROBOT_DATA)
         self.data["mass"], self.data["gravity"] = self.mass, self.gravity
         self.data["contacts"] = contacts
-        self.jacobians = j = Jacobians.zeros(data, self.directions, self.base_dof, contacts)
+        self.contact_rows = rows = PATCH if patches else self.directions
+        self.jacobians = j = Jacobians.zeros(data, self.directions, self.base_dof, contacts, rows)
         self.arrays = tuple(j)
         self.mass_matrix, self.nonlinear_effects = j.mass_matrix, j.nonlinear_effects
         self.joint_angle, self.joint_velocity = j.joints

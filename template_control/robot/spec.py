@@ -10,8 +10,15 @@ from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.robot.library import QUADRUPEDS, SHIPPED, load_floating_robot, load_robot
+from template_control.robot.library import (
+    FLAT_FEET,
+    QUADRUPEDS,
+    SHIPPED,
+    load_floating_robot,
+    load_robot,
+)
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.sole import Sole
 from template_control.robot.terms import LEGS
 
 
@@ -32,6 +39,9 @@ class RobotSpec(Checked):
             locked move.
         gravity: that its model and its template have [m/s^2]; None: 9.81.
         masses: of links by name, instead of the URDF's [kg]; their inertias grow alike.
+        flat_feet: whether a free robot stands on soles, as its feet's collision shapes have them;
+            joints that are in no leg are then locked.
+        sole: the left one, where it is not to be found in the URDF.
     """
 
     model: str = "five-link"
@@ -44,11 +54,18 @@ class RobotSpec(Checked):
     foot_offset: tuple[float, float, float] | None = None
     gravity: Positive | None = None
     masses: Mapping[str, Positive] = field(default_factory=dict)
+    flat_feet: bool = False
+    sole: Sole | None = None
 
     @property
     def trots(self) -> bool:
         """True if the robot is a quadruped, whose pairs of legs are the template's legs."""
         return self.model in QUADRUPEDS or (self.feet is not None and len(self.feet) > LEGS)
+
+    @property
+    def stands_flat(self) -> bool:
+        """True if the robot stands on soles."""
+        return self.model in FLAT_FEET or self.flat_feet or self.sole is not None
 
     def load(self) -> Biped:
         """The robot.
@@ -76,6 +93,8 @@ class RobotSpec(Checked):
             "foot_offset": self.foot_offset,
             "locked": self.locked,
             "lossless": self.lossless,
+            "flat_feet": self.flat_feet,
+            "sole": self.sole,
         }
         given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
         if not given:
@@ -87,4 +106,6 @@ class RobotSpec(Checked):
             if self.sagittal_joints:
                 raise ParameterError("sagittal joints hold a robot in its plane: leave them out")
             return FloatingBaseBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
+        if self.stands_flat:
+            raise ParameterError("a robot in its plane has point feet: run one on flat feet free")
         return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]

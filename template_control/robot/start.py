@@ -63,9 +63,11 @@ class FloatingBasePose(Checked):
     Attributes:
         com: (3,) of the CoM [m].
         com_velocity: (3,) m/s; with the angular momentum about the CoM, as if it moved the CoM: m z
-            times it is the momentum about the point on the ground below.
+            times it is the momentum about the point on the ground below. With flat feet the lateral
+            one is ``sway`` times that.
         feet: (2, 3) lowest points of rear and front foot [m]; of several contacts the mean, from
-            which they are as far as where the legs hang down.
+            which they are as far as where the legs hang down. Of flat feet the toes of level
+            soles.
         feet_velocity: (2, 3) [m/s].
         rear: the foot that is the rear leg's.
         pitch: of the trunk [rad].
@@ -166,9 +168,11 @@ def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple
     else:
         rows[0] += robot.space.momentum_jacobian[1] / weight
         rows[1] -= robot.space.momentum_jacobian[0] / weight
-    wanted = np.zeros(len(rows))
+        rows[1] *= robot.sway
+    wanted, velocities = np.zeros(len(rows)), np.zeros((len(robot.feet), robot.contact_rows))
     wanted[:3] = pose.com_velocity
-    wanted[6:] = _by_contact(robot, pose, pose.feet_velocity).ravel()
+    velocities[:, :3] = _by_contact(robot, pose, pose.feet_velocity)
+    wanted[6:] = velocities.ravel()
     v = _smallest(robot, rows, wanted)
     robot.update(q, v)
     return q, v
@@ -295,12 +299,15 @@ def _floating_configuration(
     def error(_: Array) -> Array:
         turn = pin.log3(robot.rotation @ upright.T)
         away = robot.space.contact - feet
+        if robot.patches:
+            axes = robot.data["contact_axes"][0, : len(feet)]
+            away = np.hstack((away, [pin.log3(turned) for turned in axes]))
         return np.concatenate((robot.space.com - pose.com, turn, away.ravel()))
 
     def step(q: Array, error: Array) -> Array:
         rows, r = _rows(robot), robot.foot_radius
         # The lowest point's path, not that of the material point which touches there.
-        for foot in range(len(robot.feet)):
+        for foot in range(len(robot.feet) if r > 0.0 else 0):
             turning = _foot_turning(robot, q, foot)
             rows[6 + 3 * foot] += r * turning[1]
             rows[7 + 3 * foot] -= r * turning[0]
@@ -318,7 +325,7 @@ def _by_contact(robot: FloatingBaseBiped, pose: FloatingBasePose, values: Array)
 
 
 def _rows(robot: FloatingBaseBiped) -> Array:
-    """(6 + 3 n, nv) Jacobians of the CoM, the trunk's turning and all contacts."""
+    """(6 + 3 n, nv) Jacobians of the CoM, the trunk's turning and all contacts; 6 rows of soles."""
     s = robot.space
     feet = s.contact_jacobian.reshape(-1, robot.nv)
     return np.concatenate((s.com_jacobian, s.turning_jacobian, feet))

@@ -29,6 +29,9 @@ FLOATING_DOF = 6
 LEGS = 2
 """Legs of the template, each a group of a robot's contacts."""
 
+PATCH = 6
+"""Rows of a contact that is a patch: those of its point, and its angular velocity."""
+
 MOST_CONTACTS = 8
 """Contacts that a robot may have: room for as many is in the memory that compiled code shares."""
 
@@ -44,9 +47,14 @@ ROBOT_DATA = np.dtype(
         ("gravity", _F),  # [m/s^2]
         ("foot_radius", _F),  # of the foot spheres [m]
         ("leg_length", _F),  # from hip to the foot sphere's centre with a straight knee [m]
+        ("toe_ahead", _F),  # of the ankle, of flat feet; 0 of point feet [m]
+        ("ankle_height", _F),  # over a sole, of flat feet; 0 of point feet [m]
+        ("sway", _F),  # speed of the CoM to the left over that with the momentum; 1 of point feet
         ("contacts", _I),  # number of points that may touch the ground
         ("members", _I, (LEGS,)),  # number of contacts in the group of each template leg
         ("group", _I, (LEGS, MOST_CONTACTS)),  # which
+        ("sole_centre", _F, (MOST_CONTACTS, 2)),  # of each patch from its toe, in its axes [m]
+        ("sole_half", _F, (MOST_CONTACTS, 2)),  # half sides of each patch [m]
         ("spare", _I),  # number of spare joints
         ("spare_joint", _I, (LEGS,)),  # their indices among the actuated joints
         ("spare_angle", _F, (LEGS,)),  # where they rest [rad]
@@ -57,8 +65,11 @@ ROBOT_DATA = np.dtype(
         ("momentum", _F, (3,)),  # angular, about the CoM, by axis: pitch is 1 [N m s]
         ("momentum_bias", _F, (3,)),  # dA/dt v of its matrix [N m]
         ("contact_position", _F, (MOST_CONTACTS, 3)),  # lowest points of the spheres [m]
-        ("contact_velocity", _F, (MOST_CONTACTS, 3)),  # of the material points there [m/s]
-        ("contact_bias", _F, (MOST_CONTACTS, 3)),  # dJ/dt v of their Jacobians, rolling [m/s^2]
+        # Of the material points there, and the angular velocities of patches [m/s, rad/s].
+        ("contact_velocity", _F, (MOST_CONTACTS, PATCH)),
+        # dJ/dt v of their Jacobians, of points rolling [m/s^2, rad/s^2].
+        ("contact_bias", _F, (MOST_CONTACTS, PATCH)),
+        ("contact_axes", _F, (MOST_CONTACTS, 3, 3)),  # of each patch, in columns
         ("foot_position", _F, (LEGS, 3)),  # of each template leg: the mean of its contacts [m]
         ("foot_velocity", _F, (LEGS, 3)),  # the same [m/s]
         ("attitude", _F, (3,)),  # roll, pitch and yaw of the trunk [rad]
@@ -81,7 +92,7 @@ class Jacobians(NamedTuple):
         nonlinear_effects: (nv,) C(q, v) v + g(q), and the joints' damping [N, N m].
         com: (d, nv) maps v to the CoM's velocity, d the directions.
         momentum: (1, nv) or (3, nv) angular momentum about the CoM: pitch, or all axes.
-        contact: (n, d, nv) maps v to each contact's velocity.
+        contact: (n, d, nv) maps v to each contact's velocity; (n, 6, nv) of patches.
         turning: (0, nv) or (3, nv) angular velocity of a floating trunk; its bias is 0.
         joints: (2, nu) angles and velocities of the actuated joints [rad, rad/s].
     """
@@ -95,10 +106,12 @@ class Jacobians(NamedTuple):
     joints: Array
 
     @classmethod
-    def zeros(cls, data: Any, directions: int, base_dof: int, contacts: int) -> Jacobians:
-        """All zero but for what Pinocchio writes; ``directions`` are those of a contact."""
+    def zeros(
+        cls, data: Any, directions: int, base_dof: int, contacts: int, rows: int
+    ) -> Jacobians:
+        """All zero but for what Pinocchio writes; ``rows`` are those of a contact."""
         nv, axes = len(data.nle), 3 if directions > UP else 1
-        shapes = ((directions, nv), (axes, nv), (contacts, directions, nv), (axes // 3 * 3, nv))
+        shapes = ((directions, nv), (axes, nv), (contacts, rows, nv), (axes // 3 * 3, nv))
         found = [np.zeros(shape) for shape in (*shapes, (2, nv - base_dof))]
         return cls(data.M, data.nle, *found)
 
@@ -115,7 +128,8 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array)
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.g)
     places = tuple(data.oMf[frame].translation for frame in frames)
-    return (*whole, places, data.Jcom, data.Ag, data.J, carrying(model, frames), limits)
+    turns = tuple(data.oMf[frame].rotation for frame in frames)
+    return (*whole, places, turns, data.Jcom, data.Ag, data.J, carrying(model, frames), limits)
 
 
 @compiled
@@ -174,8 +188,8 @@ def gather_planar(
         out: of :class:`Jacobians`, as a plain tuple: ``nonlinear_effects``, ``com``, ``momentum``,
             ``contact`` and ``joints``, overwritten.
     """
-    centre, speed, pull, momentum, weight, places = views[:6]
-    com_jacobian, centroidal, jacobian, carries, limits = views[6:]
+    centre, speed, pull, momentum, weight, places, _ = views[:7]
+    com_jacobian, centroidal, jacobian, carries, limits = views[7:]
     effects, jcom, jspin, contact, joints = out
     s = data[0]
     finite = gather_joints(q, v, limits, s, effects, joints)
@@ -259,8 +273,8 @@ def gather_floating(
     ``base`` (5,) is :class:`Trunk` as a plain tuple, of the heading frame: x and y of its origin in
     the world [m], cosine and sine of the heading, y of the trunk's hips from its origin [m].
     """
-    centre, speed, _, momentum, weight, places = views[:6]
-    jcom_world, centroidal, jacobian, carries, limits = views[6:]
+    centre, speed, _, momentum, weight, places, turns = views[:7]
+    jcom_world, centroidal, jacobian, carries, limits = views[7:]
     effects, jcom, jspin, contact, jturning, joints = out
     frame, trunk = base
     rotation, st, nv = trunk[0], data[0], v.shape[0]
@@ -314,8 +328,10 @@ def gather_floating(
         bx, by = drift[i][0] - r * drift[i][4], drift[i][1] + r * drift[i][3]
         st.contact_bias[i, 0], st.contact_bias[i, 1] = c * bx + s * by, c * by - s * bx
         st.contact_bias[i, 2] = drift[i][2]
+        if contact.shape[1] == PATCH:
+            _gather_patch(st, i, (jacobian, carries, drift[i]), contact[i], frame, turns[i])
         moving = np.dot(contact[i], v)
-        for k in range(3):
+        for k in range(contact.shape[1]):
             st.contact_velocity[i, k] = moving[k]
     _gather_feet(st)
     for k in range(3):
@@ -328,6 +344,35 @@ def gather_floating(
             st.turning[i] += jturning[i, 3 + k] * v[3 + k]
     _gather_trunk(q, v, st, frame, trunk)
     return finite
+
+
+@compiled
+def _gather_patch(
+    s: Any,
+    patch: int,
+    views: tuple[Array, Array, Array],
+    contact: Array,
+    frame: Array,
+    turn: Array,
+) -> None:
+    """Write the angular rows of a patch, and its axes.
+
+    ``views`` are the joints' Jacobians, which of them move each contact, and the drift of this one;
+    ``turn`` (3, 3) is the rotation of its frame to the world.
+    """
+    jacobian, carries, drift = views
+    c, sine = frame[2], frame[3]
+    for k in range(contact.shape[1]):
+        wx, wy = jacobian[3, k] * carries[patch, k], jacobian[4, k] * carries[patch, k]
+        contact[3, k], contact[4, k] = c * wx + sine * wy, c * wy - sine * wx
+        contact[5, k] = jacobian[5, k] * carries[patch, k]
+    s.contact_bias[patch, 3] = c * drift[3] + sine * drift[4]
+    s.contact_bias[patch, 4] = c * drift[4] - sine * drift[3]
+    s.contact_bias[patch, 5] = drift[5]
+    for k in range(3):
+        s.contact_axes[patch, 0, k] = c * turn[0, k] + sine * turn[1, k]
+        s.contact_axes[patch, 1, k] = c * turn[1, k] - sine * turn[0, k]
+        s.contact_axes[patch, 2, k] = turn[2, k]
 
 
 @compiled

@@ -68,6 +68,17 @@ def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
     return {str(joint.get("name")) for joint in robot.findall("joint")} - held
 
 
+def joints_in_no_leg(robot: ET.Element, feet: Collection[str]) -> set[str]:
+    """Names of the joints that move no foot."""
+    carriers = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
+    found = {str(joint.get("name")) for joint in carriers.values()}
+    for link in feet:
+        while link in carriers:
+            found.discard(str(carriers[link].get("name")))
+            link = end_of(carriers[link], "parent")
+    return found
+
+
 def lock(
     path: Path, robot: ET.Element, moving: Collection[str], locked: Mapping[str, float]
 ) -> None:

@@ -16,6 +16,7 @@ from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
+from template_control.embedding.free.soles import SoleOptions
 from template_control.embedding.free.trot import TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
@@ -114,7 +115,7 @@ class Experiment(Checked):
     robot: RobotSpec | Biped | str = field(default_factory=RobotSpec)
     motion: GaitSpec | Scenario | VelocityProfile | VelocityCommand | Gait | Route | None = None
     planner: PlannerSpec | Planner | Planners | None = None
-    controller: EmbeddingOptions | FreeOptions | TrotOptions | None = None
+    controller: EmbeddingOptions | FreeOptions | TrotOptions | SoleOptions | None = None
     world: PlantOptions | MujocoOptions | IdealOptions | Plant = field(
         default_factory=default_plant
     )
@@ -176,6 +177,8 @@ class Experiment(Checked):
             return default_options(self.robot)
         if self.robot.trots:
             return TrotOptions()
+        if self.free and self.robot.stands_flat:
+            return SoleOptions()
         return FreeOptions() if self.free else EmbeddingOptions()
 
     @property

@@ -242,7 +242,7 @@ class LiveRun:
         dt = o.world.time_step
         delay = TorqueDelay(o.delay_ticks)
         q, v = robot.neutral(), np.zeros(robot.nv)
-        forces = np.zeros((len(robot.feet), robot.directions))
+        forces = np.zeros((len(robot.feet), robot.contact_rows))
         contacts = ContactSensors(o.sensors, o.falls.contact_force * robot.mass * robot.gravity)
         thrown = o.falls.thrown * controller.parameters.speed_unit
         done, tick, failures = 0, 0, QpFailures(robot.name)
@@ -255,7 +255,8 @@ class LiveRun:
             plant.contact_forces(forces)
             start = time.perf_counter()
             try:
-                touching, felt = contacts.measure(forces)
+                own = np.ascontiguousarray(forces[:, : robot.directions])
+                touching, felt = contacts.measure(own)
                 sensed = senses.measure(q, v, touching)
                 speed = hypot(*sensed[1][: robot.directions].tolist())
                 if speed > thrown and recorder.ticks:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
@@ -250,7 +251,7 @@ class Record(Facts):
         Raises:
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
-        kind = next((k for k in cls.__subclasses__() if _holds(path, k)), cls)
+        kind = next((k for k in _kinds(cls) if _holds(path, k)), cls)
         sizes = {name: quantity.layout for name, quantity in quantities(kind).items()}
         return storage.load(kind, path, kind.file_format, storage.Layout(sizes, _METADATA))
 
@@ -320,6 +321,38 @@ class FloatingRecord(Record):
     heading: Annotated[Array, Quantity("T", "rad")]
     sway: Annotated[Array, Quantity("T 2:sway_state")]
     side_reference: Annotated[Array, Quantity("T 2:group", "m")]
+
+
+@dataclass(frozen=True, repr=False)
+class SoleRecord(FloatingRecord):
+    """A run of a robot on flat feet, whose ``foot`` and ``space_foot`` are the toes.
+
+    Attributes:
+        sole_wrench: (T, n, 6) the ground's force on each sole and its moment about the toe, in the
+            sole's axes: x forward, y to the left, z up [N, N m].
+    """
+
+    file_format: ClassVar[str] = "template-control run on soles 1"
+
+    sole_wrench: Annotated[Array, Quantity("T n:foot 6:wrench")]
+
+    @property
+    def centre_of_pressure(self) -> Array:
+        """(T, n, 2) x and y of the centre of pressure from each toe [m], NaN in the air.
+
+        In the air is a foot that bears less than a hundredth of the weight.
+        """
+        fz = self.sole_wrench[:, :, 2]
+        least = 0.01 * float(self.metadata["mass"]) * 9.81
+        load = np.where(fz > least, fz, np.nan)[:, :, None]
+        return self.sole_wrench[:, :, [4, 3]] * (-1.0, 1.0) / load
+
+
+def _kinds(kind: type[Record]) -> Iterator[type[Record]]:
+    """All kinds of runs that are of a kind, the most special first."""
+    for special in kind.__subclasses__():
+        yield from _kinds(special)
+    yield kind
 
 
 def _holds(path: str | Path, kind: type[Record]) -> bool:

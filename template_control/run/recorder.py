@@ -20,9 +20,9 @@ from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import load_robot
-from template_control.robot.terms import LEGS, UP
+from template_control.robot.terms import LEGS, PATCH, UP
 from template_control.run.metadata import about, outcome
-from template_control.run.record import FloatingRecord, Record
+from template_control.run.record import FloatingRecord, Record, SoleRecord
 from template_control.run.statistics import Counts, Statistics, count, statistics
 from template_control.warm_up import Part, ready
 from template_control.whole_body.solver import Solution
@@ -68,6 +68,8 @@ def _columns(robot: Biped) -> dict[str, tuple[int, ...]]:
             "sway": (2,),
             "side_reference": (LEGS,),
         }
+    if robot.patches:
+        found["sole_wrench"] = (contacts, PATCH)
     return found
 
 
@@ -93,7 +95,8 @@ def write_row(
     Args:
         row: overwritten.
         numbers: the first seven columns.
-        state: q, v, torques, and the ground's forces in the world (n, d) [N].
+        state: q, v, torques, and the ground's forces in the world (n, d) [N], of soles (n, 6) with
+            their moments about its origin [N m].
         robot: ``data`` of the robot, its ``joint_places`` and ``heading_frame``.
         seen: (1,) of ``SNAPSHOT``.
     """
@@ -108,7 +111,7 @@ def write_row(
         row[at] = c * (joints[i, 0] - x) + sine * (joints[i, 1] - y)
         row[at + 1] = joints[i, UP]
         at += 2
-    contacts, up = force.shape[0], force.shape[1] - 1
+    contacts, up = force.shape[0], min(force.shape[1], UP + 1) - 1
     for i in range(contacts):
         row[at], row[at + 1] = r.contact_position[i, 0], r.contact_position[i, UP]
         row[at + 2 * contacts], row[at + 2 * contacts + 1] = force[i, 0], force[i, up]
@@ -130,8 +133,30 @@ def write_row(
     for i in range(contacts):
         at = _to_world(frame, r.contact_position[i], row, at)
     for i in range(contacts):
-        at = _put(row, at, force[i])
-    _put(row, _put(row, _put(row, at, r.attitude), s.sway), s.side_reference)
+        at = _put(row, at, force[i, : UP + 1])
+    at = _put(row, _put(row, _put(row, at, r.attitude), s.sway), s.side_reference)
+    for i in range(contacts if force.shape[1] == PATCH else 0):
+        _write_wrench(r, i, force[i], frame, row[at : at + PATCH])
+        at += PATCH
+
+
+@compiled
+def _write_wrench(r: Any, patch: int, force: Array, frame: Array, out: Array) -> None:
+    """Write force and moment about the toe of a sole in its own axes, ``out`` (6,) [N, N m].
+
+    ``force`` (6,) is in the world, with the moment about its origin.
+    """
+    c, sine, toe, heading = frame[2], frame[3], np.empty(3), np.empty(PATCH)
+    _to_world(frame, r.contact_position[patch], toe, 0)
+    moment = force[3:] - np.cross(toe, force[:3])
+    for half, part in enumerate((force[:3], moment)):
+        heading[3 * half] = c * part[0] + sine * part[1]
+        heading[3 * half + 1] = c * part[1] - sine * part[0]
+        heading[3 * half + 2] = part[2]
+        for k in range(3):
+            out[3 * half + k] = 0.0
+            for i in range(3):
+                out[3 * half + k] += r.contact_axes[patch, i, k] * heading[3 * half + i]
 
 
 @compiled
@@ -243,7 +268,7 @@ class Recorder:
             q: (nq,) configuration, without the noise of the sensors where that is known.
             v: (nv,) velocity.
             force: (n, d) the ground's force on each contact, forward first and up last [N]; NaN
-                where nobody knows it.
+                where nobody knows it. Of soles (n, 6), as plants give it.
             solution: that the controller has just computed.
             time: of the tick [s]; None: the controller's.
             push: disturbance on the trunk; of a free robot its size, negative backward [N].
@@ -334,6 +359,8 @@ class Recorder:
         """
         self._close_block()
         kind = FloatingRecord if self._floating is not None else Record
+        if self.controller.robot.patches:
+            kind = SoleRecord
         table, clocks = (
             np.concatenate(list(parts.values())) for parts in (self._kept, self._clocks)
         )

@@ -18,6 +18,7 @@ _FLOATING_BASE = {**dict.fromkeys("xyz", "m"), **dict.fromkeys(("qx", "qy", "qz"
 _FLOATING_RATES = {**dict.fromkeys("xyz", "m/s"), **dict.fromkeys(("wx", "wy", "wz"), "rad/s")}
 _STATE = {"dx": "m/s", "y": "m", "dy": "m/s"}
 _SWAY = {"place": "m", "rate": "m/s"}
+_WRENCH = {**dict.fromkeys(("fx", "fy", "fz"), "N"), **dict.fromkeys(("mx", "my", "mz"), "N m")}
 _CONTROLS = {slot.name.lower(): "rad" if slot is Slot.TOUCHDOWN_ANGLE else "N/m" for slot in Slot}
 _FIRST = {"T": "time", "S": "section", "ticks": "tick"}
 
@@ -74,6 +75,7 @@ def _labels(record: Any) -> dict[str, Mapping[str, str]]:
         "space_axis": dict.fromkeys("xyz", ""),
         "angle": dict.fromkeys(("roll", "pitch", "yaw"), ""),
         "sway_state": _SWAY,
+        "wrench": _WRENCH,
         "state": _STATE,
         "control": _CONTROLS,
     }

@@ -9,6 +9,10 @@ contact, f_t each of its tangential ones, of which there is one in the plane and
          0 <= f_n <= cap                        unilateral contact, unloading leg
          low <= a_joint <= high                 only where a joint is near its speed limit
 
+A contact that is a patch, the sole of a flat foot, has six rows: force and moment at its toe. Its
+constraints are those of the wrench that a rectangle can bear (:func:`patch_cone`); its moments have
+a cost of their own.
+
 H is badly conditioned (tasks against regularisers), and a proximal solver is slow along
 its soft directions. So the solver gets the same problem in w = L^T z with H = L L^T, whose
 Hessian is the identity, and constraint rows of unit length.
@@ -25,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.robot.terms import MOST_CONTACTS, UP
+from template_control.robot.terms import MOST_CONTACTS, PATCH, UP
 from template_control.whole_body.elimination import cholesky, eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
@@ -42,6 +46,7 @@ _F, _I = np.float64, np.int64
 QP_DATA = np.dtype(
     [
         ("force_cost", _F),  # of the contact forces' distance from the wanted ones, per (m g)^2
+        ("sole_share", _F),  # share of a sole in which its centre of pressure is kept
         ("torque_cost", _F),  # of the joint torques, per squared limit
         ("friction", _F),  # coefficient that the cones are built with
         ("contact_damping", _F),  # brings a foot that landed sliding to rest [1/s]
@@ -51,7 +56,7 @@ QP_DATA = np.dtype(
         ("load", _F),  # ratio of the real to the modelled inertia
         ("contacts", _I),  # number of contacts on the ground
         ("contact", _I, (MOST_CONTACTS,)),  # which
-        ("force", _F, (MOST_CONTACTS, 3)),  # to stay near, of each, by direction [N]
+        ("force", _F, (MOST_CONTACTS, PATCH)),  # to stay near, of each, by row [N, N m]
         ("cap", _F, (MOST_CONTACTS,)),  # largest normal force of each; inf: none [N]
     ],
     align=True,
@@ -59,13 +64,58 @@ QP_DATA = np.dtype(
 """The stance of a tick, and the constants of the QP."""
 
 
+CONE = 16
+"""Constraints of the wrench that a patch can bear, beyond the range of its normal force."""
+
+_CROOKED = 10.0
+"""Cost of a moment about a sole's x or y, per its half side and weight, over that of a force.
+
+The centre of pressure stays at the toe where nothing asks for more. With 1 and 100 G1 walks too.
+"""
+
+
 @compiled
-def rows_per_contact(directions: int) -> int:
+def rows_per_contact(rows: int) -> int:
     """Constraints of a contact: two for each tangential direction, one for the normal one.
 
-    ``directions`` are those of its force, 2 in the plane, 3 in space.
+    ``rows`` are those of its force, 2 in the plane, 3 in space; 6 of a patch, which has ``CONE``
+    and one for the normal force.
     """
-    return 2 * directions - 1
+    return CONE + 1 if rows == PATCH else 2 * rows - 1
+
+
+@compiled
+def patch_cone(friction: float, half: Array, centre: Array, out: Array) -> None:
+    """Write the cone of the wrenches w that a rectangle can bear: ``out`` w >= 0.
+
+    w is force and moment at a point of the rectangle, in its axes; ``centre`` (2,) is its centre
+    from there and ``half`` (2,) its half sides X, Y [m]. With the moment m about the centre, these
+    are the rows of Caron, Pham and Nakamura (ICRA 2015, equations 12 to 16):
+
+        |f_x| <= mu f_z,  |f_y| <= mu f_z,  |m_x| <= Y f_z,  |m_y| <= X f_z,
+        m_z <=  mu (X + Y) f_z - |Y f_x + mu m_x| - |X f_y + mu m_y|,
+        m_z >= -mu (X + Y) f_z + |Y f_x - mu m_x| + |X f_y - mu m_y|.
+
+    ``out`` (CONE, 6) is overwritten.
+    """
+    x, y, mu, row = half[0], half[1], friction, 0
+    out[:] = 0.0
+    for axis in range(2):
+        for side in (1.0, -1.0):
+            out[row, axis], out[row, 2] = side, mu
+            out[row + 1, 3 + axis], out[row + 1, 2] = side, y if axis == 0 else x
+            row += 2
+    for turn in (1.0, -1.0):
+        for one in (1.0, -1.0):
+            for other in (1.0, -1.0):
+                out[row, 2], out[row, 5] = mu * (x + y), -turn
+                out[row, 0], out[row, 3] = one * y, one * turn * mu
+                out[row, 1], out[row, 4] = other * x, other * turn * mu
+                row += 1
+    for row in range(CONE):  # from the moment about the centre to that about the point
+        out[row, 2] += centre[0] * out[row, 4] - centre[1] * out[row, 3]
+        out[row, 0] += centre[1] * out[row, 5]
+        out[row, 1] -= centre[0] * out[row, 5]
 
 
 class Matrices(NamedTuple):
@@ -73,7 +123,8 @@ class Matrices(NamedTuple):
 
     Attributes:
         a_map: (nv, nu + 1) accelerations as an affine function of the torques.
-        f_map: (d c, nu + 1) contact forces as an affine function of the torques, d the directions.
+        f_map: (d c, nu + 1) contact forces as an affine function of the torques, d the directions,
+            or 6 of patches.
         factor: (nu, nu) L in its lower triangle.
         gradient: (nu,) L^-1 g.
         constraint: (nu + (2 d - 1) c, nu) rows of unit length; nu more where accelerations are
@@ -154,12 +205,13 @@ def assemble(
     a_map, f_map, factor, gradient, constraint, lower, upper, minimum = out
     mass_matrix, nonlinear_effects, contact = arrays[0], arrays[1], arrays[4]
     contacts, directions = p.contacts, contact.shape[1]
+    up = min(directions, UP + 1) - 1
     per_contact, weight, friction = rows_per_contact(directions), r.mass * r.gravity, p.friction
     jacobian, bias = np.empty((directions * contacts, nv)), np.empty(directions * contacts)
     for i in range(contacts):
         point = p.contact[i]
         for d in range(directions):
-            axis = UP if d == directions - 1 else d
+            axis = UP if d == up else d
             for k in range(nv):
                 jacobian[i * directions + d, k] = contact[point, d, k]
             sliding = p.contact_damping * r.contact_velocity[point, axis]
@@ -181,19 +233,23 @@ def assemble(
         row[nu] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
         _add_square(row, tasks[t, nv + WEIGHT], torque_limit, factor, gradient)
     for i in range(contacts):
-        for d in range(directions):
+        for d in range(up + 1):
             for j in range(nu + 1):
                 row[j] = f_map[i * directions + d, j] / weight
             row[nu] -= p.force[i, d] / weight
             _add_square(row, p.force_cost, torque_limit, factor, gradient)
+    if directions == PATCH:
+        _add_moments(p, r, f_map, (row, torque_limit), factor, gradient)
 
     constraint[:] = 0.0
     for i in range(nu):
         constraint[i, i] = 1.0
         lower[i], upper[i] = -1.0, 1.0
+    if directions == PATCH:
+        _bound_patches(p, r, f_map, torque_limit, constraint, lower, upper)
     for i in range(contacts):
-        top, normal = nu + per_contact * i, directions * i + directions - 1
-        for d in range(directions - 1):
+        top, normal = nu + per_contact * i, directions * i + up
+        for d in range(up if directions < PATCH else 0):
             along = directions * i + d
             for side in range(2):
                 sign, at = 1.0 - 2.0 * side, top + 2 * d + side
@@ -237,6 +293,71 @@ def assemble(
         if upper[i] < _FAR:
             upper[i] *= scale
     return BOUNDED
+
+
+@compiled
+def _in_sole(axes: Array, f_map: Array, first: int, out: Array) -> None:
+    """Write a patch's rows of ``f_map``, from row ``first`` on, in the sole's axes (3, 3)."""
+    for half in range(0, PATCH, 3):
+        for k in range(3):
+            for j in range(f_map.shape[1]):
+                total = 0.0
+                for i in range(3):
+                    total += axes[i, k] * f_map[first + half + i, j]
+                out[half + k, j] = total
+
+
+@compiled
+def _add_moments(
+    p: Any, r: Any, f_map: Array, parts: tuple[Array, Array], factor: Array, gradient: Array
+) -> None:
+    """Add the cost of the moments of the soles that stand, about their toes.
+
+    ``parts`` are a row (nu + 1,) that is overwritten, and the limits of torque.
+    """
+    row, torque_limit = parts
+    wrench, weight = np.empty((PATCH, f_map.shape[1])), r.mass * r.gravity
+    for i in range(p.contacts):
+        patch = p.contact[i]
+        _in_sole(r.contact_axes[patch], f_map, PATCH * i, wrench)
+        for axis in range(3):
+            side = r.sole_half[patch, 1 if axis == 0 else 0]
+            for j in range(f_map.shape[1]):
+                row[j] = wrench[3 + axis, j] / (weight * side)
+            cost = p.force_cost if axis == UP else _CROOKED * p.force_cost
+            _add_square(row, cost, torque_limit, factor, gradient)
+
+
+@compiled
+def _bound_patches(
+    p: Any,
+    r: Any,
+    f_map: Array,
+    torque_limit: Array,
+    constraint: Array,
+    lower: Array,
+    upper: Array,
+) -> None:
+    """Write the cones of the soles that stand; arguments as in :func:`assemble`."""
+    nu = torque_limit.shape[0]
+    wrench, cone, weight = np.empty((PATCH, nu + 1)), np.empty((CONE, PATCH)), r.mass * r.gravity
+    half = np.empty(2)
+    for i in range(p.contacts):
+        patch, top = p.contact[i], nu + (CONE + 1) * i
+        _in_sole(r.contact_axes[patch], f_map, PATCH * i, wrench)
+        for k in range(2):
+            half[k] = p.sole_share * r.sole_half[patch, k]
+        patch_cone(p.friction, half, r.sole_centre[patch], cone)
+        for k in range(CONE):
+            for j in range(nu):
+                total = 0.0
+                for d in range(PATCH):
+                    total += cone[k, d] * wrench[d, j]
+                constraint[top + k, j] = total * torque_limit[j] / weight
+            total = 0.0
+            for d in range(PATCH):
+                total += cone[k, d] * wrench[d, nu]
+            lower[top + k], upper[top + k] = -total / weight, _FAR
 
 
 @compiled

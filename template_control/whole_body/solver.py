@@ -99,6 +99,8 @@ class QpOptions(Checked):
         friction: Coulomb coefficient of the ground, as far as the controller knows it.
         friction_margin: share of it that the cones use; a foot slides before the QP knows.
         torque_scale: share of the URDF's torque limits that may be used.
+        sole_share: share of a flat foot's sole, in length and width, in which its centre of pressure
+            is kept; at its edge the foot tilts.
         contact_damping: brings a foot that landed sliding to rest [1/s].
         speed_share: from this share of its limit on a joint's speed is bounded. Far from the
             limit the bound would only cost time.
@@ -115,6 +117,7 @@ class QpOptions(Checked):
     friction: Positive = tuned(0.7)
     friction_margin: Positive = tuned(0.9)
     torque_scale: Positive = tuned(1.0)
+    sole_share: Share = tuned(0.8)
     contact_damping: NotNegative = tuned(40.0, RATE)
     speed_share: Share = tuned(0.85)
     speed_horizon: Positive = tuned(0.005, TIME)
@@ -132,7 +135,8 @@ class Stance(NamedTuple):
 
     Attributes:
         contacts: their indices.
-        force: (d c,) contact forces to stay near, of each x and y, in space x, y and z [N].
+        force: (d c,) contact forces to stay near, of each x and y, in space x, y and z [N]; of
+            patches (6 c,), force and moment of each.
         cap: (c,) largest normal force of each [N] (inf: none).
     """
 
@@ -150,7 +154,8 @@ class Solution(NamedTuple):
 
     Attributes:
         torque: (nu,) joint torques [N m], within their limits.
-        force: (d c,) force at each contact on the ground [N], by direction.
+        force: (d c,) force at each contact on the ground [N], by direction; of patches (6 c,),
+            force and moment at the toe of each [N, N m].
         acceleration: (nv,) generalised accelerations.
         solved: False where the QP was infeasible, singular or not solved within its caps;
             the torques are then the last solved ones, and force and acceleration follow
@@ -197,7 +202,7 @@ class Workspace:
     """
 
     def __init__(self, robot: Robot, contacts: int, bounded: int = 0) -> None:
-        nv, nu, directions = robot.nv, len(robot.torque_limit), robot.directions
+        nv, nu, directions = robot.nv, len(robot.torque_limit), robot.contact_rows
         rows = nu + rows_per_contact(directions) * contacts + bounded
         self._identity = np.eye(nu)
         numbers = (nu + 1) * (nv + directions * contacts) + nu * (nu + 2) + rows * (nu + 2)
@@ -274,6 +279,7 @@ class WholeBodyQp:
         self.data = np.zeros(1, QP_DATA)
         now = self.data[0]
         now["force_cost"], now["torque_cost"] = FORCE_COST, TORQUE_COST
+        now["sole_share"] = o.sole_share
         now["friction"], now["contact_damping"] = o.cone, o.contact_damping
         now["speed_share"], now["stop_share"] = o.speed_share, o.stop_share
         now["stop_time"], now["load"] = o.stop_horizon / o.speed_share, 1.0
@@ -313,7 +319,7 @@ class WholeBodyQp:
         """
         now, count = self.data[0], len(stance.contacts)
         now["contacts"], now["contact"][:count] = count, stance.contacts
-        now["cap"][:count], directions = stance.cap, self.robot.directions
+        now["cap"][:count], directions = stance.cap, self.robot.contact_rows
         now["force"][:count, :directions] = stance.force.reshape(count, directions)
         robot, room = self.robot, self.room(count, load)
         kind = solve_free(self.data, robot.data, robot.arrays, tasks.table, room)
@@ -327,7 +333,7 @@ class WholeBodyQp:
             load: as for :meth:`solve`.
         """
         robot, w, empty = self.robot, self.workspaces[contacts], np.empty
-        torque, force = empty(len(self._torque)), empty(robot.directions * contacts)
+        torque, force = empty(len(self._torque)), empty(robot.contact_rows * contacts)
         found = self._torque, torque, force, empty(robot.nv)
         if load != self._load:
             self._take_load(load)

@@ -38,6 +38,8 @@ REFERENCES = np.dtype(
         ("furthest", _F, (LEGS,)),
         ("offset", _F, (MOST_CONTACTS, 3, 3)),
         ("stands", _I, (MOST_CONTACTS,)),
+        ("lead", _F),
+        ("sway", _F),
         ("lift", _F),
     ],
     align=True,
@@ -69,6 +71,8 @@ class References:
             position, velocity, acceleration [m, m/s, m/s^2]; 0 of a contact that is a foot.
         stands: (n,) of each contact, whether the QP has it on the ground: a ``FootTask`` or a
             ``SideFootTask`` then asks for nothing.
+        lead: how far the point that moves with the momentum is ahead of the CoM [m].
+        sway: wanted rate of the speed to the left with the momentum, dy/dt - L_x / (m z) [m/s^2].
         lift: the feedback part of the CoM's vertical acceleration; a ``ComTask`` writes it
             [m/s^2].
         data: (1,) of ``REFERENCES``, all of them.
@@ -88,7 +92,9 @@ class References:
         self.stands: NDArray[np.int64] = now["stands"]
         self.feet[1], self.furthest[:], self.pitch = 1, np.inf, pitch
 
-    com_push, pitch, lift = (Number(name) for name in ("com_push", "pitch", "lift"))
+    com_push, pitch, lift, lead, sway = (
+        Number(name) for name in ("com_push", "pitch", "lift", "lead", "sway")
+    )
 
 
 class Rows(NamedTuple):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import Index, NotNegative
+from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.compiled import compiled
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
@@ -54,7 +54,7 @@ TASK = np.dtype(
 )
 """A task as compiled code reads it."""
 
-_COM, _FOOT, _MOMENTUM, _POSTURE, _ORIENTATION, _SPIN, _SIDE_FOOT, _SPARE = range(8)
+_COM, _FOOT, _MOMENTUM, _POSTURE, _ORIENTATION, _SPIN, _SIDE_FOOT, _SPARE, _SOLE, _SWAY = range(10)
 
 
 class CompiledTask(Checked):
@@ -63,10 +63,12 @@ class CompiledTask(Checked):
     Attributes:
         kind: its formula.
         in_space: whether only floating-base robots have what it speaks of.
+        on_soles: whether only those with flat feet have it.
     """
 
     kind: ClassVar[int]
     in_space: ClassVar[bool] = False
+    on_soles: ClassVar[bool] = False
 
     @property
     def weights(self) -> tuple[float, ...]:
@@ -109,6 +111,11 @@ class CompiledTask(Checked):
                 f"robot {robot.name} is held in its plane, and a {type(self).__name__} asks for a"
                 " free one: take load_floating_robot, or tasks of the plane"
             )
+        if self.on_soles and not robot.patches:
+            raise ParameterError(
+                f"robot {robot.name} has point feet, and a {type(self).__name__} asks for soles:"
+                " take tasks of point feet"
+            )
         contact, members = getattr(self, "contact", 0), min(map(len, robot.groups))
         if contact >= members:
             raise ParameterError(
@@ -135,15 +142,29 @@ class ComTask(CompiledTask):
         (J_x + A_L / (m h)) a + bias = r_x'' + push + kp (r_x - c_x) + kd (r_x' - s'),
         bias = dJ_x/dt v + (dA_L/dt v - L c_y' / h) / (m h).
 
+    A sole bears a moment in single stance, by which both can be followed. The point that moves with
+    s' is then taken for c_x (``on_point``): the CoM leads or lags it by a centimetre as the leg
+    swings, and the centre of pressure would move by several to hold the CoM back. An error grows as
+    that of a pendulum does, by (r_y'' + g) / h (c_x - r_x), which is left to it (``falling``).
+
     Attributes:
         weight: of x and y [s^4/m^2].
         gains: kp [1/s^2] and kd [1/s].
+        on_point: whether x is that of the point which moves with the momentum.
+        falling: share of a pendulum's acceleration that an error of x is left.
     """
 
     weight: tuple[NotNegative, NotNegative] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
     gains: tuple[NotNegative, NotNegative] = tuned((60.0, 16.0), RATE_SQUARED, RATE)
+    on_point: bool = tuned(False)
+    falling: Share = tuned(0.0)
 
     kind = _COM
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """See :attr:`CompiledTask.numbers`."""
+        return *self.gains, float(self.on_point), self.falling
 
 
 @compiled
@@ -161,6 +182,10 @@ def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array)
     turning = r.momentum_bias[1] - r.momentum[1] * rise / height
     rows[0, nv + BIAS], rows[1, nv + BIAS] = r.com_bias[0] + turning / moment, r.com_bias[UP]
     ahead = ref[4] + kp * (ref[0] - now[0]) + kd * (ref[2] - now[2]) + want.com_push
+    if task.gains[2] > 0.0:
+        ahead -= kp * want.lead
+    if task.gains[3] > 0.0:
+        ahead += task.gains[3] * (ref[5] + r.gravity) / height * (now[0] - ref[0])
     want.lift = kp * (ref[1] - now[1]) + kd * (ref[3] - now[3])
     rows[0, nv + DESIRED], rows[1, nv + DESIRED] = ahead, ref[5] + want.lift
 
@@ -207,7 +232,7 @@ def foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array
     kp, kd, hold_p, hold_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
     point, nv = r.group[foot, task.contact], contact.shape[2]
     for row in range(2):
-        axis, direction = row * UP, row * (contact.shape[1] - 1)
+        axis, direction = row * UP, row * (min(contact.shape[1], UP + 1) - 1)
         for k in range(nv):
             rows[row, k] = contact[point, direction, k]
         rows[row, nv + BIAS] = r.contact_bias[point, axis]
@@ -469,6 +494,98 @@ def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) ->
         rows[row, nv + DESIRED] = away - task.gains[1] * joints[1, joint]
 
 
+@dataclass(frozen=True)
+class SoleTask(CompiledTask):
+    """Three rows: the sole of a foot in the air is kept level, and faces as the trunk shall.
+
+        w' = -kp e - kd w
+
+    e is the axis of the sole's rotation from there times the sine of its angle. A sole that the QP
+    has on the ground already is asked for nothing.
+
+    Attributes:
+        leg: the foot's role.
+        weight: of each row [s^4/rad^2].
+        gains: kp [1/s^2] and kd [1/s].
+    """
+
+    leg: Leg = Leg.FRONT
+    _: KW_ONLY
+    weight: tuple[NotNegative, NotNegative, NotNegative] = tuned(
+        (0.05, 0.05, 0.05), PER_RATE_TO_THE_FOURTH
+    )
+    gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
+
+    kind = _SOLE
+    in_space = True
+    on_soles = True
+
+
+@compiled
+def sole_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of a :class:`SoleTask`; arguments as for :func:`write_rows`."""
+    contact, foot = arrays[4], want.feet[task.leg]
+    patch, nv = r.group[foot, 0], contact.shape[2]
+    axes = r.contact_axes[patch]
+    c, s = np.cos(want.lean[2]), np.sin(want.lean[2])
+    for axis in range(3):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        # The rotation times the inverse of the wanted one, a turn about the vertical.
+        off = _turned_back(axes, j, i, c, s) - _turned_back(axes, i, j, c, s)
+        for k in range(nv):
+            rows[axis, k] = contact[patch, 3 + axis, k]
+        rows[axis, nv + BIAS] = r.contact_bias[patch, 3 + axis]
+        speed = r.contact_velocity[patch, 3 + axis]
+        rows[axis, nv + DESIRED] = -0.5 * task.gains[0] * off - task.gains[1] * speed
+        rows[axis, nv + WEIGHT] = 0.0 if want.stands[patch] else task.weight[axis]
+
+
+@compiled
+def _turned_back(axes: Array, row: int, column: int, c: float, s: float) -> float:
+    """Entry of a rotation times that about the vertical by minus an angle: cosine c, sine s."""
+    if column == 0:
+        return c * axes[row, 0] - s * axes[row, 1]
+    if column == 1:
+        return s * axes[row, 0] + c * axes[row, 1]
+    return float(axes[row, 2])
+
+
+@dataclass(frozen=True)
+class SwayTask(CompiledTask):
+    """One row: the rate of s = c_y' - L / (m h), the lateral speed with the momentum.
+
+        (J_y - A_L / (m h)) a + bias = sway,   bias = dJ_y/dt v - (dA_L/dt v - L c_z' / h) / (m h)
+
+    L = A_L v is the angular momentum about the CoM's x and h its height: m h s is the momentum
+    about a line on the ground below. ``sway`` is the reference of that name.
+
+    Attributes:
+        weight: [s^4/m^2].
+    """
+
+    weight: NotNegative = tuned(1.0, PER_ACCELERATION_SQUARED)
+
+    kind = _SWAY
+    in_space = True
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """See :attr:`CompiledTask.numbers`."""
+        return ()
+
+
+@compiled
+def sway_rows(r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the row of a :class:`SwayTask`; arguments as for :func:`write_rows`."""
+    com, momentum, height = arrays[2], arrays[3], want.com_now[1]
+    nv, moment = com.shape[1], r.mass * height
+    for k in range(nv):
+        rows[0, k] = com[_SIDE, k] - momentum[0, k] / moment
+    turning = r.momentum_bias[0] - r.momentum[0] * r.com_velocity[UP] / height
+    rows[0, nv + BIAS] = r.com_bias[_SIDE] - turning / moment
+    rows[0, nv + DESIRED] = want.sway
+
+
 @compiled
 def write_rows(
     program: Any, data: Any, arrays: tuple[Any, ...], references: Any, table: Array
@@ -496,5 +613,9 @@ def write_rows(
             spin_rows(task, r, arrays, want, rows)
         elif task.kind == _SIDE_FOOT:
             side_foot_rows(task, r, arrays, want, rows)
+        elif task.kind == _SOLE:
+            sole_rows(task, r, arrays, want, rows)
+        elif task.kind == _SWAY:
+            sway_rows(r, arrays, want, rows)
         else:
             spare_joint_rows(task, r, arrays, rows)

@@ -105,6 +105,7 @@ LATERAL = np.dtype(
         ("touchdown", _F),
         ("section", _F),
         ("beside", _I),
+        ("ratio", _F),
         ("feet", _I, (2,)),  # that were rear and front at its start
         ("stood", _F, (2, 2)),  # x and y where each foot stands, or stood last [m]
         # -- the turn of a run's stride --
@@ -114,6 +115,10 @@ LATERAL = np.dtype(
         ("bank", _F),  # roll that the turn's curve asks for [rad]
         ("bank_rate", _F),  # at which the roll goes there [rad/s]
         ("spin", _F),  # angular momentum about the vertical [N m s]
+        # Of the periodic motion, at the section of the foot that landed last: y of the CoM from it,
+        # and dy/dt [m, m/s].
+        ("cycle", _F, (2,)),
+        ("section_began", _F),  # time of the last section [s]
         # -- what the foothold is for: see LateralAim --
         ("state", _F, (2,)),
         ("step", _F),
@@ -158,6 +163,7 @@ def lateral_foothold(
         touchdown=lateral.touchdown,
         section=lateral.section,
         beside=lateral.beside,
+        ratio=lateral.ratio,
     )
     aim = LateralAim(
         state=lateral.state,
@@ -187,18 +193,24 @@ class LateralPlanner:
     """The lateral half of the walk; all positions are y in the heading frame.
 
     ``options`` are of the reference template; ``wish``, step width, lateral motion and turn, may be
-    changed between two steps; ``data`` (1,) are of ``LATERAL``, which ticks read and write.
+    changed between two steps; ``data`` (1,) are of ``LATERAL``, which ticks read and write;
+    ``ratio`` is that of a :class:`.LateralPath`.
     ``lessons`` is what the robot adds to the template's sideways motion, by kind of stride,
     ``cycle`` the wish's periodic motion.
     """
 
     def __init__(
-        self, parameters: SlipParameters, options: LateralOptions, wish: LateralWish, data: Any
+        self,
+        parameters: SlipParameters,
+        options: LateralOptions,
+        wish: LateralWish,
+        data: Any,
+        ratio: float = 1.0,
     ) -> None:
         self.wish, self.data = wish, data
         self._unscaled = options
         self.options = scaled(options, Scale.of(parameters))
-        self._gravity = parameters.gravity
+        self._gravity, self._ratio = parameters.gravity, ratio
         self.lessons: dict[str, LateralLearnt] = {}
         self.cycle: LateralCycle
         self._gait: Gait | None = None
@@ -242,7 +254,7 @@ class LateralPlanner:
         """
         if gait is not None and gait is not self._gait:
             self._gait = gait
-            self._lateral = lateral_gait(gait, self._unscaled)
+            self._lateral = lateral_gait(gait, self._unscaled, ratio=self._ratio)
         if self._gait is not None:
             self.cycle = lateral_cycle(self._lateral, self.wish, self.learnt.offset)
 
@@ -271,13 +283,18 @@ class LateralPlanner:
         self._landed, self._due = self.placed, np.inf
         self.data["placed"] = 0
 
-    def aim(self, stance: Side) -> None:
+    def aim(self, stance: Side, *, turned: bool = False) -> None:
         """Aim at the next foothold, next to the foot on the side ``stance``, and the one after it.
 
-        That foot stands, or stood last.
+        That foot stands, or stood last; ``turned`` says whether the heading has turned at its
+        section already.
         """
         if self._gait is None:
             return
+        state = self.cycle.states[stance.row].copy()
+        if turned:
+            state[1] -= self._lateral.speed * self.wish.turn
+        self.data["cycle"] = state
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
         self.data["second_step"] = self.cycle.steps[stance.other.row]
         for name, value in self._aim._asdict().items():
@@ -299,10 +316,11 @@ class LateralPlanner:
         """
         self._take(path)
         self.data["feet"] = feet
-        for name in ("gravity", "longest", "touchdown", "section", "beside"):
+        for name in ("gravity", "longest", "touchdown", "section", "beside", "ratio"):
             self.data[name] = getattr(self._path, name)
         return self._path.coefficients, self._path.meta, self._path.footholds
 
     def _take(self, path: TemplatePath) -> None:
         if path is not self._planar:
-            self._planar, self._path = path, lateral_path(path.strides, self._gravity)
+            self._planar = path
+            self._path = lateral_path(path.strides, self._gravity, self._ratio)

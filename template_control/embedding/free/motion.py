@@ -90,7 +90,7 @@ class LateralMotion:
         ready(LATERAL)
         scale = Scale.of(parameters)
         wish = LateralWish(scaled(options, scale).step_width)
-        planner = LateralPlanner(parameters, options.lateral, wish, data)
+        planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway)
         data["bank_rate"] = BANK_RATE / scale.time
         turns = TURN_RAMP / scale.time**2, RUN_RAMP / scale.time**2
         ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
@@ -116,7 +116,7 @@ class LateralMotion:
         s = self.robot.space
         speed = s.com_velocity[_SIDE]
         if momentum_speed:
-            speed = speed - s.momentum[0] / (self.robot.mass * height)
+            speed = (speed - s.momentum[0] / (self.robot.mass * height)) * self.robot.sway
         return np.array([s.com[_SIDE], speed])
 
     def side(self, foot: int) -> float:
@@ -185,7 +185,7 @@ class LateralMotion:
         aside, turn = (gait.step_duration * self._now).tolist()
         planner.wish = replace(planner.wish, aside=aside, turn=turn)
         planner.walk(gait)
-        planner.aim(SIDES[self._feet.landed])
+        planner.aim(SIDES[self._feet.landed], turned=True)
         z, target = section.of(sensed.state), supervisor.goal.target
 
         def decide(least: float) -> Decision:
@@ -202,6 +202,7 @@ class LateralMotion:
             feet = self._stood[list(supervisor.feet), _SIDE]
             return planner.forecast(supervisor.path, com, feet)
 
+        planner.data["section_began"] = time
         if not node.stance:
             planner.expect(inf)
             self._turn_in_run(sensed, gait.step_duration, time)

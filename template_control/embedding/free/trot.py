@@ -13,6 +13,7 @@ from typing import ClassVar
 
 from template_control.checks.ranges import NotNegative
 from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.free.soles import SoleOptions
 from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import (
@@ -113,8 +114,10 @@ def default_options(robot: Biped) -> EmbeddingOptions:
     """Options of a robot's kind.
 
     Args:
-        robot: planar, or with a floating base and two legs or four.
+        robot: planar, or with a floating base and two legs, with point or flat feet, or four.
     """
+    if robot.patches:
+        return SoleOptions()
     if len(robot.feet) > LEGS:
         return TrotOptions()
     return FreeOptions() if robot.directions > UP else EmbeddingOptions()

@@ -33,6 +33,8 @@ class Learners:
         self, options: EmbeddingOptions, parameters: SlipParameters, robot: Biped, tick: Any
     ) -> None:
         scale, weight = Scale.of(parameters), robot.mass * robot.gravity
+        # On soles a robot of another mass takes no nominal stride until its load is learnt.
+        self._always = bool(robot.patches)
         self.load = LoadEstimate(robot.gravity, tick["load"])
         self.trim = MomentumTrim(parameters)
         self.lean = TrunkLean(options.lean, options.trunk_pitch, scale, tick["lean"])
@@ -50,7 +52,7 @@ class Learners:
 
         ``state`` (4,) is x, y, dx/dt, dy/dt at its section.
         """
-        self.load.end_stride(nominal)
+        self.load.end_stride(nominal or self._always)
         self.trim.end_stride(section.padded(section.of(state)), nominal)
         self.lean.end_stride(nominal)
 

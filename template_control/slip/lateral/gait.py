@@ -133,7 +133,10 @@ class LateralGait:
 
 @checked
 def lateral_gait(
-    gait: Gait, options: LateralOptions | None = None, automaton: Automaton = AUTOMATON
+    gait: Gait,
+    options: LateralOptions | None = None,
+    automaton: Automaton = AUTOMATON,
+    ratio: Positive = 1.0,
 ) -> LateralGait:
     """The sideways step map along a planar gait.
 
@@ -141,6 +144,7 @@ def lateral_gait(
         gait: the planar one.
         options: what errors and steps cost, for the reference template; scaled to the gait's.
         automaton: of the gait's stride.
+        ratio: of dy/dt to that with the angular momentum about the CoM, as a robot sways.
 
     Raises:
         GaitError: if the gait's stride is not completed, or no foot lands in it.
@@ -148,7 +152,7 @@ def lateral_gait(
     p, node = gait.parameters, automaton.start(gait.stride).name
     section = section_of(automaton.sections(node)[0])
     stride = simulate_stride(p, node, section.state(gait.state), gait.controls, automaton=automaton)
-    path = lateral_path((stride,), p.gravity)
+    path = lateral_path((stride,), p.gravity, ratio)
     if not np.isfinite(path.section):
         raise GaitError(
             f"gait {gait.name!r} has no sideways step: {stride.outcome.reason or 'no foot lands'}"

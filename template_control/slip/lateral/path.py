@@ -55,6 +55,8 @@ class LateralPath(NamedTuple):
         section: time of the first section after it [s], inf if the path does not come there or
             starts below the ground.
         beside: index, 0 or 1, of the foothold next to which the next foot lands.
+        ratio: of dy/dt to that with the angular momentum about the CoM, as a robot sways; c_i is
+            times it. 1 of the template, whose legs weigh nothing.
     """
 
     coefficients: Array
@@ -65,14 +67,16 @@ class LateralPath(NamedTuple):
     touchdown: float
     section: float
     beside: int
+    ratio: float
 
 
-def lateral_path(strides: Sequence[Stride], gravity: float) -> LateralPath:
+def lateral_path(strides: Sequence[Stride], gravity: float, ratio: float = 1.0) -> LateralPath:
     """Of strides each of which starts where the one before ended.
 
     Args:
         strides: at least one, such as those of the path that a robot follows.
         gravity: g [m/s^2].
+        ratio: see :class:`LateralPath`.
     """
     metas, resets, sections, offset = [], [], [], 0.0
     for stride in strides:
@@ -96,6 +100,7 @@ def lateral_path(strides: Sequence[Stride], gravity: float) -> LateralPath:
         touchdown=touchdown,
         section=section if height > 0.0 else np.inf,
         beside=beside,
+        ratio=float(ratio),
     )
 
 
@@ -125,7 +130,7 @@ COLUMNS = 2 + NEXT + 1
 
 @compiled
 def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> None:
-    """Write c_i = f_i / (m l_i) of the rear and the front leg into ``out`` (2,) [1/s^2].
+    """Write c_i = f_i / (m l_i), times the ratio, of both legs into ``out`` (2,) [1/s^2].
 
     ``time`` is since the start of segment ``row`` [s]; ``com`` (6,) is overwritten with x, z and
     their first and second derivatives. 0 for a leg in the air; legs do not pull.
@@ -143,6 +148,7 @@ def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> N
             share = min(max(share, 0.0), 1.0)
     elif not rear and not front:
         total = 0.0
+    total *= path.ratio
     out[0], out[1] = total * (1.0 - share), total * share
 
 

@@ -1,0 +1,91 @@
+"""Tuning of the embedding of a humanoid on flat feet, and its table of phases.
+
+A sole bears a moment. So in single stance the CoM's momentum is followed too, forward and to the
+left, and the trunk is kept upright; the centre of pressure moves by millimetres for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.learners.lean import LeanOptions
+from template_control.embedding.phases import RUNNING_SWING, PhaseControl, Phases, running_phases
+from template_control.slip.automaton.vocabulary import Leg, Phase
+from template_control.whole_body.tasks import (
+    ComTask,
+    FootTask,
+    OrientationTask,
+    SideFootTask,
+    SoleTask,
+    SwayTask,
+)
+
+_SINGLE = PhaseControl(
+    tasks=(
+        # Lighter in x, a sole would be a free lunch: the momentum is drained to move the swing leg.
+        ComTask((1.0, 10.0), on_point=True, falling=1.0),
+        SwayTask(1.0),
+        OrientationTask(),
+        FootTask(),
+        SideFootTask(),
+        SoleTask(),
+    ),
+    swings=(Leg.FRONT,),
+)
+_RUNNING_STANCE = replace(
+    _SINGLE,
+    tasks=(
+        ComTask((1.0, 10.0), on_point=True, falling=1.0),
+        SwayTask(1.0),
+        OrientationTask((3.0, 3.0, 0.05)),
+        FootTask(weight=(0.1, 0.1)),
+        SideFootTask(weight=0.1),
+        SoleTask(),
+    ),
+    swing=RUNNING_SWING,
+)
+_DOUBLE = PhaseControl(
+    tasks=(
+        ComTask((10.0, 10.0), on_point=True),
+        SwayTask(10.0),
+        OrientationTask((4.0, 4.0, 0.4)),
+    ),
+    unload_legs=(Leg.REAR,),
+)
+
+SOLE_PHASES: Phases = {
+    **running_phases(
+        (
+            OrientationTask((0.2, 0.2, 0.02)),
+            *(task(leg) for leg in Leg for task in (FootTask, SideFootTask, SoleTask)),
+        ),
+        _RUNNING_STANCE,
+        _DOUBLE,
+    ),
+    Phase.SS: _SINGLE,
+    Phase.DS: replace(_DOUBLE, trim_momentum=True),
+    # A planner with push-off leaves the trim nothing to do.
+    "DS_sc^wp": _DOUBLE,
+    "DS_sd^wp": _DOUBLE,
+}
+"""Walking, and runs. Nodes of other gaits find the entry of their phase."""
+
+
+@dataclass(frozen=True)
+class SoleOptions(FreeOptions):
+    """Tuning of the embedding of a robot on flat feet.
+
+    The fields of :class:`~template_control.embedding.free.options.FreeOptions` come first.
+
+    Attributes:
+        phases: tasks, clock, feet and learners of each phase.
+        lean: none: the trunk stays upright.
+    """
+
+    kind: ClassVar[str] = "soles"
+
+    phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(SOLE_PHASES))
+    lean: LeanOptions = field(default_factory=lambda: LeanOptions({}))
