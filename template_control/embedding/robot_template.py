@@ -132,7 +132,8 @@ def walking_speeds(robot: Biped, torque_scale: Positive = 1.0) -> tuple[float, f
             share = max(hip / _SWING_TORQUE, _stance(robot, gait) / _STANCE_TORQUE)
             swings.append((gait.mean_speed, gait.vlo[0], uneven, share))
     mean, vlo, uneven, share = np.array(swings).T
-    heavy = uneven > _UNEVEN * vlo
+    # A sole bears what the swing of heavy legs adds.
+    heavy = (uneven > _UNEVEN * vlo) & (not robot.patches)
     low = float(np.max((mean + uneven)[heavy], initial=slowest))
     hasty = np.flatnonzero(share > torque_scale)
     if len(hasty) and hasty[0] > 0:

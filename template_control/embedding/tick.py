@@ -46,7 +46,7 @@ from template_control.embedding.swing import (
 from template_control.robot.terms import LEGS, PATCH, UP
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.problem import solve_free
-from template_control.whole_body.tasks import write_rows
+from template_control.whole_body.task_rows import write_rows
 
 Array = NDArray[np.float64]
 
@@ -378,7 +378,7 @@ def _place_contacts(t: Any, r: Any, want: Any) -> None:
 
 @compiled
 def _sway(t: Any, r: Any, want: Any) -> None:
-    """Write how a robot on soles is to sway: as the template, and in single stance held to its gait.
+    """Write how a robot on soles is to sway: as the template, in single stance held to its gait.
 
     The capture point xi = y + a s / w diverges with w = sqrt(a g / h), s the lateral speed with the
     momentum, a the sway ratio. In the gait's periodic motion it is at X*_y + X*_v / w from the

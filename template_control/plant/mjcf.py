@@ -39,9 +39,9 @@ _ROOT = 1  # Pinocchio's index of the free flyer
 def mjcf(robot: Biped, world: PlantOptions, contact_time: float) -> str:
     """The model as MuJoCo reads it; ``contact_time`` is the contacts' time constant [s].
 
-    The joints have the names of Pinocchio's, the feet's spheres are ``foot0`` and ``foot1``, of soles
-    ``foot0_0`` to ``foot1_3``, and the trunk's body and shapes begin with ``trunk``. Feet and a planar robot's trunk meet the
-    ground; the other links, and the robot itself, do not.
+    The joints have the names of Pinocchio's, the feet's spheres are ``foot0`` and ``foot1``, of
+    soles ``foot0_0`` to ``foot1_3``, and the trunk's body and shapes begin with ``trunk``. Feet and
+    a planar robot's trunk meet the ground; the other links, and the robot itself, do not.
     """
     root = Element("mujoco", model="plant")
     _add(root, "compiler", angle="radian", autolimits="true")

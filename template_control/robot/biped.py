@@ -39,9 +39,10 @@ _SAGITTAL = {2: 1, 3: UP}  # by directions: from forward to up
 class Biped(Robot):
     """A robot on two template legs, and its kinematics and dynamics at the last :meth:`update`.
 
-    It touches the ground at *contacts*, the lowest points of its foot spheres, or with patches, the
-    soles of flat feet, whose points here are their toes. A leg of the template is a group of contacts, and its foot is their mean. A biped with point feet has two
-    groups of one; of a quadruped that trots either diagonal pair is a virtual leg (Raibert).
+    It touches the ground at *contacts*: the lowest points of its foot spheres; or patches, the
+    soles of flat feet, whose points are their toes. A leg of the template is a group of contacts,
+    and its foot is their mean. A biped has two groups of one; of a quadruped that trots either
+    diagonal pair is a virtual leg (Raibert).
 
     Sagittal quantities have two entries, x forward and y up: of a planar robot in the world, of a
     free one in its heading frame.
@@ -82,9 +83,11 @@ class Biped(Robot):
         angular_momentum_jacobian: (nv,) its row of the centroidal momentum matrix.
         angular_momentum_bias: that row's time derivative times v [N m].
         contact_position: (n, d) lowest point of each foot sphere, in all ``directions`` [m].
-        contact_velocity: (n, d) of the material point there [m/s].
+        contact_velocity: (n, d) of the material point there [m/s]; (n, 6) of patches, with their
+            angular velocity [rad/s].
         contact_jacobian: (n, d, nv) maps v to each contact's velocity; (n, 6, nv) of patches.
-        contact_bias: (n, d) dJ/dt v of these Jacobians, for rolling feet [m/s^2].
+        contact_bias: (n, d) dJ/dt v of these Jacobians, for rolling feet [m/s^2]; (n, 6) of
+            patches.
         foot_position: (2, 2) of each template leg's foot, the mean of its contacts [m].
         foot_velocity: (2, 2) [m/s].
         foot_jacobian: (2, 2, nv) maps v to each foot's velocity.
@@ -202,7 +205,7 @@ class Biped(Robot):
         )
         contacts, every = len(self.feet), UP // step
         self.contact_position, self.contact_velocity, self.contact_bias = (
-            now[f"contact_{name}"][0, :contacts, : UP + 1 : every]
+            now[f"contact_{name}"][0, :contacts, : max(self.contact_rows, UP + 1) : every]
             for name in ("position", "velocity", "bias")
         )
         self.contact_jacobian = j.contact
@@ -255,8 +258,8 @@ class Biped(Robot):
                 add_feet(self.path, urdf, model, self.feet)
         model.gravity.linear = np.array([0.0, 0.0, -(gravity or self.gravity)])
         rest = self.feet, self.foot_radius, self.walk
-        own = {"patches": self.patches} if self.patches else {}
-        return type(self)(self.path, urdf, model, *rest, groups=self.groups, **own)
+        same = {"groups": self.groups, "patches": self.patches}
+        return type(self)(self.path, urdf, model, *rest, **same)  # type: ignore[arg-type]
 
     @staticmethod
     @abstractmethod

@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
-from template_control.errors import ParameterError
+from template_control.errors import ParameterError, RobotError
 from template_control.robot.biped import Biped
+from template_control.robot.legs import HINGES
 from template_control.robot.requirements import add_feet, check_floating, feet_of_legs
 from template_control.robot.sole import Sole, add_soles, find_soles, mirrored, with_balls
 from template_control.robot.terms import FLOATING_DOF, UP, Jacobians, Trunk, gather_floating
-from template_control.structured import Number
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import (
     check_joint_names,
@@ -42,6 +42,7 @@ from template_control.robot.urdf_edits import (
     spheres,
     take_points,
 )
+from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
@@ -141,8 +142,8 @@ class FloatingBaseBiped(Biped):
         space: all terms with three directions, in the heading frame.
         spare: of each leg with four hinges, the joint above the hip whose axis is nearest to the
             vertical: its index into ``joint_names``, and its angle in :meth:`neutral` [rad].
-        sway: of flat feet, dy/dt of the CoM over dy/dt - L_x / (m z) where the soles and the attitude
-            of the trunk rest, L the angular momentum about the CoM; 1 of point feet.
+        sway: of flat feet, dy/dt of the CoM over dy/dt - L_x / (m z) where the soles and the
+            attitude of the trunk rest, L the angular momentum about the CoM; 1 of point feet.
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
     """
 

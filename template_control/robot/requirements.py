@@ -123,9 +123,7 @@ def check_guide(path: Path, model: pin.Model) -> None:
             )
 
 
-def check_floating(
-    path: Path, model: pin.Model, feet: Sequence[str], flat: bool = False
-) -> None:
+def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool = False) -> None:
     """Check that a robot with a free flyer has legs that can place their feet anywhere.
 
     Those with a ``flat`` foot also turn it as they like, but for one direction.

@@ -41,6 +41,7 @@ class Robot(ABC):
     Args:
         model: Pinocchio's.
         contacts: number of points or patches of it that may touch the ground.
+        patches: whether they are patches, which bear moments too.
 
     Attributes that are constant:
         base_dof: unactuated degrees of freedom, the first ones.

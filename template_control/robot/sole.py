@@ -122,7 +122,7 @@ def _geometry(path: Path, urdf: str, model: pin.Model) -> pin.GeometryModel:
 def _points(body: object) -> list[tuple[Array, float]]:
     """Points of a shape in its own frame [m], each with the radius of a sphere about it [m]."""
     if isinstance(body, pin.hppfcl.BVHModelBase):
-        return [(body.vertices(i), 0.0) for i in range(body.num_vertices)]
+        return [(body.vertex(i), 0.0) for i in range(body.num_vertices)]
     if isinstance(body, pin.hppfcl.Box):
         return [(np.array(signs) * body.halfSide, 0.0) for signs in product((-1.0, 1.0), repeat=3)]
     if isinstance(body, pin.hppfcl.Sphere):
@@ -155,7 +155,7 @@ def with_balls(urdf: str, model: pin.Model, feet: Sequence[str], soles: Sequence
             link.remove(shape)
         turn = data.oMf[foot_frame(model, foot)].rotation.T
         for x, y in product((-1.0, 1.0), repeat=2):
-            corner = sole.centre + (x * sole.half_sides[0], y * sole.half_sides[1], _BALL)
+            corner = sole.centre + np.array((x, y, _BALL)) * (*sole.half_sides, 1.0)
             collision = ET.SubElement(link, "collision")
             ET.SubElement(collision, "origin", xyz=vector_text(turn @ corner))
             ET.SubElement(ET.SubElement(collision, "geometry"), "sphere", radius=f"{_BALL:g}")

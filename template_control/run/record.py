@@ -9,7 +9,7 @@ import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from template_control.run.tables import Quantity, quantities, to_dataframe, to_x
 from template_control.slip.automaton.vocabulary import Phase
 
 Array = NDArray[np.float64]
+
+R = TypeVar("R", bound="Record")
 
 _METADATA: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("robot", "urdf", "gait", "planner", "plant"), (str,)),
@@ -348,7 +350,7 @@ class SoleRecord(FloatingRecord):
         return self.sole_wrench[:, :, [4, 3]] * (-1.0, 1.0) / load
 
 
-def _kinds(kind: type[Record]) -> Iterator[type[Record]]:
+def _kinds(kind: type[R]) -> Iterator[type[R]]:
     """All kinds of runs that are of a kind, the most special first."""
     for special in kind.__subclasses__():
         yield from _kinds(special)

@@ -358,7 +358,7 @@ class Recorder:
             error: that ended it, on one line.
         """
         self._close_block()
-        kind = FloatingRecord if self._floating is not None else Record
+        kind: type[Record] = Record if self._floating is None else FloatingRecord
         if self.controller.robot.patches:
             kind = SoleRecord
         table, clocks = (

@@ -64,6 +64,10 @@ Small: in double stance it chooses between forces that serve the tasks alike.
 TORQUE_COST = 1e-4
 """Of the joint torques, per squared limit. Smaller: it only makes the optimum unique."""
 
+SOLE_SHARE = 0.8
+"""Share of a sole, in length and width, in which its centre of pressure is kept: at its edge the
+foot tilts. With 0.25 and 0.5 G1 walks too."""
+
 _CHECKS = "proxsuite.instructionset"
 """Module that proxsuite asks at its import which of its builds the processor can run."""
 
@@ -99,8 +103,6 @@ class QpOptions(Checked):
         friction: Coulomb coefficient of the ground, as far as the controller knows it.
         friction_margin: share of it that the cones use; a foot slides before the QP knows.
         torque_scale: share of the URDF's torque limits that may be used.
-        sole_share: share of a flat foot's sole, in length and width, in which its centre of pressure
-            is kept; at its edge the foot tilts.
         contact_damping: brings a foot that landed sliding to rest [1/s].
         speed_share: from this share of its limit on a joint's speed is bounded. Far from the
             limit the bound would only cost time.
@@ -117,7 +119,6 @@ class QpOptions(Checked):
     friction: Positive = tuned(0.7)
     friction_margin: Positive = tuned(0.9)
     torque_scale: Positive = tuned(1.0)
-    sole_share: Share = tuned(0.8)
     contact_damping: NotNegative = tuned(40.0, RATE)
     speed_share: Share = tuned(0.85)
     speed_horizon: Positive = tuned(0.005, TIME)
@@ -279,7 +280,7 @@ class WholeBodyQp:
         self.data = np.zeros(1, QP_DATA)
         now = self.data[0]
         now["force_cost"], now["torque_cost"] = FORCE_COST, TORQUE_COST
-        now["sole_share"] = o.sole_share
+        now["sole_share"] = SOLE_SHARE
         now["friction"], now["contact_damping"] = o.cone, o.contact_damping
         now["speed_share"], now["stop_share"] = o.speed_share, o.stop_share
         now["stop_time"], now["load"] = o.stop_horizon / o.speed_share, 1.0

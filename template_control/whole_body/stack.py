@@ -12,7 +12,8 @@ from template_control.checks.fitting import blame, name_of
 from template_control.errors import ParameterError
 from template_control.robot.robot import Robot
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT, References, Rows, Task
-from template_control.whole_body.tasks import TASK, CompiledTask, ComTask, write_rows
+from template_control.whole_body.task_rows import TASK, write_rows
+from template_control.whole_body.tasks import CompiledTask, ComTask
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,253 @@
+"""Rows of the library's tasks, in compiled code.
+
+One formula a task, and :func:`write_rows` calls those of a phase's tasks in turn. The equations are
+in the docstrings of the tasks. Arguments: ``task`` is of ``TASK``, ``r`` of ``ROBOT_DATA``,
+``arrays`` is :class:`~template_control.robot.terms.Jacobians` as a plain tuple, ``want`` is of
+``REFERENCES``, and ``rows`` are the task's own, overwritten.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.compiled import compiled
+from template_control.robot.terms import UP
+from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
+
+Array = NDArray[np.float64]
+
+_PITCH = 2  # place of a planar robot's pitch in q
+_SIDE = 1  # y of a floating-base robot's feet, to the left
+_YAW = 2
+# An error of the yaw counts as this much at most in a run [rad]: more momentum about the vertical
+# than it asks for is more than ab- and adduction have, and roll is lost with it.
+_MOST_YAW = 0.2
+_F, _I = np.float64, np.int64
+
+TASK = np.dtype(
+    [
+        ("kind", _I),  # which formula: a task's ``kind``
+        ("first", _I),  # row of the stack
+        ("leg", _I),  # role of the task's foot
+        ("contact", _I),  # which one of the foot's group
+        ("gains", _F, (4,)),  # kp and kd, twice where the task has two pairs
+        ("weight", _F, (3,)),  # of the first rows
+    ],
+    align=True,
+)
+"""A task as compiled code reads it."""
+
+COM, FOOT, MOMENTUM, POSTURE, ORIENTATION, SPIN, SIDE_FOOT, SPARE, SOLE, SWAY = range(10)
+"""Formulas, by the kind of a task."""
+
+
+@compiled
+def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of a :class:`ComTask`, and ``lift`` of references; see :func:`write_rows`."""
+    com, momentum = arrays[2], arrays[3]
+    kp, kd, nv = task.gains[0], task.gains[1], com.shape[1]
+    up, pitch = com.shape[0] - 1, len(momentum) // 2
+    ref, now = want.com, want.com_now
+    height, rise = now[1], r.com_velocity[UP]
+    moment = r.mass * height
+    for k in range(nv):
+        rows[0, k] = com[0, k] + momentum[pitch, k] / moment
+        rows[1, k] = com[up, k]
+    turning = r.momentum_bias[1] - r.momentum[1] * rise / height
+    rows[0, nv + BIAS], rows[1, nv + BIAS] = r.com_bias[0] + turning / moment, r.com_bias[UP]
+    ahead = ref[4] + kp * (ref[0] - now[0]) + kd * (ref[2] - now[2]) + want.com_push
+    if task.gains[2] > 0.0:
+        ahead -= kp * want.lead
+    if task.gains[3] > 0.0:
+        ahead += task.gains[3] * (ref[5] + r.gravity) / height * (now[0] - ref[0])
+    want.lift = kp * (ref[1] - now[1]) + kd * (ref[3] - now[3])
+    rows[0, nv + DESIRED], rows[1, nv + DESIRED] = ahead, ref[5] + want.lift
+
+
+@compiled
+def foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of a :class:`FootTask`; arguments as for :func:`write_rows`."""
+    contact, foot = arrays[4], want.feet[task.leg]
+    kp, kd, hold_p, hold_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
+    point, nv = r.group[foot, task.contact], contact.shape[2]
+    for row in range(2):
+        axis, direction = row * UP, row * (min(contact.shape[1], UP + 1) - 1)
+        for k in range(nv):
+            rows[row, k] = contact[point, direction, k]
+        rows[row, nv + BIAS] = r.contact_bias[point, axis]
+        wanted, away = want.foot[foot, row], want.offset[point, axis]
+        ahead = wanted[0] + away[0] - r.contact_position[point, axis]
+        faster = wanted[1] + away[1] - r.contact_velocity[point, axis]
+        rows[row, nv + DESIRED] = wanted[2] + away[2] + kp * ahead + kd * faster
+        rows[row, nv + WEIGHT] = 0.0 if want.stands[point] else task.weight[row]
+    ahead = want.furthest[foot] + want.offset[point, 0, 0] - r.contact_position[point, 0]
+    held = hold_p * ahead + hold_d * (r.hip_speed - r.contact_velocity[point, 0])
+    rows[0, nv + DESIRED] = min(rows[0, nv + DESIRED], held)
+
+
+@compiled
+def momentum_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the row of a :class:`MomentumTask`; arguments as for :func:`write_rows`."""
+    momentum, height = arrays[3], want.com_now[1]
+    pitch, nv = len(momentum) // 2, momentum.shape[1]
+    inertia = r.mass * (height * height)
+    for k in range(nv):
+        rows[0, k] = momentum[pitch, k]
+    rows[0, nv + BIAS] = r.momentum_bias[1]
+    turning = inertia * task.gains[1] * (want.pitch - r.attitude[1])
+    rows[0, nv + DESIRED] = task.gains[0] * (turning - r.momentum[1])
+    rows[0, nv + WEIGHT] = task.weight[0] / (inertia * inertia)
+
+
+@compiled
+def posture_rows(task: Any, r: Any, want: Any, rows: Array) -> None:
+    """Write the row of a :class:`PostureTask`; arguments as for :func:`write_rows`."""
+    nv = rows.shape[1] - 3
+    rows[0, _PITCH] = 1.0
+    away = task.gains[0] * (want.pitch - r.attitude[1])
+    rows[0, nv + DESIRED] = away - task.gains[1] * r.turning[1]
+
+
+@compiled
+def orientation_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of an :class:`OrientationTask`; arguments as for :func:`write_rows`."""
+    turning, nv = arrays[5], rows.shape[1] - 3
+    kp, kd, yaw_p, yaw_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
+    for axis in range(turning.shape[0]):
+        for k in range(nv):
+            rows[axis, k] = turning[axis, k]
+    rows[0, nv + DESIRED] = kp * (want.lean[0] - r.attitude[0]) - kd * r.turning[0]
+    rows[1, nv + DESIRED] = kp * (want.pitch - r.attitude[1]) - kd * r.turning[1]
+    rows[2, nv + DESIRED] = yaw_p * (want.lean[2] - r.attitude[2]) - yaw_d * r.turning[2]
+
+
+@compiled
+def spin_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of a :class:`SpinTask`.
+
+    Arguments as for :func:`write_rows`, one of each.
+    """
+    momentum, height = arrays[3], want.com_now[1]
+    nv, inertia = momentum.shape[1], r.mass * (height * height)
+    for axis in range(momentum.shape[0]):
+        for k in range(nv):
+            rows[axis, k] = momentum[axis, k]
+        rows[axis, nv + BIAS] = r.momentum_bias[axis]
+        wanted = want.pitch if axis == 1 else want.lean[axis]
+        error = wanted - r.attitude[axis]
+        if axis == _YAW:
+            error = min(max(error, -_MOST_YAW), _MOST_YAW)
+        turning = inertia * task.gains[1 + axis] * error
+        if axis == _YAW:
+            turning += want.spin
+        rows[axis, nv + DESIRED] = task.gains[0] * (turning - r.momentum[axis])
+        rows[axis, nv + WEIGHT] = task.weight[axis] / (inertia * inertia)
+
+
+@compiled
+def side_foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the row of a :class:`SideFootTask`; arguments as for :func:`write_rows`."""
+    contact, foot, nv = arrays[4], want.feet[task.leg], rows.shape[1] - 3
+    point = r.group[foot, task.contact]
+    wanted, off = want.side[foot], want.offset[point, _SIDE]
+    for k in range(nv):
+        rows[0, k] = contact[point, _SIDE, k]
+    rows[0, nv + BIAS] = r.contact_bias[point, _SIDE]
+    away = wanted[0] + off[0] - r.contact_position[point, _SIDE]
+    behind = wanted[1] + off[1] - r.contact_velocity[point, _SIDE]
+    rows[0, nv + DESIRED] = wanted[2] + off[2] + task.gains[0] * away + task.gains[1] * behind
+    rows[0, nv + WEIGHT] = 0.0 if want.stands[point] else task.weight[0]
+
+
+@compiled
+def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) -> None:
+    """Write the rows of a :class:`SpareJointTask`; arguments as for :func:`write_rows`."""
+    joints, nv = arrays[6], rows.shape[1] - 3
+    base_dof = nv - joints.shape[1]
+    for row in range(2):
+        if row >= r.spare:
+            rows[row, nv + WEIGHT] = 0.0
+            continue
+        joint = r.spare_joint[row]
+        rows[row, base_dof + joint] = 1.0
+        away = task.gains[0] * (r.spare_angle[row] - joints[0, joint])
+        rows[row, nv + DESIRED] = away - task.gains[1] * joints[1, joint]
+
+
+@compiled
+def sole_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the rows of a :class:`SoleTask`; arguments as for :func:`write_rows`."""
+    contact, foot = arrays[4], want.feet[task.leg]
+    patch, nv = r.group[foot, 0], contact.shape[2]
+    axes = r.contact_axes[patch]
+    c, s = np.cos(want.lean[2]), np.sin(want.lean[2])
+    for axis in range(3):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        # The rotation times the inverse of the wanted one, a turn about the vertical.
+        off = _turned_back(axes, j, i, c, s) - _turned_back(axes, i, j, c, s)
+        for k in range(nv):
+            rows[axis, k] = contact[patch, 3 + axis, k]
+        rows[axis, nv + BIAS] = r.contact_bias[patch, 3 + axis]
+        speed = r.contact_velocity[patch, 3 + axis]
+        rows[axis, nv + DESIRED] = -0.5 * task.gains[0] * off - task.gains[1] * speed
+        rows[axis, nv + WEIGHT] = 0.0 if want.stands[patch] else task.weight[axis]
+
+
+@compiled
+def _turned_back(axes: Array, row: int, column: int, c: float, s: float) -> float:
+    """Entry of a rotation times that about the vertical by minus an angle: cosine c, sine s."""
+    if column == 0:
+        return c * axes[row, 0] - s * axes[row, 1]
+    if column == 1:
+        return s * axes[row, 0] + c * axes[row, 1]
+    return float(axes[row, 2])
+
+
+@compiled
+def sway_rows(r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the row of a :class:`SwayTask`; arguments as for :func:`write_rows`."""
+    com, momentum, height = arrays[2], arrays[3], want.com_now[1]
+    nv, moment = com.shape[1], r.mass * height
+    for k in range(nv):
+        rows[0, k] = com[_SIDE, k] - momentum[0, k] / moment
+    turning = r.momentum_bias[0] - r.momentum[0] * r.com_velocity[UP] / height
+    rows[0, nv + BIAS] = r.com_bias[_SIDE] - turning / moment
+    rows[0, nv + DESIRED] = want.sway
+
+
+@compiled
+def write_rows(
+    program: Any, data: Any, arrays: tuple[Any, ...], references: Any, table: Array
+) -> None:
+    """Let tasks write their rows into the table of a :class:`~.stack.TaskStack`.
+
+    ``program`` (n,) is of ``TASK``, ``data`` (1,) of ``ROBOT_DATA``, ``references`` (1,) of
+    ``REFERENCES``.
+    """
+    r, want = data[0], references[0]
+    for i in range(program.shape[0]):
+        task = program[i]
+        rows = table[task.first :]
+        if task.kind == COM:
+            com_rows(task, r, arrays, want, rows)
+        elif task.kind == FOOT:
+            foot_rows(task, r, arrays, want, rows)
+        elif task.kind == MOMENTUM:
+            momentum_rows(task, r, arrays, want, rows)
+        elif task.kind == POSTURE:
+            posture_rows(task, r, want, rows)
+        elif task.kind == ORIENTATION:
+            orientation_rows(task, r, arrays, want, rows)
+        elif task.kind == SPIN:
+            spin_rows(task, r, arrays, want, rows)
+        elif task.kind == SIDE_FOOT:
+            side_foot_rows(task, r, arrays, want, rows)
+        elif task.kind == SOLE:
+            sole_rows(task, r, arrays, want, rows)
+        elif task.kind == SWAY:
+            sway_rows(r, arrays, want, rows)
+        else:
+            spare_joint_rows(task, r, arrays, rows)
