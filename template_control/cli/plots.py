@@ -11,7 +11,7 @@ from template_control.checks.ranges import Range
 from template_control.run.record import Record, load_record
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import writing
-from template_control.view.figures import FIGURES, FORMATS, FREE_FIGURES
+from template_control.view.figures import FIGURES, FORMATS, FREE_FIGURES, SOLE_FIGURES
 from template_control.view.scenario_figures import ROUTE_FIGURES
 from template_control.view.style import DPI, Look
 
@@ -19,7 +19,7 @@ TEMPLATE = "template.npz"
 """File of the template's run that goes with a robot's run through a scenario."""
 
 _DOTS = Range(20, 1200)
-_KNOWN = tuple(dict.fromkeys((*FIGURES, *FREE_FIGURES, *ROUTE_FIGURES)))
+_KNOWN = tuple(dict.fromkeys((*FIGURES, *FREE_FIGURES, *SOLE_FIGURES, *ROUTE_FIGURES)))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from template_control.checks import option_types as values
 from template_control.embedding.robot_template import default_gait
-from template_control.robot.legs import HINGES
 from template_control.robot.library import ROBOTS, SHIPPED, load_floating_robot, load_robot
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.terminal import show, table
@@ -58,7 +57,7 @@ def _describe(name: str) -> dict[str, Any]:
         "mass": robot.mass,
         "leg_length": robot.leg_length,
         "joints": list(robot.joint_names),
-        "hip_knee_torque": robot.torque_limit[list(robot.legs[0][-HINGES:])].tolist(),
+        "hip_knee_torque": robot.torque_limit[list(robot.hinges[0][:2])].tolist(),
         "torque_limit": robot.torque_limit.tolist(),
         "velocity_limit": robot.velocity_limit.tolist(),
         "template": {"rest_length": p.rest_length, "leg_stiffness": p.leg_stiffness},

@@ -83,10 +83,10 @@ def _stumbled(record: Record) -> NDArray[np.bool_]:
 
 
 def _stretched(record: Record) -> NDArray[np.bool_]:
-    legs = record.legs
     wrong = np.zeros(len(record.time), dtype=bool)
-    for foot, (leg, bears) in enumerate(zip(legs, _bears(record).T, strict=True)):
-        hip, knee, tip = record.joint[:, leg[-2]], record.joint[:, leg[-1]], record.foot[:, foot]
+    for foot, (leg, bears) in enumerate(zip(record.hinges, _bears(record).T, strict=True)):
+        # Down to the ankle, or the foot.
+        hip, knee, tip, *_ = (*(record.joint[:, j] for j in leg), record.foot[:, foot])
         whole = np.linalg.norm(hip - knee, axis=1) + np.linalg.norm(knee - tip, axis=1)
         wrong |= bears & (np.linalg.norm(hip - tip, axis=1) > _STRAIGHT * whole)
     return wrong

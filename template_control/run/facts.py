@@ -60,6 +60,9 @@ class Facts:
         joints, feet: names.
         groups: the contacts, by their places in ``feet``, of each template leg.
         legs: for each foot, the indices into ``joints`` of its joints, hip first.
+        soles: (n, 4) of flat feet x and y of each sole's centre from the toe, and its half sides
+            [m]; (0, 4) of point feet.
+        hinges: for each foot, those of hip and knee, and of a flat foot's ankle.
         torque_limit, velocity_limit: (nu,) of the joints [N m, rad/s].
         nodes, phases: of the automaton.
         stiffness_slots: for each node, the Slot of its rear and of its front leg; None without.
@@ -119,6 +122,16 @@ class Facts:
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """See the class; runs recorded before there were several contacts are of bipeds."""
         return _joints_of_legs(self.metadata.get("groups", ((0,), (1,))))
+
+    @property
+    def hinges(self) -> tuple[tuple[int, ...], ...]:
+        """See the class; runs recorded before there were flat feet have legs that end in a knee."""
+        return _joints_of_legs(self.metadata.get("hinges") or [leg[-2:] for leg in self.legs])
+
+    @property
+    def soles(self) -> Array:
+        """See the class; runs recorded before there were flat feet have none."""
+        return np.array(self.metadata.get("soles", ())).reshape(-1, 4)
 
     @property
     def weight(self) -> float:

@@ -31,6 +31,8 @@ def about(controller: EmbeddingController) -> dict[str, Any]:
         "feet": robot.feet,
         "groups": robot.groups,
         "legs": robot.legs,
+        "hinges": robot.hinges,
+        "soles": [[*patch.centre, *patch.half_sides] for patch in robot.patches],
         "trunk_com": robot.trunk_com,
         "nodes": [node.name for node in nodes],
         "phases": [node.phase.name for node in nodes],

@@ -11,12 +11,13 @@ from typing import Any, Literal
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count
 from template_control.errors import ParameterError
-from template_control.run.record import FloatingRecord, Record
+from template_control.run.record import FloatingRecord, Record, SoleRecord
 from template_control.slip.automaton.vocabulary import Event, Phase
 from template_control.view.replay.playback import stances
 from template_control.view.state_figures import (
@@ -68,16 +69,16 @@ def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
     height = 2.0 * record.trunk_com
     for row in rows:
         q = record.q[row]
-        hip = record.joint[row, record.legs[0][-2]]
+        hip = record.joint[row, record.hinges[0][0]]
         pitch = record.attitude[row, 1] if isinstance(record, FloatingRecord) else q[2]
         top = hip + height * np.array([np.sin(pitch), np.cos(pitch)])
         trunk = np.stack((hip, top))
         if len(record.legs) > len(SIDES):
-            trunk = record.joint[row, [leg[-2] for leg in record.legs]]
+            trunk = record.joint[row, [leg[0] for leg in record.hinges]]
         axes.plot(*trunk.T, color=TRUNK, linewidth=1.2, alpha=0.55, label="trunk")
-        legs = zip(record.legs, feet_shown(record), record.foot[row], strict=True)
+        legs = zip(record.hinges, feet_shown(record), record.foot[row], strict=True)
         for leg, (name, color), foot in legs:
-            points = np.vstack((record.joint[row, leg[-2:]], foot))
+            points = np.vstack((record.joint[row, list(leg)], foot))
             axes.plot(
                 *points.T, color=color, linewidth=1.0, alpha=0.65,
                 label=name.replace("foot", "leg"),
@@ -277,6 +278,29 @@ def lateral_portrait(record: FloatingRecord, look: Look = _LOOK) -> Figure:
     return finish(figure, [axes], f"{as_text(record.robot_name)}: sway in single stance", look)
 
 
+def pressure(record: SoleRecord, look: Look = _LOOK) -> Figure:
+    """The centre of pressure in each sole, seen from above; x forward is up in the figure."""
+    w = look.rows(record)
+    figure = Figure(figsize=(6.0, 6.0), layout="constrained")
+    panels = figure.subplots(1, len(record.soles), sharex=True, sharey=True)
+    points = 1e3 * record.centre_of_pressure[w]
+    single = record.in_phase(Phase.SS)[w]
+    parts = ((single, "on one sole"), (~single, "on both"))
+    for foot, (name, color) in enumerate(feet_shown(record)):
+        axes, (x, y, length, width) = panels[foot], 1e3 * record.soles[foot]
+        corner = y - width, x - length
+        axes.add_patch(Rectangle(corner, 2.0 * width, 2.0 * length, fill=False, color="0.3"))
+        for (part, phase), mark in zip(parts, (color, "0.6"), strict=True):
+            seen = points[part, foot]
+            axes.plot(seen[:, 1], seen[:, 0], ".", color=mark, markersize=2.0, label=phase)
+        axes.plot(0.0, 0.0, "+", color="0.3", label="toe")
+        axes.set(xlabel="y, to the left [mm]", title=name)
+        axes.set_aspect("equal")
+    panels[0].invert_xaxis()  # left is to the left; the axes are shared
+    panels[0].set_ylabel("x, forward [mm]")
+    return finish(figure, panels, f"{as_text(record.robot_name)}: centre of pressure", look)
+
+
 FIGURES: dict[str, Draw] = {
     "stick_diagram": stick_diagram,
     "com": com_tracking,
@@ -299,6 +323,9 @@ FREE_FIGURES: dict[str, Draw] = {
 }
 """Figures that only a floating-base run has, by file name."""
 
+SOLE_FIGURES: dict[str, Draw] = {"pressure": pressure}
+"""Figures that only a run on flat feet has, by file name."""
+
 _PLANAR_ONLY = ("energies", "turning", "apex_return")
 
 
@@ -306,7 +333,8 @@ def figures_of(record: Record) -> dict[str, Draw]:
     """The figures that have something to show of a run: apexes need two that follow each other."""
     if isinstance(record, FloatingRecord):
         shared = {name: draw for name, draw in FIGURES.items() if name not in _PLANAR_ONLY}
-        return {**shared, **FREE_FIGURES}
+        own = SOLE_FIGURES if isinstance(record, SoleRecord) else {}
+        return {**shared, **FREE_FIGURES, **own}
     names = [record.sections[i] for i in record.section]
     if (Event.APEX.name, Event.APEX.name) in pairwise(names):
         return FIGURES

@@ -20,7 +20,7 @@ from template_control.plant.plant import Plant
 from template_control.robustness import DisturbanceDistribution
 from template_control.run.specs import PlannerSpec
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.view.figures import FIGURES, FREE_FIGURES
+from template_control.view.figures import FIGURES, FREE_FIGURES, SOLE_FIGURES
 from template_control.view.scenario_figures import ROUTE_FIGURES
 
 PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
@@ -90,7 +90,7 @@ def test_what_a_tick_is_given():
 
 def test_the_figures_and_their_options():
     told = first_names(table("replay.md", "file "))
-    assert set(told) == {*FIGURES, *FREE_FIGURES, *ROUTE_FIGURES}
+    assert set(told) == {*FIGURES, *FREE_FIGURES, *SOLE_FIGURES, *ROUTE_FIGURES}
     assert len(told) == len(set(told))
     known = {o for a in parser_of("plots")._actions for o in a.option_strings}
     rows = re.findall(r"`(--[\w-]+)", " ".join(row[0] for row in table("replay.md", "option ")))
