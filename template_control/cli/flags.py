@@ -178,6 +178,13 @@ OWN_URDF = (
         {"type": number(Range(-1.0, 1.0)), "nargs": 3, "metavar": ("X", "Y", "Z")},
     ),
     Flag(
+        "--flat-feet",
+        "robot.flat_feet",
+        "of a floating-base biped: it stands on soles, which its feet's collision shapes have;"
+        " joints that are in no leg are locked",
+        _ON,
+    ),
+    Flag(
         "--lossless",
         "robot.lossless",
         "leave out the damping and friction of the URDF's joints",

@@ -18,7 +18,6 @@ from template_control.robot.library import (
     load_robot,
 )
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.sole import Sole
 from template_control.robot.terms import LEGS
 
 
@@ -41,7 +40,6 @@ class RobotSpec(Checked):
         masses: of links by name, instead of the URDF's [kg]; their inertias grow alike.
         flat_feet: whether a free robot stands on soles, as its feet's collision shapes have them;
             joints that are in no leg are then locked.
-        sole: the left one, where it is not to be found in the URDF.
     """
 
     model: str = "five-link"
@@ -55,7 +53,6 @@ class RobotSpec(Checked):
     gravity: Positive | None = None
     masses: Mapping[str, Positive] = field(default_factory=dict)
     flat_feet: bool = False
-    sole: Sole | None = None
 
     @property
     def trots(self) -> bool:
@@ -65,7 +62,7 @@ class RobotSpec(Checked):
     @property
     def stands_flat(self) -> bool:
         """True if the robot stands on soles."""
-        return self.model in FLAT_FEET or self.flat_feet or self.sole is not None
+        return self.model in FLAT_FEET or self.flat_feet
 
     def load(self) -> Biped:
         """The robot.
@@ -94,7 +91,6 @@ class RobotSpec(Checked):
             "locked": self.locked,
             "lossless": self.lossless,
             "flat_feet": self.flat_feet,
-            "sole": self.sole,
         }
         given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
         if not given:
