@@ -78,6 +78,7 @@ def written_and_read(experiment, tmp_path):
         ("--foot-radius 0.02", "robot.foot_radius", 0.02),
         ("--foot-offset 0 0 -0.1", "robot.foot_offset", (0.0, 0.0, -0.1)),
         ("--lossless", "robot.lossless", True),
+        ("--flat-feet", "robot.flat_feet", True),
         ("--gravity 1.62", "robot.gravity", 1.62),
         ("--mass trunk=60", "robot.masses", {"trunk": 60.0}),
         ("--plant-gravity 9.7", "world.gravity", 9.7),
