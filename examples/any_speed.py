@@ -1,12 +1,15 @@
-"""Walk at a speed that changes at any time: random profiles, or one from a file.
+"""Move at a speed that changes at any time: random profiles, or one from a file.
 
     python examples/any_speed.py [--trials 4] [--first 0] [--duration 60] [--robot five-link]
+    python examples/any_speed.py --commands 3.0 [--trials 4] [--first 0] [--robot five-link]
     python examples/any_speed.py --ramp 0.3 [--stay 5]
     python examples/any_speed.py --profile FILE [--save run.npz]
     python examples/any_speed.py --speeds 8 [--robot rabbit] [--starts 3]
 
 A random profile goes at 0.1 to 0.5 m/s^2 from one speed to the next, all within 0.3 to 1.4 m/s for
-l0 = 1 m, and keeps each for 1 to 5 s. Its number is its seed. A ramp goes from 0.4 to 1.4 m/s with
+l0 = 1 m, and keeps each for 1 to 5 s. Its number is its seed. With --commands the robot stands,
+walks and runs: the speed jumps to one between 0 and this one every 3 to 8 s, to 0 in a quarter of
+the cases. A ramp goes from 0.4 to 1.4 m/s with
 this acceleration, stays, and goes back. FILE is TOML with two lists, times [s] and speeds [m/s].
 With --speeds the robot keeps so many speeds, spread evenly over its own range, for 50 steps each;
 with --starts also from so many starts off its gait.
@@ -23,8 +26,11 @@ from template_control.robustness import wilson_interval
 from template_control.run.experiment import perturbed_start
 from template_control.run.summary import summarise
 from template_control.slip import Scale, WalkingGait
+from template_control.slip.scenario.scenario import Gait
 
 _STEPS, _LAST = 50, 20  # of a run that keeps a speed, and those that it is judged by
+_JUMP = 1e-3  # duration of a jump of the speed [s]
+_ALL: tuple[Gait, ...] = ("stand", "walk", "run")
 
 
 def random_profile(seed: int, duration: float, unit: float) -> tc.SpeedProfile:
@@ -39,6 +45,17 @@ def random_profile(seed: int, duration: float, unit: float) -> tc.SpeedProfile:
     return tc.SpeedProfile(tuple(times), tuple(unit * v for v in speeds))
 
 
+def random_commands(seed: int, duration: float, fastest: float) -> tc.SpeedProfile:
+    """Speeds that jump, drawn with this seed; ``fastest`` [m/s]."""
+    rng = np.random.default_rng(seed)
+    times, speeds = [0.0], []
+    while times[-1] < duration:
+        speeds += 2 * [0.0 if rng.random() < 0.25 else rng.uniform(0.0, fastest)]
+        times += [times[-1] + rng.uniform(3.0, 8.0)] * 2
+        times[-1] += _JUMP
+    return tc.SpeedProfile(tuple(times[:-1]), tuple(speeds))
+
+
 def ramp(acceleration: float, stay: float, unit: float) -> tc.SpeedProfile:
     """0.4 to 1.4 m/s and back, ``stay`` seconds at either end."""
     rise = 1.0 / acceleration
@@ -46,10 +63,16 @@ def ramp(acceleration: float, stay: float, unit: float) -> tc.SpeedProfile:
     return tc.SpeedProfile(tuple(times), tuple(unit * v for v in (0.4, 0.4, 1.4, 1.4, 0.4, 0.4)))
 
 
-def walk(name: str, robot: str, profile: tc.SpeedProfile, duration: float) -> tc.Record:
-    """Walk a profile, and say how it went."""
+def follow(
+    name: str,
+    robot: str,
+    profile: tc.SpeedProfile,
+    duration: float,
+    gaits: tuple[Gait, ...] = ("walk",),
+) -> tc.Record:
+    """Follow a profile, and say how it went."""
     model = tc.load_robot(robot)
-    route = tc.SpeedRoute(tc.template_for(model), profile, duration)
+    route = tc.SpeedRoute(tc.template_for(model), profile, duration, gaits)
     record = tc.simulate(tc.Experiment(model, route, record_every=10))
     told, speed = summarise(record, None), record.section_state[:, 0]
     ended = f"FELL: {told['fall_reason']}" if record.fell else "no fall"
@@ -109,11 +132,12 @@ def row(record: tc.Record, gait: WalkingGait, speed: float, seed: int | None) ->
 
 
 def main() -> None:
-    """Walk what was asked for."""
-    parser = argparse.ArgumentParser(description="Walk at a speed that changes at any time.")
+    """Follow what was asked for."""
+    parser = argparse.ArgumentParser(description="Move at a speed that changes at any time.")
     parser.add_argument("--trials", type=int, default=4)
     parser.add_argument("--first", type=int, default=0, help="seed of the first trial")
     parser.add_argument("--duration", type=float, default=60.0, help="of a random profile [s]")
+    parser.add_argument("--commands", type=float, help="fastest of random commands [m/s]")
     parser.add_argument("--ramp", type=float, help="acceleration [m/s^2]")
     parser.add_argument("--stay", type=float, default=5.0, help="at the end of a ramp [s]")
     parser.add_argument("--profile", type=Path, help="TOML with times and speeds")
@@ -128,15 +152,18 @@ def main() -> None:
     elif chosen.profile is not None:
         data = tomllib.loads(chosen.profile.read_text(encoding="utf-8"))
         profile = tc.SpeedProfile(tuple(data["times"]), tuple(data["speeds"]))
-        record = walk(str(chosen.profile), chosen.robot, profile, profile.times[-1])
+        record = follow(str(chosen.profile), chosen.robot, profile, profile.times[-1])
     elif chosen.ramp is not None:
         profile = ramp(chosen.ramp, chosen.stay, unit)
-        record = walk(f"{chosen.ramp:g} m/s^2", chosen.robot, profile, profile.times[-1])
+        record = follow(f"{chosen.ramp:g} m/s^2", chosen.robot, profile, profile.times[-1])
     else:
         falls = 0
         for seed in range(chosen.first, chosen.first + chosen.trials):
-            profile = random_profile(seed, chosen.duration, unit)
-            record = walk(f"seed {seed}", chosen.robot, profile, chosen.duration)
+            if chosen.commands is None:
+                profile, gaits = random_profile(seed, chosen.duration, unit), _ALL[1:2]
+            else:
+                profile, gaits = random_commands(seed, chosen.duration, chosen.commands), _ALL
+            record = follow(f"seed {seed}", chosen.robot, profile, chosen.duration, gaits)
             falls += record.fell
         low, high = wilson_interval(chosen.trials - falls, chosen.trials)
         print(

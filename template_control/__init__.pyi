@@ -49,11 +49,11 @@ from .slip.gaits.walking_by_speed import gait_for_speed as gait_for_speed
 from .slip.maps.return_map import ReturnMap as ReturnMap
 from .slip.parameters import SlipParameters as SlipParameters
 from .slip.scenario.route import SpeedProfile as SpeedProfile
-from .slip.scenario.route import SpeedRoute as SpeedRoute
 from .slip.scenario.run import simulate_scenario as simulate_scenario
 from .slip.scenario.scenario import example_one as example_one
 from .slip.scenario.scenario import load_scenario as load_scenario
 from .slip.scenario.scenario_route import ScenarioRoute as ScenarioRoute
+from .slip.scenario.speed_route import SpeedRoute as SpeedRoute
 from .sweep.many import simulate_many as simulate_many
 from .version import __version__ as __version__
 from .view.figures import plot as plot

@@ -92,6 +92,8 @@ NotNegative = Annotated[float, Range(0.0)]
 Share = Annotated[float, Range(0.0, 1.0)]
 Speed = Annotated[float, Range(0.0, 20.0, above=True)]
 """Wanted of a walk or a run [m/s]; twice that of the fastest runner."""
+SpeedOrRest = Annotated[float, Range(0.0, 20.0)]
+"""Of a walk, a run or a stand [m/s]."""
 Angle = Annotated[float, Range(0.0, math.pi / 2.0, above=True, below=True)]
 Degrees = Annotated[float, Range(0.0, 90.0, above=True, below=True)]
 """Of a leg's angle to the ground, where a user types it."""

@@ -111,6 +111,16 @@ class RoutePlanners:
         goal = None if self.recovery is None else self.recovery.goal(section, z)
         return goal or self._goal(self.route.ahead, section, z, now)
 
+    def beyond(self, goal: StrideGoal, section: Section) -> StrideGoal:
+        """Goal of a stride from ``section`` after the route's end, which ``goal`` leads to.
+
+        That is the same stride again; after one from gait to gait, the stride that follows it.
+        """
+        begins = self.automaton.sections(self.automaton.starts[goal.stride])[0]
+        if section_of(begins) is section or goal.then is None:
+            return goal
+        return replace(goal, stride=goal.then, then=None)
+
     def _goal(
         self, method: Callable[[Section, Array, float], StrideGoal | None], *where: Any
     ) -> StrideGoal | None:
@@ -158,8 +168,8 @@ class RoutePlanners:
         if last is not None:
             asked(self.of(last.goal).observe, last.decision, z)
         wanted = self.next(section, z, now)
-        # The last stride goes on until the loop that drives the robot ends the run.
-        goal = wanted or (self.first_goal() if last is None else last.goal)
+        # Strides go on until the loop that drives the robot ends the run.
+        goal = wanted or (self.first_goal() if last is None else self.beyond(last.goal, section))
         planner = self.of(goal)
         if last is not None and last.goal.stride != goal.stride:
             asked(planner.forget)
@@ -287,7 +297,7 @@ class TemplateRollout:
             at += last.duration
             section = section_of(self.automaton.sections(start)[1])
             z = section.of(last.state)
-            then = self.planners.ahead(section, z, at) or goal
+            then = self.planners.ahead(section, z, at) or self.planners.beyond(goal, section)
             context = Context(z, then.target, cause=Cause.FUTURE)
             ahead = decided(self.planners.of(then).decide, context)
             whole = whole and ahead.lasting

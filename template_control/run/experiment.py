@@ -53,9 +53,10 @@ from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.gait import Gait, WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.slip.gaits.walking_by_speed import walking_gait
-from template_control.slip.scenario.route import Route, SpeedRoute
+from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.scenario import STAND_HEIGHT, Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
+from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.warm_up import ready
 
 STEPS = 50

@@ -34,7 +34,7 @@ from template_control.run.metadata import conditions
 from template_control.run.record import Record
 from template_control.run.recorder import RECORD, Recorder
 from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
-from template_control.run.velocity import VelocityProfile
+from template_control.run.velocity import VelocityCommand, VelocityProfile
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
@@ -232,7 +232,11 @@ class LiveRun:
         if not hand.velocities:
             return again
         x, y, z = self._o.start or supervisor.route.start.tolist()
-        profile = VelocityProfile(tuple(hand.velocities), foreseen=False)
+        motion = self._given.motion
+        assert isinstance(motion, VelocityProfile | VelocityCommand)
+        profile = VelocityProfile(
+            tuple(hand.velocities), foreseen=False, gaits=motion.gaits, changes=motion.changes
+        )
         return replace(again, motion=profile, start=(x, y, z))
 
     def _loop(self, senses: Senses) -> Generator[Tick, None, None]:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
-from template_control.checks.checked import Checked
+from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
-from template_control.checks.ranges import NotNegative, Positive, Speed
+from template_control.checks.ranges import NotNegative, Positive, SpeedOrRest
 from template_control.embedding.robot_template import template_for
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.options import HeadingCommand, SideSpeed, TurningRate
-from template_control.slip.scenario.route import SpeedRoute
+from template_control.slip.scenario.scenario import Gait
+from template_control.slip.scenario.speed_route import GaitChangeOptions, SpeedRoute
 
 Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
@@ -23,8 +24,8 @@ Velocity = tuple[float, float, float]
 class VelocityProfile(Checked):
     """Velocities by time, each kept until the next; of a planar robot all are forward.
 
-    The motion of an :class:`~template_control.run.Experiment`: the robot walks at any speed of its
-    family of gaits. Footholds and heading follow from one step to the next; the forward speed
+    The motion of an :class:`~template_control.run.Experiment`: the robot moves at any speed of its
+    gaits. Footholds and heading follow from one step to the next; the forward speed
     changes as fast as the planner finds steps.
 
     Attributes:
@@ -33,6 +34,9 @@ class VelocityProfile(Checked):
         duration: of the run [s]; None: the profile does not end the run.
         foreseen: whether a step is planned for the velocity that is wanted at its end. If not, the
             robot learns of a velocity when its time has come, as from a :class:`VelocityCommand`.
+        gaits: that the robot may have, of which the forward velocity chooses one as
+            :class:`~template_control.SpeedRoute` does.
+        changes: of the gait.
 
     Raises:
         ParameterError: if the first time is not 0, or the times do not rise.
@@ -40,9 +44,11 @@ class VelocityProfile(Checked):
 
     kind: ClassVar[str] = "velocity"
 
-    velocities: tuple[tuple[NotNegative, Speed, SideSpeed, TurningRate], ...]
+    velocities: tuple[tuple[NotNegative, SpeedOrRest, SideSpeed, TurningRate], ...]
     duration: Positive | None = None
     foreseen: bool = True
+    gaits: tuple[Gait, ...] = ("walk",)
+    changes: GaitChangeOptions = field(default_factory=GaitChangeOptions)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,15 +71,26 @@ class VelocityCommand:
     """A velocity that may be set at any time; of a planar robot it is forward.
 
     The motion of an :class:`~template_control.run.Experiment` without an end. What is set holds
-    from the next VLO on.
+    from the next section on.
 
     Args:
         forward: mean velocity ahead [m/s].
         left: to the left [m/s].
         turning: rate of the heading, to the left [rad/s].
+        gaits, changes: as of a :class:`VelocityProfile`.
     """
 
-    def __init__(self, forward: float, left: float = 0.0, turning: float = 0.0) -> None:
+    @checked
+    def __init__(
+        self,
+        forward: float,
+        left: float = 0.0,
+        turning: float = 0.0,
+        *,
+        gaits: tuple[Gait, ...] = ("walk",),
+        changes: GaitChangeOptions | None = None,
+    ) -> None:
+        self.gaits, self.changes = gaits, changes or GaitChangeOptions()
         self.set(forward, left, turning)
 
     def set(self, forward: float, left: float = 0.0, turning: float = 0.0) -> None:
@@ -88,7 +105,7 @@ class VelocityCommand:
             ParameterError: if one of them is out of its range; the velocity stays as it was.
         """
         self._velocity: Velocity = (
-            check("the commanded forward speed", forward, Speed, ParameterError),
+            check("the commanded forward speed", forward, SpeedOrRest, ParameterError),
             check("the commanded speed to the left", left, SideSpeed, ParameterError),
             check("the commanded turning rate", turning, TurningRate, ParameterError),
         )
@@ -126,4 +143,7 @@ def velocity_route(
             raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
         return speed
 
-    return velocity, SpeedRoute(template_for(robot), forward, getattr(motion, "duration", None))
+    duration = getattr(motion, "duration", None)
+    return velocity, SpeedRoute(
+        template_for(robot), forward, duration, motion.gaits, motion.changes
+    )

@@ -77,7 +77,6 @@ from .parameters import SlipParameters as SlipParameters
 from .scenario.route import Route as Route
 from .scenario.route import SpeedCommand as SpeedCommand
 from .scenario.route import SpeedProfile as SpeedProfile
-from .scenario.route import SpeedRoute as SpeedRoute
 from .scenario.route import SteadyRoute as SteadyRoute
 from .scenario.route import StrideGoal as StrideGoal
 from .scenario.run import ScenarioRecord as ScenarioRecord
@@ -87,4 +86,6 @@ from .scenario.scenario import Segment as Segment
 from .scenario.scenario import example_one as example_one
 from .scenario.scenario import load_scenario as load_scenario
 from .scenario.scenario_route import ScenarioRoute as ScenarioRoute
+from .scenario.speed_route import GaitChangeOptions as GaitChangeOptions
+from .scenario.speed_route import SpeedRoute as SpeedRoute
 from .similarity import Scale as Scale

@@ -28,9 +28,10 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
 from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.section import APEX, REST
-from template_control.slip.scenario.route import Route, SpeedRoute, SteadyRoute
-from template_control.slip.scenario.scenario import Scenario
+from template_control.slip.scenario.route import Route, SteadyRoute
+from template_control.slip.scenario.scenario import STAND, STAND_HEIGHT
 from template_control.slip.scenario.scenario_route import ScenarioRoute
+from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.slip.similarity import REFERENCE, Scale
 
 # A slow stride lasts 1.3 sqrt(l0 / g); a run that is behind its profile must be able to catch up.
@@ -41,13 +42,16 @@ _RECOVERY = StandingOptions(reach=1.06, slack=0.03)
 _GENTLE = 0.05  # of g: up to this acceleration moderate controls keep up
 
 
-def _keeping_up(scenario: Scenario) -> RunningOptions:
-    """Options with which a run keeps up with the accelerations of a scenario."""
-    p, options = scenario.parameters, RunningOptions()
-    runs = [abs(s.acceleration) for s in scenario.segments if s.gait == "run"]
+def _keeping_up(route: Route) -> RunningOptions:
+    """Options with which a run keeps up with the accelerations of a route."""
+    options, runs = RunningOptions(), []
+    if isinstance(route, ScenarioRoute):
+        runs = [abs(s.acceleration) for s in route.scenario.segments if s.gait == "run"]
+    elif isinstance(route, SpeedRoute) and "run" in route.gaits:
+        runs = [route.changes.acceleration]
     if not runs:
         return _CATCHING
-    fastest = max(runs) / p.gravity
+    fastest = max(runs) / route.parameters.gravity
     if fastest > _GENTLE:
         return AGILE
     # A change of speed over a stride, for the reference template as all options are.
@@ -59,7 +63,7 @@ def first_speed(route: Route) -> float:
     """dx/dt that the gait has with which a route begins, after a stand where it has one [m/s]."""
     if isinstance(route, ScenarioRoute):
         return route.scenario.walking_speed
-    return float(route.start[0])
+    return route.walking_speed if isinstance(route, SpeedRoute) else float(route.start[0])
 
 
 def _standing(route: Route, half_length: float) -> Planners:
@@ -68,7 +72,9 @@ def _standing(route: Route, half_length: float) -> Planners:
     ``half_length`` is of the template legs' feet [m].
     """
     p, family = route.parameters, None
-    if isinstance(route, ScenarioRoute) and route.scenario.stands:
+    if isinstance(route, SpeedRoute) and STAND in route.gaits:
+        height, family = STAND_HEIGHT / REFERENCE.rest_length * p.rest_length, gaits_by_speed(p)
+    elif isinstance(route, ScenarioRoute) and route.scenario.stands:
         height = route.scenario.stand_height
         family = gaits_by_speed(p) if route.pushes_off else None
     elif route.section == REST:
@@ -107,21 +113,26 @@ def default_planners(
 
     if route.section == APEX:
         return {StrideKind.RUN: RunningPlanner(runs(speed))}
-    scenario = route.scenario if isinstance(route, ScenarioRoute) else None
     standing = _standing(route, half_length)
-    if route.section == REST and scenario is None:
+    if route.section == REST and not isinstance(route, ScenarioRoute | SpeedRoute):
         return standing
-    if isinstance(route, SpeedRoute) or (isinstance(route, ScenarioRoute) and route.pushes_off):
-        ahead = walking or AheadPlanner(p, speed=speed)
-        return {ahead.gait.stride: ahead, **standing}
-    walk = walking or LqrPlanner(walking_gait(p, speed))
-    options = _CATCHING if scenario is None else _keeping_up(scenario)
+    any_speed = isinstance(route, SpeedRoute) or (
+        isinstance(route, ScenarioRoute) and route.pushes_off
+    )
+    if any_speed:
+        walk = walking or AheadPlanner(p, speed=speed)
+        if not (isinstance(route, SpeedRoute) and "run" in route.gaits):
+            return {walk.gait.stride: walk, **standing}
+    else:
+        walk = walking or LqrPlanner(walking_gait(p, speed))
 
     def walks(speed: float) -> Gait:
         # A walk that is kept is walked again after a run, whatever family it is of.
-        return walk.gait if isinstance(route, SteadyRoute) else walking_gait(p, speed)
+        if isinstance(route, SteadyRoute):
+            return walk.gait
+        return gaits_by_speed(p).gait(speed) if any_speed else walking_gait(p, speed)
 
-    run = RunningPlanner(runs(slowest), options)
+    run = RunningPlanner(runs(slowest), _keeping_up(route))
     return {
         walk.gait.stride: walk,
         StrideKind.WALK_TO_RUN: TransitionPlanner(StrideKind.WALK_TO_RUN, walk, runs, WALK_TO_RUN),

@@ -163,7 +163,10 @@ class CurvePlanner(Planner):
         u[Slot.K_SD] = over.stiffness
         first = timed_stride(AUTOMATON, node, found.pieces, toes)
         second = self._passes.arriving(first.node, liftoff[:, :2].T.ravel(), u, first.toes)
-        return replace(decision, controls=u, feasible=feet.fits(found)), chained(first, second)
+        speed = float(over.vlo[0])
+        accepted = None if speed == decision.predicted[0] else speed
+        chosen = replace(decision, controls=u, feasible=feet.fits(found), accepted=accepted)
+        return chosen, chained(first, second)
 
     def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
         """The decision for a step (None: there is none) to a state ``end`` (3,)."""

@@ -7,7 +7,8 @@ import template_control as tc
 from template_control.errors import ScenarioError
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.section import VLO
-from template_control.slip.scenario.route import SpeedCommand, SpeedProfile, SpeedRoute
+from template_control.slip.scenario.route import SpeedCommand, SpeedProfile
+from template_control.slip.scenario.speed_route import SpeedRoute
 
 P = tc.SlipParameters()
 
@@ -25,7 +26,7 @@ def test_a_profile_is_straight_between_its_times_and_level_beyond():
         ((), (), "0 times"),
         ((0.0, 1.0), (0.5,), "2 times and 1 speeds"),
         ((0.0, 0.0), (0.5, 0.6), "rising times"),
-        ((0.0,), (-0.5,), "above 0"),
+        ((0.0,), (-0.5,), "from 0 to 20"),
     ],
 )
 def test_a_profile_that_is_none_is_refused(times, speeds, told):
@@ -40,7 +41,7 @@ def test_a_command_holds_until_it_is_changed():
     assert route.next(VLO, route.start, 0.0).wanted_speed == 0.5
     command.speed = 0.9
     assert route.ahead(VLO, route.start, 0.8).wanted_speed == 0.9
-    with pytest.raises(ScenarioError, match="above 0"):
+    with pytest.raises(ScenarioError, match="from 0 to 20"):
         command.speed = -1.0
 
 

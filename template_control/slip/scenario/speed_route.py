@@ -1,0 +1,236 @@
+"""Route at a speed that a function of time gives: standing, walking and running."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.checks.checked import Checked, checked
+from template_control.checks.fitting import check
+from template_control.checks.ranges import NotNegative, Positive
+from template_control.errors import ScenarioError
+from template_control.slip.automaton.vocabulary import StrideKind
+from template_control.slip.gaits.running_gait import running_speeds, suited_height
+from template_control.slip.gaits.walking_by_speed import walking_by_speed
+from template_control.slip.maps.section import APEX, REST, VLO, Section
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import SpeedAtTime, StrideGoal
+from template_control.slip.scenario.scenario import STAND, STAND_HEIGHT, Gait
+from template_control.slip.similarity import ACCELERATION, REFERENCE, SPEED, Scale, scaled, tuned
+
+Array = NDArray[np.float64]
+
+_FIRST_DURATION = 2.2  # of sqrt(l0 / g): guess of a step's duration before one was made
+
+
+# Changes of the gait, for the reference template.
+_TAKE_OFF = 1.1  # dx/dt at the VLO where a run begins and ends [m/s]
+_NEAR = 0.1  # difference from it with which a run begins [m/s]
+_FIRST = 1.3  # dx/dt at the first apex of a run [m/s]: the slower, the less torque it needs
+_LAST = 1.4  # dx/dt at apex from which on a run may end [m/s]
+_LEAN = 3.5  # time of the trunk to lean forward before a run, and to rise after it [s]
+_STOP = 0.5  # dx/dt at VLO from which one step leads to rest [m/s]
+
+
+@dataclass(frozen=True)
+class GaitChangeOptions(Checked):
+    """Border of walk and run by speed, and the change of a run's speed.
+
+    Attributes:
+        run: mean speed from which a robot runs, and below which it walks [m/s].
+        hysteresis: width of the band about ``run`` in which it keeps its gait [m/s].
+        acceleration: of the speed that is wanted of a run, on its way to another [m/s^2].
+    """
+
+    run: Positive = tuned(1.4, SPEED)
+    hysteresis: NotNegative = tuned(0.1, SPEED)
+    acceleration: Positive = tuned(0.35, ACCELERATION)
+
+
+class _Way(NamedTuple):
+    """Progress on the route.
+
+    Attributes:
+        began: time of the last section [s].
+        took: duration of the last stride [s].
+        stride: kind of the one under way, "" before the first.
+        runs: it has begun to change to a run, or it runs.
+        since: time since which the trunk leans forward for a run, or rises after one [s].
+        reference: speed wanted of a run, on its way to the wanted one [m/s].
+    """
+
+    began: float
+    took: float
+    stride: str = ""
+    runs: bool = False
+    since: float = -np.inf
+    reference: float = 0.0
+
+
+class SpeedRoute:
+    """Moves at a speed that a function of time gives.
+
+    A step aims at the speed that is wanted when it will be over, and takes that of the family's
+    gait at VLO for it. Beyond the family's range the target is beyond its end too, by as much; the
+    planner takes the end.
+
+    With more gaits than the walk, the speed chooses the gait: below half of the slowest walk's the
+    robot stands, from ``changes.run`` on it runs. A change from a stand to a run, or back, leads
+    through a walk.
+
+    Args:
+        parameters: the template.
+        speed: a :class:`~.route.SpeedProfile`, a :class:`~.route.SpeedCommand`, or
+            any function of time.
+        duration: when the route ends [s]; None: it does not.
+        gaits: those that it may have; the walk always.
+        changes: of the gait, for the reference template.
+    """
+
+    @checked
+    def __init__(
+        self,
+        parameters: SlipParameters,
+        speed: SpeedAtTime,
+        duration: Positive | None = None,
+        gaits: Sequence[Gait] = ("walk",),
+        changes: GaitChangeOptions | None = None,
+    ) -> None:
+        self.parameters = parameters
+        self.gaits = frozenset((*gaits, "walk"))
+        scale = Scale.of(parameters)
+        self.changes = scaled(changes or GaitChangeOptions(), scale)
+        self._take_off, self._near, self._first, self._last, self._stop = (
+            speed * scale.speed for speed in (_TAKE_OFF, _NEAR, _FIRST, _LAST, _STOP)
+        )
+        self._lean = _LEAN * scale.time
+        self._fastest = running_speeds(parameters)[1]
+        self._speed, self._duration = speed, duration
+        self._family = walking_by_speed()
+        low, high = self._family.range(parameters)
+        self._range = low, high
+        first = self._wanted(0.0)
+        rest = STAND_HEIGHT / REFERENCE.rest_length * parameters.rest_length
+        self._rest: Array = np.array([0.0, rest, 0.0])
+        stands = self._gait(first, _Way(0.0, 0.0)) == STAND
+        self.section: Section = REST if stands else VLO
+        walk = self._family.gait_for(parameters, min(max(first, low), high))
+        self.start: Array = self._rest if stands else walk.vlo
+        self.walking_speed = float(walk.vlo[0])
+        self._guess = _FIRST_DURATION * float(np.sqrt(parameters.rest_length / parameters.gravity))
+        self.reset()
+
+    @property
+    def endless(self) -> bool:
+        """See :class:`~.route.Route`."""
+        return self._duration is None
+
+    def reset(self) -> None:
+        """See :class:`~.route.Route`."""
+        self._way = _Way(0.0, self._guess)
+
+    def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """See :meth:`~.route.Route.next`."""
+        if now > self._way.began:
+            self._way = self._way._replace(took=now - self._way.began)
+        self._way, goal = self._go(section, z, now)
+        return goal
+
+    def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
+        """See :meth:`~.route.Route.ahead`."""
+        return self._go(section, z, now)[1]
+
+    def _go(self, section: Section, z: Array, now: float) -> tuple[_Way, StrideGoal | None]:
+        if self._duration is not None and now >= self._duration:
+            return self._way, None
+        wanted = self._wanted(now + self._way.took)
+        way, speed = self._way, float(z[0])
+        if way.stride == StrideKind.RUN_TO_WALK:
+            way = way._replace(runs=False, since=now)
+        step = {REST: self._from_rest, VLO: self._from_vlo, APEX: self._from_apex}[section]
+        way, goal = step(way, speed, wanted, now)
+        return way._replace(began=now, stride=goal.stride), goal
+
+    def _gait(self, wanted: float, way: _Way) -> Gait:
+        """The gait of a mean speed [m/s]."""
+        border = self.changes.run + 0.5 * self.changes.hysteresis * (-1.0 if way.runs else 1.0)
+        if "run" in self.gaits and wanted >= border:
+            return "run"
+        return STAND if STAND in self.gaits and wanted < 0.5 * self._range[0] else "walk"
+
+    def _from_rest(
+        self, way: _Way, speed: float, wanted: float, now: float
+    ) -> tuple[_Way, StrideGoal]:
+        if way.stride == StrideKind.WALK_TO_STAND:  # its last step is a long one
+            return way, StrideGoal(StrideKind.STEP_FORWARD, self._rest, 0.0)
+        if self._gait(wanted, way) == STAND:
+            return way, StrideGoal(StrideKind.STAND, self._rest, 0.0)
+        goal = self._walk(min(wanted, self._take_off))
+        return way, replace(goal, stride=StrideKind.STAND_TO_WALK, then=goal.stride)
+
+    def _from_vlo(
+        self, way: _Way, speed: float, wanted: float, now: float
+    ) -> tuple[_Way, StrideGoal]:
+        gait = self._gait(wanted, way)
+        if gait == "run":
+            if not way.runs:
+                way = way._replace(runs=True, since=now)
+            if abs(speed - self._take_off) <= self._near and now - way.since >= self._lean:
+                way = way._replace(reference=self._first)
+                return way, self._run(StrideKind.WALK_TO_RUN, self._first)
+            height = self._family.vlo_for(self.parameters, self._take_off)[1]
+            target = np.array([self._take_off, height, 0.0])
+            then = StrideKind.WALK_TO_RUN
+            return way, StrideGoal(StrideKind.WALK_PUSH_OFF, target, self._take_off, then=then)
+        if way.runs:  # the run is not wanted any more
+            way = way._replace(runs=False, since=now)
+        if gait == STAND and speed <= self._stop and now - way.since >= self._lean:
+            return way, StrideGoal(StrideKind.WALK_TO_STAND, self._rest, 0.0)
+        return way, self._walk(wanted if gait == "walk" else self._range[0])
+
+    def _from_apex(
+        self, way: _Way, speed: float, wanted: float, now: float
+    ) -> tuple[_Way, StrideGoal]:
+        on = self._gait(wanted, way) == "run"
+        if not on and speed <= self._last:
+            height = self._family.vlo_for(self.parameters, self._take_off)[1]
+            target = np.array([self._take_off, height, 0.0])
+            then = StrideKind.WALK_PUSH_OFF
+            return way, StrideGoal(StrideKind.RUN_TO_WALK, target, self._take_off, then=then)
+        most = self.changes.acceleration * way.took
+        aim = min(
+            max(wanted if on else self._first, self._first), running_speeds(self.parameters)[1]
+        )
+        reference = min(max(aim, way.reference - most), way.reference + most)
+        goal = self._run(StrideKind.RUN, reference)
+        return way._replace(reference=reference), replace(
+            goal, then=None if on else StrideKind.RUN_TO_WALK
+        )
+
+    def _walk(self, wanted: float) -> StrideGoal:
+        """A walking step at a mean speed [m/s]."""
+        speed, height = self._family.vlo_for(self.parameters, wanted)
+        beyond = wanted - min(max(wanted, self._range[0]), self._range[1])
+        target = np.array([speed + beyond, height, 0.0])
+        return StrideGoal(StrideKind.WALK_PUSH_OFF, target, wanted)
+
+    def _run(self, stride: str, speed: float) -> StrideGoal:
+        """A stride to an apex with a speed [m/s]."""
+        p = self.parameters
+        height = suited_height(speed / p.speed_unit) * p.rest_length
+        return StrideGoal(stride, np.array([speed, height]), speed, then=StrideKind.RUN)
+
+    def _wanted(self, time: float) -> float:
+        """The wanted mean speed [m/s].
+
+        Raises:
+            ScenarioError: if the function does not say one.
+        """
+        found = check(
+            f"the wanted speed at {time:g} s", self._speed(time), NotNegative, ScenarioError
+        )
+        return float(found)
