@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, SpeedOrRest
-from template_control.embedding.robot_template import template_for
+from template_control.embedding.robot_template import template_for, walking_speeds
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.options import HeadingCommand, SideSpeed, TurningRate
 from template_control.slip.scenario.scenario import Gait
 from template_control.slip.scenario.speed_route import GaitChangeOptions, SpeedRoute
+from template_control.slip.similarity import Scale
+
+_FASTEST_WALK = 0.38
+"""Mean speed over sqrt(g l0) above which a floating base that can run no longer walks: it has the
+room to turn and to step to the left there."""
 
 Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
@@ -143,7 +148,10 @@ def velocity_route(
             raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
         return speed
 
+    template, changes = template_for(robot), motion.changes
+    if "run" in motion.gaits:
+        fastest = walking_speeds(robot)[1] if planar else _FASTEST_WALK * template.speed_unit
+        unit = Scale.of(template).speed
+        changes = replace(changes, run=min(changes.run, fastest / unit))
     duration = getattr(motion, "duration", None)
-    return velocity, SpeedRoute(
-        template_for(robot), forward, duration, motion.gaits, motion.changes
-    )
+    return velocity, SpeedRoute(template, forward, duration, motion.gaits, changes)

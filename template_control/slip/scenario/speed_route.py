@@ -28,6 +28,7 @@ _FIRST_DURATION = 2.2  # of sqrt(l0 / g): guess of a step's duration before one 
 
 
 # Changes of the gait, for the reference template.
+_SLOWEST = 0.3  # mean speed of the slowest walk that robots keep [m/s]; a slower one stands
 _TAKE_OFF = 1.1  # dx/dt at the VLO where a run begins and ends [m/s]
 _NEAR = 0.1  # difference from it with which a run begins [m/s]
 _FIRST = 1.3  # dx/dt at the first apex of a run [m/s]: the slower, the less torque it needs
@@ -78,8 +79,8 @@ class SpeedRoute:
     gait at VLO for it. Beyond the family's range the target is beyond its end too, by as much; the
     planner takes the end.
 
-    With more gaits than the walk, the speed chooses the gait: below half of the slowest walk's the
-    robot stands, from ``changes.run`` on it runs. A change from a stand to a run, or back, leads
+    With more gaits than the walk, the speed chooses the gait: below 0.3 m/s (for l0 = 1 m) the robot
+    stands, from ``changes.run`` on it runs. A change from a stand to a run, or back, leads
     through a walk.
 
     Args:
@@ -104,8 +105,8 @@ class SpeedRoute:
         self.gaits = frozenset((*gaits, "walk"))
         scale = Scale.of(parameters)
         self.changes = scaled(changes or GaitChangeOptions(), scale)
-        self._take_off, self._near, self._first, self._last, self._stop = (
-            speed * scale.speed for speed in (_TAKE_OFF, _NEAR, _FIRST, _LAST, _STOP)
+        self._slowest, self._take_off, self._near, self._first, self._last, self._stop = (
+            speed * scale.speed for speed in (_SLOWEST, _TAKE_OFF, _NEAR, _FIRST, _LAST, _STOP)
         )
         self._lean = _LEAN * scale.time
         self._fastest = running_speeds(parameters)[1]
@@ -116,10 +117,13 @@ class SpeedRoute:
         first = self._wanted(0.0)
         rest = STAND_HEIGHT / REFERENCE.rest_length * parameters.rest_length
         self._rest: Array = np.array([0.0, rest, 0.0])
-        stands = self._gait(first, _Way(0.0, 0.0)) == STAND
-        self.section: Section = REST if stands else VLO
-        walk = self._family.gait_for(parameters, min(max(first, low), high))
-        self.start: Array = self._rest if stands else walk.vlo
+        gait = self._gait(first, _Way(0.0, 0.0))
+        self.section: Section = REST if gait == STAND else VLO
+        if gait == "run":
+            walk = self._family.chains[-1].gait(parameters, self._take_off)
+        else:
+            walk = self._family.gait_for(parameters, min(max(first, low), high))
+        self.start: Array = self._rest if gait == STAND else walk.vlo
         self.walking_speed = float(walk.vlo[0])
         self._guess = _FIRST_DURATION * float(np.sqrt(parameters.rest_length / parameters.gravity))
         self.reset()
@@ -160,7 +164,7 @@ class SpeedRoute:
         border = self.changes.run + 0.5 * self.changes.hysteresis * (-1.0 if way.runs else 1.0)
         if "run" in self.gaits and wanted >= border:
             return "run"
-        return STAND if STAND in self.gaits and wanted < 0.5 * self._range[0] else "walk"
+        return STAND if STAND in self.gaits and wanted < self._slowest else "walk"
 
     def _from_rest(
         self, way: _Way, speed: float, wanted: float, now: float
@@ -188,7 +192,8 @@ class SpeedRoute:
             return way, StrideGoal(StrideKind.WALK_PUSH_OFF, target, self._take_off, then=then)
         if way.runs:  # the run is not wanted any more
             way = way._replace(runs=False, since=now)
-        if gait == STAND and speed <= self._stop and now - way.since >= self._lean:
+        walks = way.stride == StrideKind.WALK_PUSH_OFF  # its swing foot is on its way to a foothold
+        if gait == STAND and walks and speed <= self._stop and now - way.since >= self._lean:
             return way, StrideGoal(StrideKind.WALK_TO_STAND, self._rest, 0.0)
         return way, self._walk(wanted if gait == "walk" else self._range[0])
 
