@@ -148,6 +148,10 @@ def velocity_route(
             raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
         return speed
 
+    if "stand" in motion.gaits and not (planar or robot.half_length):
+        raise ParameterError(
+            f"{robot.name} cannot stand on two feet that are points: leave stand out of its gaits"
+        )
     template, changes = template_for(robot), motion.changes
     if "run" in motion.gaits:
         fastest = walking_speeds(robot)[1] if planar else _FASTEST_WALK * template.speed_unit

@@ -32,6 +32,12 @@ def test_a_floating_base_walks_runs_and_walks_again():
     assert record.section_state[-1, 0] == pytest.approx(0.54, rel=0.05)
 
 
+def test_a_robot_on_two_points_does_not_stand():
+    motion = VelocityProfile(((0.0, 0.6, 0.0, 0.0),), duration=1.0, gaits=("stand", "walk"))
+    with pytest.raises(tc.TemplateControlError, match="leave stand out of its gaits"):
+        tc.simulate(tc.Experiment(tc.load_floating_robot("bolt"), motion))
+
+
 def test_what_a_planar_robot_cannot_do_is_refused():
     motion = VelocityProfile(((0.0, 0.6, 0.1, 0.0),), duration=1.0)
     with pytest.raises(tc.TemplateControlError, match="no velocity to the left"):

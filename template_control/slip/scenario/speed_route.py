@@ -79,8 +79,8 @@ class SpeedRoute:
     gait at VLO for it. Beyond the family's range the target is beyond its end too, by as much; the
     planner takes the end.
 
-    With more gaits than the walk, the speed chooses the gait: below 0.3 m/s (for l0 = 1 m) the robot
-    stands, from ``changes.run`` on it runs. A change from a stand to a run, or back, leads
+    With more gaits than the walk, the speed chooses the gait: below 0.3 m/s (for l0 = 1 m) the
+    robot stands, from ``changes.run`` on it runs. A change from a stand to a run, or back, leads
     through a walk.
 
     Args:

@@ -147,6 +147,8 @@ def base_for(path):
     yield tc.Experiment()
     for keys in KINDS.get(table, {}).values():
         yield tc.Experiment().with_(keys)
+    if table == "motion":
+        yield tc.Experiment(motion=tc.run.VelocityProfile(((0.0, 1.0, 0.0, 0.0),), duration=5.0))
     for name in ("lqr", "ahead", "modified", "deadbeat", "mujoco", "ideal", "imu"):
         try:
             yield tc.Experiment().with_({f"{table}.kind": name})
@@ -178,6 +180,7 @@ def another(hint, default):
 OTHERWISE = {
     "robot.model": "human", "robot.locked": {"a": 0.1}, "robot.feet": ["a", "b"],
     "motion.kind": "gait", "motion.segments": [{"gait": "walk", "speed": 1.0, "steps": 3}],
+    "motion.velocities": [[0.0, 0.5, 0.0, 0.0]], "motion.gaits": ["stand", "walk"],
     "motion.speed": 1.0, "motion.touchdown_angle": 66.0, "motion.start": [1.0, 0.97, 0.0],
     "motion.to_stand": True, "controller.kind": "planar", "pushes": [{"impulse": 5.0, "step": 2}],
     "world.kind": "mujoco", "sensors.kind": "imu", "planner.kind": "ahead", "delay": 0.003,
@@ -193,8 +196,7 @@ POSE = {
     "pose.feet": [[0.0, 0.0], [0.1, 0.1]], "pose.feet_velocity": [[0.0, 0.0], [2.0, 0.0]],
 }  # fmt: skip
 NEEDS_MORE = (
-    "world.ground_step.", "world.terrain.friction", "planner.path", "motion.velocities",
-    "motion.duration", "motion.foreseen",
+    "world.ground_step.", "world.terrain.friction", "planner.path",
 )  # fmt: skip
 """Keys of tables that have other keys which must be given with them."""
 

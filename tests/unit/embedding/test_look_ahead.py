@@ -44,7 +44,8 @@ from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap, new_workspace
-from template_control.slip.scenario.route import SpeedProfile, SpeedRoute
+from template_control.slip.scenario.route import SpeedProfile
+from template_control.slip.scenario.speed_route import SpeedRoute
 
 P = tc.SlipParameters()
 OPTIONS = AheadOptions()
