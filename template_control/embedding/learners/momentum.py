@@ -83,6 +83,7 @@ class LoadEstimate:
     def __init__(self, gravity: float, data: Any = None) -> None:
         self.data = np.zeros(1, LOAD) if data is None else data
         self.factor = 1.0
+        self._before = 0.0  # mean feedback of the stride before, over g
         self._gravity = gravity
 
     def observe(self, feedback: float, dt: float) -> None:
@@ -95,12 +96,15 @@ class LoadEstimate:
     def end_stride(self, nominal: bool) -> None:
         """Learn from the stride that has just ended.
 
-        One that is not near the gait, such as a stride with a push, teaches nothing; the estimate
-        then leaks.
+        One that is not near the gait, such as a stride with a push, teaches what the stride before
+        it has shown too; where that is nothing, the estimate leaks.
         """
         if self._time == 0.0:
             return
-        mean = self._sum / self._time / self._gravity if nominal else 0.0
+        mean = self._sum / self._time / self._gravity
+        before, self._before = self._before, mean
+        if not nominal:
+            mean = float(np.copysign(min(abs(mean), abs(before)), mean)) * (mean * before > 0.0)
         change = min(_LOAD_GAIN * max(abs(mean) - _LOAD_DEAD_ZONE, 0.0), _LOAD_STEP)
         factor = self.factor + (change if mean > 0.0 else -change)
         if change == 0.0:
