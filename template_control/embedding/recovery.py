@@ -41,8 +41,9 @@ class Exit(NamedTuple):
 
 _BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
 _BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
-_BETWEEN_FEET = ("DS_ar^s", "DS_br^ws", "DS_br^sf")
-_CURVED = (*_BETWEEN_FEET, "DS_bl^ww")
+TO_REST = ("DS_ar^s", "DS_br^ws", "DS_br^sf")
+"""Nodes in which a curve carries the CoM to rest over both feet."""
+_CURVED = (*TO_REST, "DS_bl^ww")
 _STEPS = (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK)
 
 EXITS: tuple[Exit, ...] = (
@@ -51,7 +52,7 @@ EXITS: tuple[Exit, ...] = (
     *(Exit(node, StrideKind.WALK_TO_STAND, "DS_br^ws") for node in _BOTH_STAND),
     Exit("DS_bl^ww", StrideKind.WALK_TO_STAND, "DS_br^ws"),
     *(Exit(node, StrideKind.STEP_BACK, "SS_bt^sb") for node in _BEFORE_VLO),
-    *(Exit(node, step, AUTOMATON.starts[step]) for node in _BETWEEN_FEET for step in _STEPS),
+    *(Exit(node, step, AUTOMATON.starts[step]) for node in TO_REST for step in _STEPS),
 )
 """All of them. A fast walk runs. The springs of a slow one would throw it back: a curve in time
 carries the CoM while both feet stand, on or to rest; the foot that is up is set down behind again.

@@ -24,7 +24,7 @@ from template_control.embedding.planners.planner import (
     rest_decided,
 )
 from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
-from template_control.embedding.recovery import Recovery, entry, ways_to_rest
+from template_control.embedding.recovery import TO_REST, Recovery, entry, ways_to_rest
 from template_control.embedding.rollout import TemplateRollout
 from template_control.embedding.state import TemplateState
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -420,7 +420,9 @@ def curve_or_step(
     planners = rollout.planners
     node, planner = s.node.name, planners.of(s.goal)
     decision, stride = rollout.curve(node, s.sensed, state, planner, s.decision)
-    for way in () if decision.feasible else ways_to_rest(node):
+    # A curve to a liftoff that is not quite feasible leads there all the same, if it is lasting.
+    leads = decision.feasible or (decision.lasting and node not in TO_REST)
+    for way in () if leads else ways_to_rest(node):
         other = planners.planners.get(way.stride)
         if other is None:
             continue

@@ -57,7 +57,9 @@ BEAT = 0.5
 step from a stand ends this long after its curve, when the robot has come to rest too."""
 _STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
 _SOON = 1e-3  # [s]
-_LAUNCH = 0.05  # excess with which a step is still made, over l0; without it the robot would fall
+# Excess of a curve to a liftoff that is still followed, over l0: the QP keeps the centre of
+# pressure inside. Without a step the robot would fall.
+_LAUNCH = 0.05
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,7 @@ class CurvePlanner(Planner):
         self._lands, self._rests = begin is not Event.REST, end is Event.REST
         self._passes, self._walk = passes, walk
         self._beat = BEAT * passes.scale.time
+        self._launch = _LAUNCH * passes.parameters.rest_length
         stand = StandingGait.of(passes.parameters, passes.options)
         self.gait: Gait = stand if walk is None else walk.gait
 
@@ -165,8 +168,9 @@ class CurvePlanner(Planner):
         second = self._passes.arriving(first.node, liftoff[:, :2].T.ravel(), u, first.toes)
         speed = float(over.vlo[0])
         accepted = None if speed == decision.predicted[0] else speed
-        chosen = replace(decision, controls=u, feasible=feet.fits(found), accepted=accepted)
-        return chosen, chained(first, second)
+        leads = found.excess <= self._launch
+        chosen = replace(decision, controls=u, feasible=feet.fits(found), lasting=leads)
+        return replace(chosen, accepted=accepted), chained(first, second)
 
     def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
         """The decision for a step (None: there is none) to a state ``end`` (3,)."""

@@ -159,6 +159,19 @@ def test_load_learns_a_constant_and_ignores_the_gait():
     assert load.factor == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_load_is_learnt_from_strides_off_the_gait_that_agree():
+    """A push is over by the next stride; a load that leads the robot off its gait is not."""
+    load = LoadEstimate(9.81)
+    for feedback in (-1.5, 1.2, -0.9):
+        load.observe(feedback, 0.5)
+        load.end_stride(False)
+    assert load.factor == 1.0
+    for _ in range(12):
+        load.observe(9.81 * (0.9 - load.factor), 0.5)
+        load.end_stride(False)
+    assert 0.88 < load.factor < 0.93
+
+
 def test_start_is_where_it_was_asked_for(robot, gait):
     swing, velocity = np.array([0.0, 0.05]), np.array([2.0, 0.0])
     q, v = state_at_vlo(robot, gait.vlo, 0, swing, velocity)
