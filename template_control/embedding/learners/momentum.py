@@ -32,6 +32,8 @@ _LOAD_DEAD_ZONE = 0.02
 # Share of the estimate forgotten in a step that teaches nothing; what a disturbance taught must not
 # stay.
 _LOAD_LEAK = 0.1
+# Strides off the gait whose feedback has to agree: two of a run with its motors at their limits do.
+_AGREE = 3
 _LOAD_STEP = 0.05  # largest change of the factor in one step; a push is no load
 LOAD_BOUNDS = (0.7, 1.4)
 """Of the load factor."""
@@ -83,7 +85,7 @@ class LoadEstimate:
     def __init__(self, gravity: float, data: Any = None) -> None:
         self.data = np.zeros(1, LOAD) if data is None else data
         self.factor = 1.0
-        self._before = 0.0  # mean feedback of the stride before, over g
+        self._last = (0.0,) * _AGREE  # mean feedback of the last strides, over g
         self._gravity = gravity
 
     def observe(self, feedback: float, dt: float) -> None:
@@ -96,15 +98,16 @@ class LoadEstimate:
     def end_stride(self, nominal: bool) -> None:
         """Learn from the stride that has just ended.
 
-        One that is not near the gait, such as a stride with a push, teaches what the stride before
-        it has shown too; where that is nothing, the estimate leaks.
+        One that is not near the gait, such as a stride with a push, teaches what both strides
+        before it have shown too; where that is nothing, the estimate leaks.
         """
         if self._time == 0.0:
             return
         mean = self._sum / self._time / self._gravity
-        before, self._before = self._before, mean
+        self._last = (*self._last[1:], mean)
         if not nominal:
-            mean = float(np.copysign(min(abs(mean), abs(before)), mean)) * (mean * before > 0.0)
+            agree = all(other * mean > 0.0 for other in self._last)
+            mean = min(self._last, key=abs) if agree else 0.0
         change = min(_LOAD_GAIN * max(abs(mean) - _LOAD_DEAD_ZONE, 0.0), _LOAD_STEP)
         factor = self.factor + (change if mean > 0.0 else -change)
         if change == 0.0:
