@@ -182,6 +182,8 @@ def _deeper(hint: Any, current: Any, entries: _Entries, where: str) -> Any:
 def _read(hint: Any, value: Any, where: str) -> Any:
     """A value of the type ``hint`` from what TOML holds."""
     hint = unaliased(hint)
+    if hint is Any:
+        return value
     origin, arguments = get_origin(hint), get_args(hint)
     if origin in (Union, UnionType):
         return _read_one_of([a for a in arguments if a is not NoneType], value, where)

@@ -49,6 +49,7 @@ _COMMANDS = {
         "cli.campaign",
         "disturb a robot by everything at once, many times, and tell how sure its gait is",
     ),
+    "study": ("cli.study", "run an experiment over a grid or a sample of some of its keys"),
     "slip": ("cli.slip", "simulate the SLIP template through a scenario of gaits and speeds"),
     "gaits": ("cli.gaits", "follow a branch of periodic gaits and tell its stability"),
     "automaton": (

@@ -1,3 +1,4 @@
+from .environment import WalkEnv as WalkEnv
 from .experiment import Experiment as Experiment
 from .experiment import PreparedExperiment as PreparedExperiment
 from .experiment import perturbed_start as perturbed_start
@@ -22,3 +23,4 @@ from .summary import summarise as summarise
 from .tables import columns as columns
 from .velocity import VelocityCommand as VelocityCommand
 from .velocity import VelocityProfile as VelocityProfile
+from .velocity import VelocityRange as VelocityRange

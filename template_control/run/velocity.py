@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
+import numpy as np
+
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, SpeedOrRest
-from template_control.embedding.robot_template import template_for, walking_speeds
-from template_control.errors import ParameterError
+from template_control.embedding.robot_template import default_gait, template_for, walking_speeds
+from template_control.errors import GaitError, ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.options import HeadingCommand, SideSpeed, TurningRate
+from template_control.slip.gaits.walking_by_speed import family_speeds
 from template_control.slip.scenario.scenario import Gait
 from template_control.slip.scenario.speed_route import GaitChangeOptions, SpeedRoute
 from template_control.slip.similarity import Scale
@@ -23,6 +26,11 @@ room to turn and to step to the left there."""
 
 Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
+
+
+# Bolt and five-link-3d kept them, and changes between them, for 40 s.
+_LEFT = 0.03  # of sqrt(g l0)
+_TURNING = 0.1  # of sqrt(g / l0)
 
 
 @dataclass(frozen=True)
@@ -120,6 +128,59 @@ class VelocityCommand:
         return self._velocity
 
 
+def can_stand(robot: Biped) -> bool:
+    """True if a robot can stand: in its plane, or on feet that are no points.
+
+    Args:
+        robot: of either kind.
+    """
+    return not isinstance(robot, FloatingBaseBiped) or bool(robot.half_length)
+
+
+@dataclass(frozen=True)
+class VelocityRange:
+    """Velocities that a robot can be commanded.
+
+    Attributes:
+        speeds: slowest and fastest mean speed forward [m/s].
+        first: speed of its own walk, or the nearest in this range [m/s].
+        left: largest speed to the left and to the right [m/s]; 0 of a planar robot.
+        turning: largest rate of the heading to both sides [rad/s]; 0 of a planar robot.
+        stands: whether it can stand, at the speed 0.
+    """
+
+    speeds: tuple[float, float]
+    first: float
+    left: float = 0.0
+    turning: float = 0.0
+    stands: bool = True
+
+    @classmethod
+    def of(cls, robot: Biped) -> VelocityRange:
+        """The velocities of a robot, to a centimetre per second.
+
+        Args:
+            robot: its last update is overwritten.
+        """
+        p = template_for(robot)
+        try:
+            low, high = walking_speeds(robot)
+        except GaitError:
+            low, high = family_speeds(p)
+        speeds = float(np.ceil(100.0 * low)) / 100.0, float(np.floor(100.0 * high)) / 100.0
+        first = min(max(round(default_gait(robot).mean_speed, 2), speeds[0]), speeds[1])
+        if not isinstance(robot, FloatingBaseBiped):
+            return cls(speeds, first)
+        unit = p.speed_unit
+        left, turning = round(_LEFT * unit, 2), round(_TURNING * p.gravity / unit, 2)
+        return cls(speeds, first, left, turning, stands=can_stand(robot))
+
+    @property
+    def gaits(self) -> tuple[Gait, ...]:
+        """Gaits of a command in this range."""
+        return ("stand", "walk") if self.stands else ("walk",)
+
+
 def velocity_route(
     robot: Biped, motion: VelocityProfile | VelocityCommand, course: HeadingCommand
 ) -> tuple[VelocityProfile | VelocityCommand, SpeedRoute]:
@@ -148,7 +209,7 @@ def velocity_route(
             raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
         return speed
 
-    if "stand" in motion.gaits and not (planar or robot.half_length):
+    if "stand" in motion.gaits and not can_stand(robot):
         raise ParameterError(
             f"{robot.name} cannot stand on two feet that are points: leave stand out of its gaits"
         )

@@ -1,5 +1,8 @@
 from .executor import workers as workers
 from .many import simulate_many as simulate_many
+from .study import Study as Study
+from .study import heat_map as heat_map
+from .study import run_study as run_study
 from .sweep import SweepOptions as SweepOptions
 from .sweep import SweepResult as SweepResult
 from .sweep import grid as grid

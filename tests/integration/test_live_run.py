@@ -58,6 +58,21 @@ def test_what_is_done_by_hand_is_repeated_to_the_last_bit(plant, tmp_path):
     repeats(record, again, tmp_path)
 
 
+@pytest.mark.slow(seconds=2)
+def test_a_robot_stands_and_walks_again(tmp_path):
+    command = tc.run.VelocityCommand(0.8, gaits=("stand", "walk"))
+    deeds = {
+        500: lambda hand: hand.set_velocity(0.0),
+        8000: lambda hand: hand.set_velocity(0.6),
+    }
+    record, again, _ = by_hand(tc.Experiment("five-link", command), deeds, ticks=10500)
+    assert not record.fell
+    stands = (record.time > 7.0) & (record.time < 8.0)
+    assert np.abs(record.com_velocity[stands, 0]).max() < 0.02
+    assert record.com_velocity[-1000:, 0].mean() > 0.3
+    repeats(record, again, tmp_path)
+
+
 @pytest.mark.slow(seconds=4)
 def test_a_floating_base_is_driven_too(tmp_path):
     robot = RobotSpec("five-link-3d", free=True)

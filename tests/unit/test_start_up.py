@@ -16,8 +16,8 @@ HEAVY = (
     "rich", "scipy",
 )  # fmt: skip
 COMMANDS = (
-    "walk", "run", "go", "drive", "robots", "replay", "plots", "robustness", "campaign", "slip",
-    "gaits", "automaton", "keys", "reproduce",
+    "walk", "run", "go", "drive", "robots", "replay", "plots", "robustness", "campaign", "study",
+    "slip", "gaits", "automaton", "keys", "reproduce",
 )  # fmt: skip
 ROOMS = (
     "slip", "robot", "whole_body", "estimation", "embedding", "plant", "run", "robustness",

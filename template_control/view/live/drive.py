@@ -22,11 +22,11 @@ from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment
 from template_control.run.live import LiveRun, Tick
 from template_control.run.record import Record
-from template_control.run.velocity import VelocityCommand
+from template_control.run.velocity import VelocityCommand, VelocityRange
 from template_control.view.browser import PORTS, show_in_browser
 from template_control.view.live.figures import Figures, Step
 from template_control.view.live.pace import Pace
-from template_control.view.live.page import Controls, Deeds, Plots, Ranges
+from template_control.view.live.page import Controls, Deeds, Plots, first_push
 from template_control.view.live.scene import LiveScene
 from template_control.view.live.server import PageServer
 from template_control.view.replay.playback import FRAME_RATES
@@ -155,13 +155,15 @@ class Drive:
         """Load the robot, put up the controls, and begin the run."""
         e, gui = self._experiment, self._server.gui
         assert isinstance(self._robot, Biped)
-        self._ranges = Ranges.of(self._robot)
+        self._ranges = VelocityRange.of(self._robot)
         self._restart()
         record = self._going.record()
         self._scene = LiveScene(self._server.scene, record, ground_of(e))
         self._scene.look(self._server.initial_camera)
         self._figures = Figures(record)
-        self._controls = Controls(gui, self._ranges, self._deeds(), self._going.hand.friction)
+        run = self._going
+        impulse = first_push(run.controller.parameters)
+        self._controls = Controls(gui, self._ranges, impulse, self._deeds(), run.hand.friction)
         with gui.add_folder("Plots"):
             self._plots = Plots(gui, self._ranges.speeds[1])
         self.pace.restart()
@@ -219,7 +221,7 @@ class Drive:
         """Begin a run at the first speed; the world is the experiment's."""
         if self.run is not None:
             self.run.close()
-        command = VelocityCommand(self._ranges.first)
+        command = VelocityCommand(self._ranges.first, gaits=self._ranges.gaits)
         run = LiveRun(replace(self._experiment, motion=command), keep=KEPT)
         self.tick = next(run)
         self._push, self._pushed = (0.0, 0.0), -np.inf

@@ -11,17 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.robot_template import default_gait, template_for, walking_speeds
-from template_control.errors import GaitError
-from template_control.robot.biped import Biped
-from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.slip.gaits.walking_by_speed import family_speeds
+from template_control.run.velocity import VelocityRange
+from template_control.slip.parameters import SlipParameters
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
 
 Array = NDArray[np.float64]
 
-_SIDEWAYS = 0.03  # of sqrt(g l0), largest speed to the left: five-link-3d and Bolt kept it
-_TURNING = 0.1  # of sqrt(g / l0), largest rate of the heading
 _PUSH = 0.04  # of m sqrt(g l0), size of a push at first: 10 N s for five-link
 _FRICTIONS = (0.05, 1.2)
 _STEP = 0.05  # of the speed by a key [m/s, of the reference template's sqrt(g l0)]
@@ -29,43 +24,10 @@ _WINDOW = 8.0  # [s] of the plots
 _HEIGHT = 130  # of a plot [px]
 
 
-@dataclass(frozen=True)
-class Ranges:
-    """What a robot may be asked for on the page.
-
-    Attributes:
-        speeds: slowest and fastest [m/s].
-        first: speed that it starts with [m/s].
-        left: largest speed to the left [m/s]; 0 of a planar robot.
-        turning: largest rate of the heading [rad/s]; 0 of a planar robot.
-        push: impulse of a push at first [N s].
-    """
-
-    speeds: tuple[float, float]
-    first: float
-    left: float
-    turning: float
-    push: float
-
-    @classmethod
-    def of(cls, robot: Biped) -> Ranges:
-        """Those of a robot, whose last update is overwritten."""
-        p = template_for(robot)
-        try:
-            low, high = walking_speeds(robot)
-        except GaitError:
-            low, high = family_speeds(p)
-        free, unit = isinstance(robot, FloatingBaseBiped), p.speed_unit
-        gait = default_gait(robot)
-        push = _PUSH * p.mass * unit
-        digits = 1 - int(np.floor(np.log10(push)))
-        return cls(
-            speeds=(float(np.ceil(100.0 * low)) / 100.0, float(np.floor(100.0 * high)) / 100.0),
-            first=round(min(max(gait.mean_speed, low), high), 2),
-            left=round(_SIDEWAYS * unit, 2) if free else 0.0,
-            turning=round(_TURNING * p.gravity / unit, 2) if free else 0.0,
-            push=round(push, digits),
-        )
+def first_push(p: SlipParameters) -> float:
+    """Impulse of a push at first, to two digits, for a robot of this template [N s]."""
+    push = _PUSH * p.mass * p.speed_unit
+    return round(push, 1 - int(np.floor(np.log10(push))))
 
 
 @dataclass(frozen=True)
@@ -99,14 +61,22 @@ class Controls:
 
     Args:
         gui: viser's, of a server.
-        ranges: of the robot.
+        ranges: of the robot's velocity.
+        impulse: of a push at first [N s].
         deeds: what they do.
         friction: of the ground at first; None: it cannot be changed.
     """
 
-    def __init__(self, gui: Any, ranges: Ranges, deeds: Deeds, friction: float | None) -> None:
+    def __init__(
+        self,
+        gui: Any,
+        ranges: VelocityRange,
+        impulse: float,
+        deeds: Deeds,
+        friction: float | None,
+    ) -> None:
         self._gui, self._ranges, self._deeds = gui, ranges, deeds
-        self._friction = friction
+        self._first_push, self._friction = impulse, friction
         self.status = gui.add_markdown("")
         with gui.add_folder("Walk"):
             self._add_walk()
@@ -126,7 +96,8 @@ class Controls:
 
     def _add_walk(self) -> None:
         r = self._ranges
-        self.speed = self._slide("speed [m/s]", r.speeds, r.first, 0.01)
+        slowest = 0.0 if r.stands else r.speeds[0]
+        self.speed = self._slide("speed [m/s]", (slowest, r.speeds[1]), r.first, 0.01)
         self._velocity = [self.speed]
         if r.left:
             self._velocity += [
@@ -147,7 +118,7 @@ class Controls:
         self._deeds.velocity(forward, left, turning)
 
     def _add_pushes(self) -> None:
-        free, first = bool(self._ranges.left), self._ranges.push
+        free, first = bool(self._ranges.left), self._first_push
         self._impulse = self._gui.add_number("impulse [N s]", first, min=0.0, step=first / 10.0)
         names = {"ahead": 0.0, "back": 180.0}
         if free:

@@ -23,7 +23,8 @@ from template_control.run.specs import GaitSpec, OwnPlanner
 
 COMMANDS = ("walk", "run", "go", "drive", "robustness", "campaign")
 WITHOUT_EXPERIMENT = {
-    "robots", "replay", "plots", "slip", "gaits", "automaton", "keys", "warm-up", "reproduce",
+    "robots", "replay", "plots", "study", "slip", "gaits", "automaton", "keys", "warm-up",
+    "reproduce",
 }  # fmt: skip
 KEPT_ELSEWHERE = {
     "help", "config", "output", "json", "no_figures", "keys", "scenario",

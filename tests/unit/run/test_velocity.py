@@ -7,6 +7,7 @@ import template_control as tc
 from template_control.cli.experiment_options import experiment_from
 from template_control.errors import ParameterError
 from template_control.run.options import HeadingCommand
+from template_control.run.velocity import VelocityRange
 
 ROWS = ((0.0, 0.5, 0.0, 0.0), (2.0, 0.6, 0.05, 0.2))
 PROFILE = tc.run.VelocityProfile(ROWS, duration=5.0)
@@ -57,6 +58,17 @@ def test_what_does_not_go_with_velocities_is_refused():
     for course in (HeadingCommand(turning_rate=0.1), HeadingCommand(side_speed=0.1)):
         with pytest.raises(ParameterError, match="a course does not go with velocities"):
             tc.Experiment(bolt, motion=PROFILE, course=course).prepare()
+
+
+def test_a_robot_is_commanded_what_it_can():
+    five_link = tc.load_robot("five-link")
+    planar = VelocityRange.of(five_link)
+    low, high = tc.walking_speeds(five_link)
+    assert low <= planar.speeds[0] <= planar.first <= planar.speeds[1] <= high
+    assert (planar.left, planar.turning) == (0.0, 0.0)
+    free = VelocityRange.of(tc.load_floating_robot("bolt"))
+    assert (free.left, free.turning) == (0.06, 0.52)
+    assert (planar.gaits, free.gaits) == (("stand", "walk"), ("walk",))
 
 
 @pytest.mark.slow(seconds=12)

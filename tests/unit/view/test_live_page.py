@@ -16,7 +16,7 @@ from template_control.errors import ParameterError
 from template_control.view.live.figures import Figures, Step
 from template_control.view.live.frame import Body
 from template_control.view.live.pace import Pace
-from template_control.view.live.page import Ranges
+from template_control.view.live.page import first_push
 from template_control.view.live.server import PageServer, is_own
 from template_control.view.replay.robot_visuals import foot_sides, model_of
 from template_control.view.replay.scene import in_space
@@ -102,14 +102,10 @@ def test_the_speed_is_that_of_the_last_step():
     assert step.speed == pytest.approx(moved / (record.time[last] - record.time[first]), rel=0.01)
 
 
-def test_what_a_robot_is_asked_for_is_what_it_can():
-    planar, free = Ranges.of(tc.load_robot("five-link")), Ranges.of(tc.load_floating_robot("bolt"))
-    low, high = tc.walking_speeds(tc.load_robot("five-link"))
-    assert low <= planar.speeds[0] <= planar.first <= planar.speeds[1] <= high
-    assert (planar.left, planar.turning, planar.push) == (0.0, 0.0, 10.0)
-    assert free.left > 0.0
-    assert free.turning > 0.0
-    assert free.push < 0.1
+def test_the_first_push_goes_with_the_robot():
+    five_link, bolt = tc.load_robot("five-link"), tc.load_floating_robot("bolt")
+    assert first_push(tc.template_for(five_link)) == 10.0
+    assert 0.05 < first_push(tc.template_for(bolt)) < 0.1
 
 
 # Server.
