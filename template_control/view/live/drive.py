@@ -210,6 +210,7 @@ class Drive:
         self._controls.reset()
         self._plots.clear()
         self._scene.clear()
+        self._show(1)
 
     def _save(self) -> None:
         self._folder.mkdir(parents=True, exist_ok=True)
@@ -244,18 +245,22 @@ class Drive:
     def _advance(self, ticks: int) -> int:
         """Go on by some ticks, but not beyond a fall; the number of those made."""
         run = self._going
-        for made in range(ticks):
+        for made in range(0 if run.ended else ticks):
             if self._halt_at is not None and self.tick.steps >= self._halt_at:
                 self._halt_at = None
                 return made
-            tick = next(run, None)
+            try:
+                tick = next(run, None)
+            except TemplateControlError as error:
+                self._say(f"{error}. Reset begins anew")
+                return made
             if tick is None:
                 self._say(f"fell: {run.reason}. Reset begins anew")
                 return made
             self.tick = tick
             if any(tick.push):
                 self._push, self._pushed = tick.push, tick.time
-        return ticks
+        return 0 if run.ended else ticks
 
     def _show(self, ticks: int) -> None:
         columns = self._going.recorder.latest(min(ticks, _MOST_TICKS))
@@ -270,7 +275,9 @@ class Drive:
     def _tell(self) -> None:
         """Plots, and a line about the run."""
         run, tick = self._going, self.tick
-        state = f"fell: {run.reason}; reset begins anew" if run.ended else "walks"
+        state = "walks"
+        if run.ended:
+            state = f"{f'fell: {run.reason}' if run.reason else 'stopped'}; reset begins anew"
         if not run.ended and self.paused:
             state = "halted"
         late, self._late = self.pace.late - self._late, self.pace.late

@@ -225,7 +225,8 @@ def test_a_robot_is_driven_in_a_browser(tmp_path):
         # On ice it falls, says why, and begins anew.
         page.run.hand.set_friction(0.02)
         until(lambda: page.run.ended, "it falls")
-        until(lambda: "fell: " in tab.text(), "the page says so")
+        until(lambda: "; reset begins anew" in tab.text(), "the page says so")
+        assert tab.text().count("Reset begins anew") == 1, "and notifies once"
         tab.click("button", "save")
         until(lambda: (tmp_path / "kept" / "run.toml").exists(), "it is saved")
         tab.click("button", "reset")
