@@ -17,6 +17,7 @@ from template_control.whole_body.task import References, Rows
 
 _SIDE = 1  # y, to the left
 _GAIN = 1.5  # k: larger, and a foot that slides a little is rocked on
+_LOWEST = 0.1  # of the legs' length: the least height that the law is used with
 _SHARE = 0.9  # of the way from the middle to the outermost contact on which p stays
 
 
@@ -50,7 +51,8 @@ class StandTask(Checked):
         sides = s.contact[stands, _SIDE]
         low, high = float(sides.min()), float(sides.max())
         middle, half = 0.5 * (low + high), 0.5 * _SHARE * (high - low)
-        height = float(s.com[UP] - s.contact[stands, UP].mean())
+        # Of a robot that falls it may be below its feet.
+        height = max(float(s.com[UP] - s.contact[stands, UP].mean()), _LOWEST * robot.leg_length)
         moment = robot.mass * height
         speed = float(s.com_velocity[_SIDE] - s.momentum[0] / moment)
         rate = sqrt(robot.gravity / height)

@@ -127,6 +127,14 @@ def test_a_stand_is_pushed(direction):
     assert np.abs(record.attitude).max() < 0.05
 
 
+@pytest.mark.slow(seconds=3)
+def test_a_stand_that_is_pushed_too_hard_falls():
+    push = Push(20.0, step=1, phase=0.1, duration=0.06, direction=np.radians(90.0))
+    record = going(Segment("stand", duration=1.8), pushes=(push,))
+    assert record.fell
+    assert np.isfinite(record.torque).all()
+
+
 def test_point_feet_do_not_stand():
     segments = (Segment("walk", speed=0.5, steps=2), Segment("stand", duration=1.0))
     with pytest.raises(ScenarioError, match="segment 2 stands: bolt has a floating base"):
