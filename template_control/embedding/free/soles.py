@@ -28,9 +28,11 @@ _SINGLE = PhaseControl(
         # Lighter in x, a sole would be a free lunch: the momentum is drained to move the swing leg.
         ComTask((1.0, 10.0), on_point=True, falling=1.0),
         SwayTask(1.0),
-        OrientationTask(),
-        FootTask(),
-        SideFootTask(),
+        OrientationTask((1.0, 1.0, 0.1)),
+        # Lighter than the rest: a fast swing asks for more than the hips have, and the trunk would
+        # nod with it.
+        FootTask(weight=(0.1, 0.1)),
+        SideFootTask(weight=0.1),
         SoleTask(),
     ),
     swings=(Leg.FRONT,),
