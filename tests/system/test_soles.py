@@ -1,0 +1,60 @@
+"""Humanoids on flat feet walk in both engines, with torques only, and are recorded and drawn."""
+
+import numpy as np
+import pytest
+
+import template_control as tc
+from template_control.plant.bullet import PlantOptions
+from template_control.run.record import SoleRecord
+from template_control.run.specs import GaitSpec
+from template_control.slip.automaton.vocabulary import Phase
+
+
+def walk(robot, steps, **given):
+    spec = tc.robot.RobotSpec(robot, free=True)
+    return tc.simulate(tc.Experiment(spec, motion=GaitSpec(speed=0.6), steps=steps, **given))
+
+
+def check(record, steps):
+    """The walk has its speed; the trunk is upright, and the pressure stays within the soles."""
+    assert (record.fall_reason, record.steps) == ("", steps)
+    assert record.solved.all()
+    begun = record.section_time[1]
+    after = record.time > begun
+    travelled = record.space_com[-1, 0] - record.space_com[after][0, 0]
+    assert travelled / (record.time[-1] - begun) == pytest.approx(0.6, rel=0.05)
+    assert np.sqrt((record.attitude[:, :2] ** 2).mean(axis=0)).max() < 0.01
+    assert (np.abs(record.torque) <= record.torque_limit + 1e-9).all()
+    off = np.abs(record.centre_of_pressure - record.soles[:, :2])
+    single = record.in_phase(Phase.SS)
+    assert (np.nanmax(off[single], axis=0) <= record.soles[:, 2:] + 2e-3).all()
+
+
+@pytest.mark.slow(14)
+def test_g1_walks_in_both_engines(tmp_path):
+    for world in (PlantOptions(), tc.MujocoOptions()):
+        record = walk("g1", 6, world=world)
+        check(record, 6)
+    again = tc.load_record(record.save(tmp_path / "run.npz"))
+    assert isinstance(again, SoleRecord)
+    np.testing.assert_array_equal(again.sole_wrench, record.sole_wrench)
+    # The wrench is that of the forces, and bears the robot.
+    np.testing.assert_allclose(record.sole_wrench[:, :, 2], record.contact_force[:, :, 1], atol=2.0)
+    weight = record.mass * 9.81
+    assert record.sole_wrench[:, :, 2].sum(axis=1).mean() == pytest.approx(weight, rel=0.02)
+    assert record.plot("pressure").axes
+    assert record.plot("stick_diagram").axes
+    tc.save_html(record, tmp_path / "replay.html")
+
+
+@pytest.mark.slow(6)
+def test_talos_walks_with_the_same_tuning():
+    check(walk("talos", 4), 4)
+
+
+@pytest.mark.slow(10)
+@pytest.mark.parametrize("scale", [0.9, 1.1])
+def test_another_mass_walks_and_is_learnt(scale):
+    record = walk("g1", 7, world=PlantOptions(mass_scale=scale))
+    assert not record.fell
+    assert record.section_load[-1] == pytest.approx(scale, abs=0.04)
