@@ -15,6 +15,7 @@ from .planar_biped import PlanarBiped as PlanarBiped
 from .robot import FixedBaseRobot as FixedBaseRobot
 from .robot import FrameTerms as FrameTerms
 from .robot import Robot as Robot
+from .sole import Sole as Sole
 from .spec import RobotSpec as RobotSpec
 from .start import FloatingBasePose as FloatingBasePose
 from .start import floating_state_in as floating_state_in

@@ -12,6 +12,7 @@ from .options import Push as Push
 from .record import FloatingRecord as FloatingRecord
 from .record import Record as Record
 from .record import RunInterrupted as RunInterrupted
+from .record import SoleRecord as SoleRecord
 from .record import load_record as load_record
 from .recorder import Recorder as Recorder
 from .sensing import SensorOptions as SensorOptions

@@ -14,3 +14,5 @@ from .tasks import MomentumTask as MomentumTask
 from .tasks import OrientationTask as OrientationTask
 from .tasks import PostureTask as PostureTask
 from .tasks import SideFootTask as SideFootTask
+from .tasks import SoleTask as SoleTask
+from .tasks import SwayTask as SwayTask
