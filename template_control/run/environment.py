@@ -49,7 +49,7 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     the mean speed of the last stride, the wanted one; of a floating base also y of the CoM from the
     rear foot and its rate, the trunk's roll, the turning rate of the last stride, the wanted one.
 
-    **Reward** 1 - 4 |speed - wanted| - 4 |turning rate - wanted| of the stride, and -10 for a fall.
+    **Reward** 1 - 4 abs(speed - wanted) - 4 abs(turning rate - wanted), and -10 for a fall.
 
     An episode is terminated by a fall, and truncated after ``strides``. ``info`` has the ``time``
     [s], and why the robot fell, ``fall_reason``. ``reset(options={"wanted": (0.6, 0.0)})`` sets the
