@@ -16,7 +16,11 @@ from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.family_search import stance_figures
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy, with_push_off
-from template_control.slip.gaits.running_gait import RunningGait, running_gait
+from template_control.slip.gaits.running_gait import (
+    RunningGait,
+    running_gait,
+    suited_height,
+)
 from template_control.slip.gaits.walking_by_speed import gait_for_speed, walking_by_speed
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
 from template_control.slip.maps.section import VLO
@@ -34,6 +38,8 @@ _SOLE_STRETCH = 0.95
 _KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in all robots that ran
 _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
 _SHORTEST = 0.8  # of l0, at the bottom: shorter, and the knees come to their stops
+_RUN = 0.64  # speed of a moderate run over sqrt(g l0): 2 m/s for l0 = 1 m
+_HEAVY = 0.6  # of the mass: rabbit, whose legs have 62 %, runs 14 steps; go2 has 55 %
 _HEIGHTS = np.linspace(0.9, 1.3, 161)  # over l0, that are tried
 _WALKED = (0.0957, 0.463)  # over sqrt(g l0): 0.30 and 1.45 m/s; bolt fell with 0.08 and 0.48
 _SWING_TORQUE = 0.5  # of a hip's limit: rabbit walked with 0.49, and 0.06 m/s too slow with 0.55
@@ -235,6 +241,21 @@ def _shortest_leg(gait: RunningGait) -> float:
     """Length of the template's leg at the bottom [m]."""
     result, _ = ReturnMap(gait.parameters, gait.stride).evaluate(gait.apex, gait.controls)
     return float(result[REAR_BOTTOM])
+
+
+def _run_of(robot: Biped) -> tuple[float, float]:
+    """Speed and height at apex of a moderate run [m/s, m]."""
+    p = template_for(robot)
+    return _RUN * p.speed_unit, suited_height(_RUN) * p.rest_length
+
+
+def can_run(robot: Biped) -> bool:
+    """True if a robot runs: on points, with light legs, and knees that bear it.
+
+    Its last update is overwritten.
+    """
+    legs = sum(map(len, robot.groups)) * robot.leg_mass / robot.mass
+    return not robot.patches and legs < _HEAVY and _bears(robot, *_run_of(robot), 1.0)
 
 
 def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Positive = 1.0) -> None:

@@ -10,7 +10,12 @@ import numpy as np
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, SpeedOrRest
-from template_control.embedding.robot_template import default_gait, template_for, walking_speeds
+from template_control.embedding.robot_template import (
+    can_run,
+    default_gait,
+    template_for,
+    walking_speeds,
+)
 from template_control.errors import GaitError, ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
@@ -20,6 +25,7 @@ from template_control.slip.scenario.scenario import Gait
 from template_control.slip.scenario.speed_route import GaitChangeOptions, SpeedRoute
 from template_control.slip.similarity import Scale
 
+_FASTEST_RUN = 0.96  # over sqrt(g l0): 3 m/s for l0 = 1 m, where five-link has run 1000 steps
 _FASTEST_WALK = 0.38
 """Mean speed over sqrt(g l0) above which a floating base that can run no longer walks: it has the
 room to turn and to step to the left there."""
@@ -147,6 +153,7 @@ class VelocityRange:
         left: largest speed to the left and to the right [m/s]; 0 of a planar robot.
         turning: largest rate of the heading to both sides [rad/s]; 0 of a planar robot.
         stands: whether it can stand, at the speed 0.
+        run: fastest speed of its runs [m/s]; 0 where it does not run.
     """
 
     speeds: tuple[float, float]
@@ -154,6 +161,7 @@ class VelocityRange:
     left: float = 0.0
     turning: float = 0.0
     stands: bool = True
+    run: float = 0.0
 
     @classmethod
     def of(cls, robot: Biped) -> VelocityRange:
@@ -169,16 +177,18 @@ class VelocityRange:
             low, high = family_speeds(p)
         speeds = float(np.ceil(100.0 * low)) / 100.0, float(np.floor(100.0 * high)) / 100.0
         first = min(max(round(default_gait(robot).mean_speed, 2), speeds[0]), speeds[1])
-        if not isinstance(robot, FloatingBaseBiped):
-            return cls(speeds, first)
         unit = p.speed_unit
+        run = round(_FASTEST_RUN * unit, 2) if can_run(robot) else 0.0
+        if not isinstance(robot, FloatingBaseBiped):
+            return cls(speeds, first, run=run)
         left, turning = round(_LEFT * unit, 2), round(_TURNING * p.gravity / unit, 2)
-        return cls(speeds, first, left, turning, stands=can_stand(robot))
+        return cls(speeds, first, left, turning, can_stand(robot), run)
 
     @property
     def gaits(self) -> tuple[Gait, ...]:
         """Gaits of a command in this range."""
-        return ("stand", "walk") if self.stands else ("walk",)
+        have: dict[Gait, bool] = {"stand": self.stands, "walk": True, "run": self.run > 0.0}
+        return tuple(gait for gait, has in have.items() if has)
 
 
 def velocity_route(

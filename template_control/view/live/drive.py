@@ -23,6 +23,7 @@ from template_control.run.experiment import Experiment
 from template_control.run.live import LiveRun, Tick
 from template_control.run.record import Record
 from template_control.run.velocity import VelocityCommand, VelocityRange
+from template_control.slip.maps.section import APEX, REST, VLO
 from template_control.view.browser import PORTS, show_in_browser
 from template_control.view.live.figures import Figures, Step
 from template_control.view.live.pace import Pace
@@ -37,6 +38,7 @@ KEPT = 60.0
 _DRAWN = 7  # frames between two plots
 _MANY_LATE = 0.5  # of the frames between two plots
 _PUSHED = 0.4  # [s] a push is shown: most last for three frames
+_GAITS = {VLO: "walks", APEX: "runs", REST: "stands"}  # by the section that a stride begins at
 _IDLE = 0.05  # [s] between two looks for a tab
 _MOST_TICKS = 1024  # of a frame, that are looked at
 
@@ -165,7 +167,7 @@ class Drive:
         impulse = first_push(run.controller.parameters)
         self._controls = Controls(gui, self._ranges, impulse, self._deeds(), run.hand.friction)
         with gui.add_folder("Plots"):
-            self._plots = Plots(gui, self._ranges.speeds[1])
+            self._plots = Plots(gui, max(self._ranges.speeds[1], self._ranges.run))
         self.pace.restart()
 
     def _deeds(self) -> Deeds:
@@ -275,7 +277,7 @@ class Drive:
     def _tell(self) -> None:
         """Plots, and a line about the run."""
         run, tick = self._going, self.tick
-        state = "walks"
+        state = _GAITS[run.controller.supervisor.reports[-1].section]
         if run.ended:
             state = f"{f'fell: {run.reason}' if run.reason else 'stopped'}; reset begins anew"
         if not run.ended and self.paused:

@@ -97,7 +97,8 @@ class Controls:
     def _add_walk(self) -> None:
         r = self._ranges
         slowest = 0.0 if r.stands else r.speeds[0]
-        self.speed = self._slide("speed [m/s]", (slowest, r.speeds[1]), r.first, 0.01)
+        fastest = max(r.speeds[1], r.run)
+        self.speed = self._slide("speed [m/s]", (slowest, fastest), r.first, 0.01)
         self._velocity = [self.speed]
         if r.left:
             self._velocity += [

@@ -68,7 +68,9 @@ def test_a_robot_is_commanded_what_it_can():
     assert (planar.left, planar.turning) == (0.0, 0.0)
     free = VelocityRange.of(tc.load_floating_robot("bolt"))
     assert (free.left, free.turning) == (0.06, 0.52)
-    assert (planar.gaits, free.gaits) == (("stand", "walk"), ("walk",))
+    assert (planar.gaits, planar.run) == (("stand", "walk", "run"), 3.01)
+    assert (free.gaits, free.run) == (("walk", "run"), 1.8)
+    assert VelocityRange.of(tc.load_robot("rabbit")).gaits == ("stand", "walk")
 
 
 @pytest.mark.slow(seconds=12)

@@ -192,7 +192,7 @@ def test_a_robot_is_driven_in_a_browser(tmp_path):
         # Slower, by the slider and by a key.
         until(lambda: "vertical force" in tab.text(), "all controls are there")
         first = page.run.hand.velocities[-1][1]
-        tab.click(".mantine-Slider-track", across=0.4)
+        tab.click(".mantine-Slider-track", across=0.25)
         until(lambda: page.run.hand.velocities[-1][1] < first - 0.2, "it is asked to be slower")
         second = page.run.hand.velocities[-1][1]
         tab.press("s")
