@@ -57,7 +57,7 @@ class _Way(NamedTuple):
 
     Attributes:
         began: time of the last section [s].
-        took: duration of the last stride [s].
+        took: duration of the last stride of a gait, or a guess [s].
         stride: kind of the one under way, "" before the first.
         runs: it has begun to change to a run, or it runs.
         since: time since which the trunk leans forward for a run, or rises after one [s].
@@ -140,7 +140,10 @@ class SpeedRoute:
     def next(self, section: Section, z: Array, now: float) -> StrideGoal | None:
         """See :meth:`~.route.Route.next`."""
         if now > self._way.began:
-            self._way = self._way._replace(took=now - self._way.began)
+            # A stand or a change of gait says nothing about the next stride's duration.
+            repeats = self._way.stride in (StrideKind.WALK_PUSH_OFF, StrideKind.RUN)
+            took = now - self._way.began if repeats else self._guess
+            self._way = self._way._replace(took=took)
         self._way, goal = self._go(section, z, now)
         return goal
 
@@ -192,8 +195,12 @@ class SpeedRoute:
             return way, StrideGoal(StrideKind.WALK_PUSH_OFF, target, self._take_off, then=then)
         if way.runs:  # the run is not wanted any more
             way = way._replace(runs=False, since=now)
-        walks = way.stride == StrideKind.WALK_PUSH_OFF  # its swing foot is on its way to a foothold
-        if gait == STAND and walks and speed <= self._stop and now - way.since >= self._lean:
+        if gait == STAND and way.stride != StrideKind.WALK_PUSH_OFF:
+            # No swing foot is on its way to a foothold yet: the first step keeps the speed.
+            height = self._rest[1]
+            target = np.array([speed, height, 0.0])
+            return way, StrideGoal(StrideKind.WALK_PUSH_OFF, target, speed)
+        if gait == STAND and speed <= self._stop and now - way.since >= self._lean:
             return way, StrideGoal(StrideKind.WALK_TO_STAND, self._rest, 0.0)
         return way, self._walk(wanted if gait == "walk" else self._range[0])
 
