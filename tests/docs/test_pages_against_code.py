@@ -184,7 +184,10 @@ def test_files_shown_are_read(page, tmp_path):
     for number, shown in enumerate(re.findall(r"```toml\n(.*?)```", TEXTS[page], re.DOTALL)):
         path = tmp_path / f"{number}.toml"
         path.write_text(shown)
-        if "segment" in tomllib.loads(shown) and "motion" not in tomllib.loads(shown):
+        table = tomllib.loads(shown)
+        if "segment" in table and "motion" not in table:
             tc.load_scenario(path)
+        elif "experiment" in table:
+            tc.sweep.Study.load(path)
         else:
             tc.Experiment.load(path)
