@@ -287,17 +287,17 @@ class TemplateRollout:
 
         The next foothold must be known when the swing begins, before the next section. Where no
         foot stands, the second one's is still further. ``first``, in ``node``, begins at the time
-        ``now`` [s]; ``goal`` is of strides after the route's end. Also returns whether the template
-        completes them all and lasts.
+        ``now`` [s]; ``goal`` is its own. Also returns whether the template completes them all and
+        lasts.
         """
-        strides, whole, start, at = [first], True, node.name, now
+        strides, whole, start, at, then = [first], True, node.name, now, goal
         more = 1 if node.stance or node.name in self.automaton.starts.values() else 2
         while more and strides[-1].completed:
             last = strides[-1]
             at += last.duration
             section = section_of(self.automaton.sections(start)[1])
             z = section.of(last.state)
-            then = self.planners.ahead(section, z, at) or self.planners.beyond(goal, section)
+            then = self.planners.ahead(section, z, at) or self.planners.beyond(then, section)
             context = Context(z, then.target, cause=Cause.FUTURE)
             ahead = decided(self.planners.of(then).decide, context)
             whole = whole and ahead.lasting

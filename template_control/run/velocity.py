@@ -229,4 +229,5 @@ def velocity_route(
         unit = Scale.of(template).speed
         changes = replace(changes, run=min(changes.run, fastest / unit))
     duration = getattr(motion, "duration", None)
-    return velocity, SpeedRoute(template, forward, duration, motion.gaits, changes)
+    bears = robot.half_length > 0.0
+    return velocity, SpeedRoute(template, forward, duration, motion.gaits, changes, bears=bears)

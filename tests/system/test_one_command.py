@@ -32,6 +32,21 @@ def test_a_floating_base_walks_runs_and_walks_again():
     assert record.section_state[-1, 0] == pytest.approx(0.54, rel=0.05)
 
 
+@pytest.mark.slow(seconds=6)
+def test_go2_stands_trots_and_stands_again():
+    rows = ((0.0, 0.0), (1.0, 0.5), (2.5, 1.0), (6.5, 0.0))
+    motion = VelocityProfile(
+        tuple((time, speed, 0.0, 0.0) for time, speed in rows),
+        duration=11.5,
+        gaits=("stand", "walk", "run"),
+    )
+    record = tc.simulate(tc.Experiment(tc.load_floating_robot("go2"), motion))
+    assert not record.fell
+    assert record.section_state[:, 0].max() == pytest.approx(1.0, rel=0.03)
+    np.testing.assert_allclose(record.section_state[-1, 0], 0.0, atol=0.01)
+    assert record.summary.qp_failures == 0
+
+
 def test_a_robot_on_two_points_does_not_stand():
     motion = VelocityProfile(((0.0, 0.6, 0.0, 0.0),), duration=1.0, gaits=("stand", "walk"))
     with pytest.raises(tc.TemplateControlError, match="leave stand out of its gaits"):

@@ -90,6 +90,8 @@ class SpeedRoute:
         duration: when the route ends [s]; None: it does not.
         gaits: those that it may have; the walk always.
         changes: of the gait, for the reference template.
+        bears: whether feet bear the centre of pressure around them, as of
+            :class:`~.scenario_route.ScenarioRoute`; no step closes them then.
     """
 
     @checked
@@ -100,8 +102,10 @@ class SpeedRoute:
         duration: Positive | None = None,
         gaits: Sequence[Gait] = ("walk",),
         changes: GaitChangeOptions | None = None,
+        *,
+        bears: bool = False,
     ) -> None:
-        self.parameters = parameters
+        self.parameters, self._bears = parameters, bears
         self.gaits = frozenset((*gaits, "walk"))
         scale = Scale.of(parameters)
         self.changes = scaled(changes or GaitChangeOptions(), scale)
@@ -172,10 +176,12 @@ class SpeedRoute:
     def _from_rest(
         self, way: _Way, speed: float, wanted: float, now: float
     ) -> tuple[_Way, StrideGoal]:
-        if way.stride == StrideKind.WALK_TO_STAND:  # its last step is a long one
-            return way, StrideGoal(StrideKind.STEP_FORWARD, self._rest, 0.0)
+        if (
+            way.stride == StrideKind.WALK_TO_STAND and not self._bears
+        ):  # its last step is a long one
+            return way, self._stand(StrideKind.STEP_FORWARD, StrideKind.STAND)
         if self._gait(wanted, way) == STAND:
-            return way, StrideGoal(StrideKind.STAND, self._rest, 0.0)
+            return way, self._stand(StrideKind.STAND, None)
         goal = self._walk(min(wanted, self._take_off))
         return way, replace(goal, stride=StrideKind.STAND_TO_WALK, then=goal.stride)
 
@@ -201,7 +207,8 @@ class SpeedRoute:
             target = np.array([speed, height, 0.0])
             return way, StrideGoal(StrideKind.WALK_PUSH_OFF, target, speed)
         if gait == STAND and speed <= self._stop and now - way.since >= self._lean:
-            return way, StrideGoal(StrideKind.WALK_TO_STAND, self._rest, 0.0)
+            then = StrideKind.STAND if self._bears else StrideKind.STEP_FORWARD
+            return way, self._stand(StrideKind.WALK_TO_STAND, then)
         return way, self._walk(wanted if gait == "walk" else self._range[0])
 
     def _from_apex(
@@ -222,6 +229,10 @@ class SpeedRoute:
         return way._replace(reference=reference), replace(
             goal, then=None if on else StrideKind.RUN_TO_WALK
         )
+
+    def _stand(self, stride: str, then: str | None) -> StrideGoal:
+        """A stride to a stand."""
+        return StrideGoal(stride, self._rest, 0.0, then=then)
 
     def _walk(self, wanted: float) -> StrideGoal:
         """A walking step at a mean speed [m/s]."""

@@ -46,6 +46,22 @@ def test_a_speed_from_zero_to_a_run_and_back_stands_walks_and_runs():
     ]
 
 
+def test_feet_that_bear_are_not_closed_by_a_step():
+    wanted = tc.SpeedProfile((0.0, 4.0, 4.1), (0.8, 0.8, 0.0))
+    goals = followed(tc.SpeedRoute(P, wanted, gaits=ALL, bears=True), 10.0)
+    assert kinds(goals) == [StrideKind.WALK_PUSH_OFF, StrideKind.WALK_TO_STAND, StrideKind.STAND]
+    assert kinds(followed(tc.SpeedRoute(P, wanted, gaits=ALL), 10.0))[2] == StrideKind.STEP_FORWARD
+
+
+def test_a_route_that_ends_within_a_change_of_gait_leads_on():
+    """Each stride's ``then`` begins where the stride ends."""
+    wanted = tc.SpeedProfile((0.0, 2.0, 2.1, 12.0, 12.1), (0.0, 0.0, 2.5, 2.5, 0.0))
+    for _, goal in followed(tc.SpeedRoute(P, wanted, gaits=ALL), 30.0):
+        begin, end = AUTOMATON.sections(AUTOMATON.starts[goal.stride])
+        if begin is not end:
+            assert AUTOMATON.sections(AUTOMATON.starts[goal.then])[0] is end
+
+
 def test_the_trunk_has_time_to_lean_before_a_run_and_to_rise_after_it():
     wanted = tc.SpeedProfile((0.0, 1.0, 1.1, 10.0, 10.1), (1.0, 1.0, 2.0, 2.0, 0.0))
     goals = followed(tc.SpeedRoute(P, wanted, gaits=ALL), 30.0)
