@@ -1,6 +1,7 @@
 """Sphinx configuration of the site: ``python -m sphinx -W docs build/site``."""
 
 import re
+from importlib.util import find_spec
 
 from sphinx.application import Sphinx
 
@@ -32,6 +33,8 @@ myst_heading_anchors = 3
 autodoc_class_signature = "separated"
 autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
+# The extra "gym" need not be there: the reference shows its environment all the same.
+autodoc_mock_imports = [] if find_spec("gymnasium") else ["gymnasium"]
 # Signatures would repeat what "Args" and "Attributes" say.
 autodoc_typehints = "none"
 napoleon_numpy_docstring = False

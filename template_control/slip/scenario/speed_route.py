@@ -25,8 +25,6 @@ from template_control.slip.similarity import ACCELERATION, REFERENCE, SPEED, Sca
 Array = NDArray[np.float64]
 
 _FIRST_DURATION = 2.2  # of sqrt(l0 / g): guess of a step's duration before one was made
-
-
 # Changes of the gait, for the reference template.
 _SLOWEST = 0.3  # mean speed of the slowest walk that robots keep [m/s]; a slower one stands
 _TAKE_OFF = 1.1  # dx/dt at the VLO where a run begins and ends [m/s]
@@ -176,9 +174,8 @@ class SpeedRoute:
     def _from_rest(
         self, way: _Way, speed: float, wanted: float, now: float
     ) -> tuple[_Way, StrideGoal]:
-        if (
-            way.stride == StrideKind.WALK_TO_STAND and not self._bears
-        ):  # its last step is a long one
+        stopped = way.stride == StrideKind.WALK_TO_STAND
+        if stopped and not self._bears:  # the last step of a walk is a long one
             return way, self._stand(StrideKind.STEP_FORWARD, StrideKind.STAND)
         if self._gait(wanted, way) == STAND:
             return way, self._stand(StrideKind.STAND, None)
@@ -195,16 +192,12 @@ class SpeedRoute:
             if abs(speed - self._take_off) <= self._near and now - way.since >= self._lean:
                 way = way._replace(reference=self._first)
                 return way, self._run(StrideKind.WALK_TO_RUN, self._first)
-            height = self._family.vlo_for(self.parameters, self._take_off)[1]
-            target = np.array([self._take_off, height, 0.0])
-            then = StrideKind.WALK_TO_RUN
-            return way, StrideGoal(StrideKind.WALK_PUSH_OFF, target, self._take_off, then=then)
+            return way, self._to_take_off(StrideKind.WALK_PUSH_OFF, StrideKind.WALK_TO_RUN)
         if way.runs:  # the run is not wanted any more
             way = way._replace(runs=False, since=now)
         if gait == STAND and way.stride != StrideKind.WALK_PUSH_OFF:
             # No swing foot is on its way to a foothold yet: the first step keeps the speed.
-            height = self._rest[1]
-            target = np.array([speed, height, 0.0])
+            target = np.array([speed, self._rest[1], 0.0])
             return way, StrideGoal(StrideKind.WALK_PUSH_OFF, target, speed)
         if gait == STAND and speed <= self._stop and now - way.since >= self._lean:
             then = StrideKind.STAND if self._bears else StrideKind.STEP_FORWARD
@@ -216,23 +209,22 @@ class SpeedRoute:
     ) -> tuple[_Way, StrideGoal]:
         on = self._gait(wanted, way) == "run"
         if not on and speed <= self._last:
-            height = self._family.vlo_for(self.parameters, self._take_off)[1]
-            target = np.array([self._take_off, height, 0.0])
-            then = StrideKind.WALK_PUSH_OFF
-            return way, StrideGoal(StrideKind.RUN_TO_WALK, target, self._take_off, then=then)
+            return way, self._to_take_off(StrideKind.RUN_TO_WALK, StrideKind.WALK_PUSH_OFF)
+        aim = min(max(wanted, self._first), self._fastest) if on else self._first
         most = self.changes.acceleration * way.took
-        aim = min(
-            max(wanted if on else self._first, self._first), running_speeds(self.parameters)[1]
-        )
-        reference = min(max(aim, way.reference - most), way.reference + most)
-        goal = self._run(StrideKind.RUN, reference)
-        return way._replace(reference=reference), replace(
-            goal, then=None if on else StrideKind.RUN_TO_WALK
-        )
+        way = way._replace(reference=min(max(aim, way.reference - most), way.reference + most))
+        goal = self._run(StrideKind.RUN, way.reference)
+        return way, replace(goal, then=None if on else StrideKind.RUN_TO_WALK)
 
     def _stand(self, stride: str, then: str | None) -> StrideGoal:
         """A stride to a stand."""
         return StrideGoal(stride, self._rest, 0.0, then=then)
+
+    def _to_take_off(self, stride: str, then: str) -> StrideGoal:
+        """A stride to the VLO where a run begins or ends."""
+        height = self._family.vlo_for(self.parameters, self._take_off)[1]
+        target = np.array([self._take_off, height, 0.0])
+        return StrideGoal(stride, target, self._take_off, then=then)
 
     def _walk(self, wanted: float) -> StrideGoal:
         """A walking step at a mean speed [m/s]."""
