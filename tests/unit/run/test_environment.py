@@ -45,8 +45,9 @@ def test_a_walk_at_the_wanted_speed_is_worth_one_a_stride():
     assert np.all(rewards[2:] > 0.9)
     assert seen[-1][4] == pytest.approx(wanted, abs=0.02)
     assert seen[-1][5] == pytest.approx(wanted, abs=0.02)
-    _, slow, _, _ = walked(env, [-1.0], wanted=(wanted, 0.0))
-    assert slow[-1] == pytest.approx(1.0 - 4.0 * (wanted - low), abs=0.1)
+    seen, slow, _, _ = walked(env, [-1.0], wanted=(wanted, 0.0))
+    assert seen[-1][4] == pytest.approx(low, abs=0.05)  # MuJoCo's slowest walk is 0.026 m/s slower
+    assert slow[-1] == pytest.approx(1.0 - 4.0 * (wanted - seen[-1][4]), abs=1e-3)
     env.close()
 
 
