@@ -10,7 +10,7 @@ from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
 from template_control.embedding.planners.gait_table import STATE, gait_table, row_at
 from template_control.embedding.planners.running import AGILE
-from template_control.embedding.robot_template import template_for
+from template_control.embedding.robot_template import can_stand, template_for
 from template_control.errors import ScenarioError
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
@@ -43,7 +43,7 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
             another walk, wants a speed that no gait of the robot has, or a segment a change of
             speed that is beyond a stride's reach.
     """
-    if scenario.stands and not isinstance(robot, PlanarBiped) and not robot.half_length:
+    if scenario.stands and not can_stand(robot):
         number = next(i for i, s in enumerate(scenario.segments, 1) if s.gait == STAND)
         raise ScenarioError(
             f"segment {number} stands: {robot.name} has a floating base and cannot stand on two"

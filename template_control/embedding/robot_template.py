@@ -11,6 +11,7 @@ from template_control.checks.fitting import inward
 from template_control.checks.ranges import Angle, Positive
 from template_control.errors import GaitError
 from template_control.robot.biped import Biped
+from template_control.robot.terms import UP
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.dynamics.stride import simulate_stride
@@ -247,6 +248,15 @@ def _run_of(robot: Biped) -> tuple[float, float]:
     """Speed and height at apex of a moderate run [m/s, m]."""
     p = template_for(robot)
     return _RUN * p.speed_unit, suited_height(_RUN) * p.rest_length
+
+
+def can_stand(robot: Biped) -> bool:
+    """True if a robot can stand: in its plane, or on feet that are no points.
+
+    Args:
+        robot: of either kind.
+    """
+    return robot.directions <= UP or bool(robot.half_length)
 
 
 def can_run(robot: Biped) -> bool:

@@ -12,6 +12,7 @@ from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive, SpeedOrRest
 from template_control.embedding.robot_template import (
     can_run,
+    can_stand,
     default_gait,
     template_for,
     walking_speeds,
@@ -132,15 +133,6 @@ class VelocityCommand:
     def at(self, time: float) -> Velocity:
         """The present velocity, whatever the ``time`` [s]."""
         return self._velocity
-
-
-def can_stand(robot: Biped) -> bool:
-    """True if a robot can stand: in its plane, or on feet that are no points.
-
-    Args:
-        robot: of either kind.
-    """
-    return not isinstance(robot, FloatingBaseBiped) or bool(robot.half_length)
 
 
 @dataclass(frozen=True)
