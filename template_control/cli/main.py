@@ -9,7 +9,7 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
@@ -64,6 +64,10 @@ _COMMANDS = {
         "cli.warm_up",
         "compile once what all commands call; each compiles what it needs without it",
     ),
+    "completion": (
+        "cli.completion",
+        "print a script that completes words in a shell",
+    ),
     "reproduce": (
         "paper.command",
         "reproduce a table or figure of the paper, ours beside the paper's",
@@ -113,17 +117,26 @@ def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     It lists every command, but has the options of the one command that ``arguments`` name:
     importing them all would take seconds, even for ``--help``.
     """
+    # Before the command there are only options without a value.
+    wanted = next((word for word in arguments if not word.startswith("-")), None)
+    return _parser({wanted})
+
+
+def full_parser() -> argparse.ArgumentParser:
+    """The parser of all commands, with all their options."""
+    return _parser(set(_COMMANDS))
+
+
+def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
     parser = _Parser(
         prog="template-control",
         description="Bipedal SLIP templates, their control, and robots that follow them.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    # Before the command there are only options without a value.
-    wanted = next((word for word in arguments if not word.startswith("-")), None)
     for name, (place, about) in _COMMANDS.items():
         sub_parser = commands.add_parser(name, help=about)
-        if name == wanted:
+        if name in wanted:
             module, _, part = place.partition(":")
             found: Any = importlib.import_module(f"template_control.{module}")
             found = getattr(found, part) if part else found

@@ -26,6 +26,7 @@ from .planners.planner import Context as Context
 from .planners.planner import Decision as Decision
 from .planners.planner import Planner as Planner
 from .planners.planner import RestContext as RestContext
+from .planners.residual import ResidualPlanner as ResidualPlanner
 from .planners.running import RunningOptions as RunningOptions
 from .planners.running import RunningPlanner as RunningPlanner
 from .planners.transition import TransitionOptions as TransitionOptions

@@ -10,12 +10,16 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count, NotNegative
+from template_control.embedding.planners.planner import Planner
+from template_control.embedding.planners.residual import ResidualPlanner
 from template_control.errors import MissingPackageError, ParameterError
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment
 from template_control.run.live import LiveRun
+from template_control.run.specs import GaitSpec
 from template_control.run.velocity import VelocityCommand, VelocityRange
+from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.similarity import Scale
 
 try:
@@ -29,6 +33,10 @@ Array = NDArray[np.float64]
 
 _PUSHED = 0.25  # share of the strides in which a push begins
 _OFF = 4.0  # price of an error of 1 m/s in the speed, or of 1 rad/s in the turning rate
+# Controls that a residual changes, and what its 1 is: rad, and shares of the template's stiffness.
+# Drawn anew for each stride, it falls in 1 of 8 episodes of 20 strides (five-link, Bolt), and twice
+# as much would in 4.
+_RESIDUAL = {Slot.TOUCHDOWN_ANGLE: 0.05, Slot.K_SC: 0.1, Slot.K_SD: 0.1}
 _FALL = 10.0  # price of a fall: that of ten strides without an error
 _MOST = 10.0  # of an entry of an observation, which are of the order of one
 _KEPT = 2.0  # [s] of the run that are kept
@@ -45,6 +53,10 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     slowest to its fastest, and the turning rate, from its largest to the right to that to the left.
     It holds from the next section on.
 
+    With ``residuals`` the planner of a walk at the wanted speed keeps its say, and the action (3,)
+    is added to its controls from the next section on: 1 is 0.05 rad of the touchdown angle, and a
+    tenth of the template's stiffness before and after the bottom. The wanted turning rate is 0.
+
     **Observation** (6,) or (11,): dx/dt, y and dy/dt of the CoM at the section, the trunk's pitch,
     the mean speed of the last stride, the wanted one; of a floating base also y of the CoM from the
     rear foot and its rate, the trunk's roll, the turning rate of the last stride, the wanted one.
@@ -60,6 +72,7 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         strides: of an episode.
         impulse: of the largest push [N s]; a push begins in a quarter of the strides, with a drawn
             size and, of a floating base, from a drawn side.
+        residuals: whether an action is added to the planner's controls, instead of a command.
 
     Raises:
         MissingPackageError: if gymnasium is not installed.
@@ -74,6 +87,7 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         experiment: Experiment | str = "five-link",
         strides: Count = 40,
         impulse: NotNegative = 0.0,
+        residuals: bool = False,
     ) -> None:
         if isinstance(experiment, str):
             experiment = Experiment(experiment)
@@ -84,7 +98,9 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         robot: Any = spec.load() if isinstance(spec, RobotSpec) else spec
         self._range = VelocityRange.of(robot)
         self._free = isinstance(robot, FloatingBaseBiped)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1 + self._free,), np.float32)
+        self._residuals = residuals
+        actions = len(_RESIDUAL) if residuals else 1 + self._free
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (actions,), np.float32)
         size = 11 if self._free else 6
         self.observation_space = gymnasium.spaces.Box(-_MOST, _MOST, (size,), np.float32)
         self._run: LiveRun | None = None
@@ -101,11 +117,10 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         super().reset(seed=seed)
         self.close()
         r, draw = self._range, self.np_random
-        turning = float(draw.uniform(-r.turning, r.turning))
+        turning = 0.0 if self._residuals else float(draw.uniform(-r.turning, r.turning))
         drawn = float(draw.uniform(*r.speeds)), turning
         self._wanted: tuple[float, float] = (options or {}).get("wanted", drawn)
-        command = VelocityCommand(self._wanted[0])
-        self._run = run = LiveRun(replace(self._experiment, motion=command), keep=_KEPT)
+        self._run = run = LiveRun(self._commanded(self._wanted[0]), keep=_KEPT)
         self._tick = next(run)
         self._scale = Scale.of(run.controller.parameters)
         self._place = self._where()
@@ -120,10 +135,15 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if run is None:
             raise ParameterError("the environment has no episode: call reset first")
         before = self._tick
-        low, high = r.speeds
-        share = np.clip(np.asarray(action, dtype=float), -1.0, 1.0).tolist()
-        turning = share[1] * r.turning if self._free else 0.0
-        run.hand.set_velocity(low + 0.5 * (share[0] + 1.0) * (high - low), 0.0, turning)
+        share = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        if self._residuals:
+            unit = [1.0, *[run.controller.parameters.leg_stiffness] * 2]
+            self._planner.residual[list(_RESIDUAL)] = share * list(_RESIDUAL.values()) * unit
+        else:
+            low, high = r.speeds
+            turning = float(share[1]) * r.turning if self._free else 0.0
+            speed = low + 0.5 * (float(share[0]) + 1.0) * (high - low)
+            run.hand.set_velocity(speed, 0.0, turning)
         self._push(run)
         for tick in run:
             self._tick = tick
@@ -143,6 +163,15 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._run is not None:
             self._run.close()
             self._run = None
+
+    def _commanded(self, speed: float) -> Experiment:
+        """The experiment with the motion of an episode that wants this speed [m/s]."""
+        if not self._residuals:
+            return replace(self._experiment, motion=VelocityCommand(speed))
+        walk = replace(self._experiment, motion=GaitSpec(speed=speed)).prepare()
+        assert isinstance(walk.planner, Planner)
+        self._planner = ResidualPlanner(walk.planner)
+        return replace(self._experiment, planner=self._planner)
 
     def _push(self, run: LiveRun) -> None:
         draw = self.np_random

@@ -130,6 +130,11 @@ class VelocityCommand:
             check("the commanded turning rate", turning, TurningRate, ParameterError),
         )
 
+    def __repr__(self) -> str:
+        forward, left, turning = self._velocity
+        gaits = ", ".join(self.gaits)
+        return f"<VelocityCommand {forward:g} m/s, left {left:g} m/s, {turning:g} rad/s: {gaits}>"
+
     def at(self, time: float) -> Velocity:
         """The present velocity, whatever the ``time`` [s]."""
         return self._velocity

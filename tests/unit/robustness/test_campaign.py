@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from json_page import undocumented, unprinted
 from places import DOCS
 
 from template_control import settings
@@ -253,6 +254,7 @@ def test_a_campaign_goes_on_and_its_falls_can_be_repeated(tmp_path, capfd):
     assert main(words) == 0
     found = json.loads(capfd.readouterr().out)
     assert found["fell"]["count"] == 2
+    assert undocumented("campaign", found) == unprinted("campaign", found) == set()
     results = {path: path.read_bytes() for path in (tmp_path / "out").glob("*.jsonl")}
     assert main(words) == 0
     assert json.loads(capfd.readouterr().out) == found

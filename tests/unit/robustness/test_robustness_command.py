@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from json_page import undocumented
 from places import DOCS
 
 from template_control.cli import robustness as command
@@ -34,6 +35,7 @@ def test_json_figure_and_resumption(tmp_path, capfd):
     captured = capfd.readouterr()
     figures = json.loads(captured.out)
     assert "level 2" in captured.err
+    assert undocumented("robustness", figures) == set()
     delay = figures["disturbances"]["delay"]
     assert [level["level"] for level in delay["levels"]] == [0.002, 0.004]
     assert abs(figures["undisturbed"]["speed_error"]) < 0.02
@@ -52,6 +54,7 @@ def test_a_run_is_disturbed_as_a_walk_is(tmp_path, capfd):
     assert main([*words, "--json", "--output", str(tmp_path)]) == 0
     figures = json.loads(capfd.readouterr().out)
     assert set(figures["gait"]) == {"mean_speed", "apex_height"}
+    assert undocumented("robustness", figures) == set()
     assert abs(figures["undisturbed"]["speed_error"]) < 0.02
     steps = figures["disturbances"]["step-up"]
     assert steps["breaking_point"] == pytest.approx(0.01)

@@ -26,9 +26,10 @@ def walked(env, action, seed=0, **options):
 
 
 @pytest.mark.slow(seconds=2)
+@pytest.mark.parametrize("residuals", [False, True], ids=["command", "residuals"])
 @pytest.mark.parametrize("experiment", ["five-link", BOLT], ids=["planar", "floating"])
-def test_the_interface_is_gymnasium_s(experiment):
-    env = tc.run.WalkEnv(experiment, strides=3)
+def test_the_interface_is_gymnasium_s(experiment, residuals):
+    env = tc.run.WalkEnv(experiment, strides=3, residuals=residuals)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env, skip_render_check=True, skip_close_check=True)
@@ -65,6 +66,15 @@ def test_a_fall_ends_an_episode_and_costs_ten():
     assert terminated
     assert rewards[-1] == -10.0
     assert "in step" in info["fall_reason"]
+    env.close()
+
+
+def test_residuals_change_a_walk_that_keeps_its_speed_without_them():
+    env = tc.run.WalkEnv(strides=8, residuals=True)
+    seen, rewards, _, _ = walked(env, np.zeros(3), wanted=(0.8, 0.0))
+    assert np.all(rewards[2:] > 0.9)
+    other, _, _, _ = walked(env, [0.2, 0.0, 0.0], wanted=(0.8, 0.0))
+    assert np.abs(other[1] - seen[1]).max() > 1e-3
     env.close()
 
 

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from json_page import undocumented, unprinted
 from places import EXAMPLES, ROOT
 
 import template_control as tc
@@ -93,6 +94,7 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path, capfd):
     words = ["study", str(path), "--output", str(out), "--workers", "1", "--json"]
     assert main(words) == 0
     first = json.loads(capfd.readouterr().out)
+    assert undocumented("study", first) == unprinted("study", first) == set()
     lines = (out / "trials.jsonl").read_text().splitlines()
     (out / "trials.jsonl").write_text("\n".join(lines[:3]) + "\n")
     assert main(words) == 0
