@@ -97,7 +97,6 @@ _UNTRIMMED = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unload_leg
 _STANDING = PhaseControl(
     tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, follow_curve=True
 )
-_LIFTING_OFF = replace(_STANDING, unload_legs=(Leg.REAR,), estimate_load=False)
 
 _SINGLE_STANCE = PhaseControl(
     # Height before the swing foot: near VLO its pull on the ground would need more normal
@@ -141,6 +140,33 @@ def running_phases(
     }
 
 
+def standing_phases(
+    standing: PhaseControl, stepping: PhaseControl, unloading: float = 0.0
+) -> dict[Phase | str, PhaseControl]:
+    """Entries of a stand, and of the strides to it, from it, and between two speeds of a walk.
+
+    Args:
+        standing: control of both feet on the ground.
+        stepping: control of the single stance of a step from a stand.
+        unloading: time over which a foot gives up its load before it lifts off [s]; 0: its load is
+            the template's.
+    """
+    resting = replace(standing, estimate_load=False)
+    lifting = replace(resting, unload_legs=(Leg.REAR,), unloading=unloading)
+    return {
+        "DS_ar^s": standing,
+        "DS_br^ws": resting,
+        "DS_ar^sw": lifting,
+        "DS_bl^ww": lifting,
+        "DS_al^sf": lifting,
+        "SS_bt^sf": stepping,
+        "DS_br^sf": resting,
+        "DS_al^sb": replace(lifting, unload_legs=(Leg.FRONT,)),
+        "SS_bt^sb": stepping,
+        "DS_br^sb": resting,
+    }
+
+
 PHASES: Phases = {
     # In flight the CoM is ballistic, and the trunk can only be turned against the legs.
     **running_phases(
@@ -154,16 +180,7 @@ PHASES: Phases = {
     "DS_sc^wp": replace(_UNTRIMMED, rolling_contact=True, use_pre_impact_velocity=True),
     "DS_sd^wp": replace(_UNTRIMMED, rolling_contact=True),
     "SS_bv^wp": replace(_SINGLE_STANCE, rolling_contact=True),
-    "DS_ar^s": _STANDING,
-    "DS_br^ws": replace(_STANDING, estimate_load=False),
-    "DS_ar^sw": _LIFTING_OFF,
-    "DS_bl^ww": _LIFTING_OFF,
-    "DS_al^sf": _LIFTING_OFF,
-    "SS_bt^sf": _STEPPING,
-    "DS_br^sf": replace(_STANDING, estimate_load=False),
-    "DS_al^sb": replace(_LIFTING_OFF, unload_legs=(Leg.FRONT,)),
-    "SS_bt^sb": _STEPPING,
-    "DS_br^sb": replace(_STANDING, estimate_load=False),
+    **standing_phases(_STANDING, _STEPPING),
 }
 """Control of walking and running in each phase; transitions may start from it."""
 

@@ -9,6 +9,7 @@ import numpy as np
 from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
 from template_control.checks.ranges import Angle, Positive
+from template_control.embedding.standing.curves import StandingOptions
 from template_control.errors import GaitError
 from template_control.robot.biped import Biped
 from template_control.robot.terms import UP
@@ -36,6 +37,7 @@ _STRETCH = 0.903514524055713
 # Of legs that end in an ankle: more bent, the rear one comes to the ankle's stop late in double
 # stance, as its sole is level.
 _SOLE_STRETCH = 0.95
+_SHIFT = 0.8  # time in which a CoM at rest moves over one of two soles [s], for l0 = 1 m
 _KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in all robots that ran
 _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
 _SHORTEST = 0.8  # of l0, at the bottom: shorter, and the knees come to their stops
@@ -257,6 +259,18 @@ def can_stand(robot: Biped) -> bool:
         robot: of either kind.
     """
     return robot.directions <= UP or bool(robot.half_length)
+
+
+def standing_options(robot: Biped) -> StandingOptions:
+    """Options of a robot's stand, for the reference template; the height is the library's.
+
+    Args:
+        robot: its last update is overwritten.
+    """
+    if not robot.half_length:
+        return StandingOptions()
+    half = robot.half_length / Scale.of(template_for(robot)).length
+    return StandingOptions(half_length=half, shift=_SHIFT if robot.patches else 0.0)
 
 
 def can_run(robot: Biped) -> bool:

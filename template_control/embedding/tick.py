@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from template_control.compiled import compiled
 from template_control.embedding.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
+from template_control.embedding.free.sway import closing_foothold, side_speed, sway
 from template_control.embedding.ground import FRAME, to_world, vector_to_world
 from template_control.embedding.learners.friction import SLIDES, feel_slides
 from template_control.embedding.learners.lean import LEAN, advance_lean
@@ -43,7 +44,7 @@ from template_control.embedding.swing import (
     spread_contacts,
     swing_step,
 )
-from template_control.robot.terms import LEGS, PATCH, UP
+from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.problem import solve_free
 from template_control.whole_body.task_rows import write_rows
@@ -98,10 +99,8 @@ zero."""
 QUIET, EVENTFUL, DIVERGED = 0, 1, 2
 """Results of :func:`sense`: nothing to decide; an event, or a plan that is due; no finite state."""
 
-_TOUCHDOWN, _VLO = int(Event.TOUCHDOWN), int(Event.VLO)
+_TOUCHDOWN, _VLO, _REST = int(Event.TOUCHDOWN), int(Event.VLO), int(Event.REST)
 _LIFTOFFS = (int(Event.REAR_LIFTOFF), int(Event.FRONT_LIFTOFF))  # by leg
-_SIDE_GAIN = 2.0  # by which the centre of pressure moves beyond the capture point's error
-_SIDE_SHARE = 0.7  # of half a sole's width, by which it moves at most
 _REAR = 0
 _SIDE = 1
 
@@ -241,8 +240,8 @@ def advance(
     want.com_now[0] -= s.toes[0]
     want.com_push = t.trim if mode.trim_momentum else 0.0
     want.lead = t.path.offset
-    if arrays[4].shape[1] == PATCH:
-        _sway(t, r, want)
+    if t.lateral.half_width > 0.0:
+        sway(t, r, want)
     want.pitch = advance_lean(t.lean, r.attitude[1] - t.frame.angle, dt) + t.frame.angle
     for leg in range(LEGS):
         want.feet[leg] = t.feet.roles[leg]
@@ -324,6 +323,11 @@ def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: floa
     for k in range(2):
         feet[k] = lateral.stood[lateral.feet[k], _SIDE]
     foothold = lateral_foothold(lateral, arrays, path.time, com, feet)
+    if lateral.step != 0.0 and path.event_times[_REST] < path.event_times[_VLO]:
+        # The next touchdown leads to a stand, in which the soles hold the CoM.
+        foot = f.roles[_REAR]
+        here, other = r.foot_position[foot, _SIDE], r.foot_position[1 - foot, _SIDE]
+        foothold = closing_foothold(lateral, here, other)
     for i in range(mode.swings):
         foot = f.roles[mode.swing_leg[i]]
         due, side = path.landing_time[foot] - path.time, want.side[foot]
@@ -374,38 +378,6 @@ def _place_contacts(t: Any, r: Any, want: Any) -> None:
                 away = want.offset[contact, axis]
                 away[0] = r.contact_position[contact, axis] - reference[0]
                 away[1], away[2] = down - reference[1], -reference[2]
-
-
-@compiled
-def _sway(t: Any, r: Any, want: Any) -> None:
-    """Write how a robot on soles is to sway: as the template, in single stance held to its gait.
-
-    The capture point xi = y + a s / w diverges with w = sqrt(a g / h), s the lateral speed with the
-    momentum, a the sway ratio. In the gait's periodic motion it is at X*_y + X*_v / w from the
-    stance foot at the section. The centre of pressure moves beyond it where it is off:
-
-        s' = sum_i f_i (y - y_i) / (m h) - (z'' + g) / h clip(k e),
-        e = xi - y_i - (X*_y + X*_v / w) exp(w t), t since the section, or -t until it.
-    """
-    mode, forces, height = t.mode, t.path.forces, t.sensed.state[1]
-    want.sway = 0.0
-    for leg in range(mode.stances):
-        foot = t.feet.roles[leg]
-        away = r.com[_SIDE] - r.foot_position[foot, _SIDE]
-        want.sway += forces[leg, 1] * away / (r.mass * height)
-    if mode.stances != 1:
-        return
-    lateral, foot, rate = t.lateral, t.feet.roles[0], np.sqrt(r.sway * r.gravity / height)
-    since = t.time - lateral.section_began
-    if mode.next_touchdown_leg < 0:
-        since = t.path.time - t.path.event_times[_VLO]
-    point = r.com[_SIDE] + side_speed(t, r) / rate - r.foot_position[foot, _SIDE]
-    wanted = (lateral.cycle[0] + lateral.cycle[1] / rate) * np.exp(rate * since)
-    if not np.isfinite(wanted):
-        return  # the path comes to no section
-    bound = _SIDE_SHARE * r.sole_half[r.group[foot, 0], _SIDE]
-    moved = min(max(_SIDE_GAIN * (point - wanted), -bound), bound)
-    want.sway -= (want.com[5] + r.gravity) / height * moved
 
 
 @compiled
@@ -466,16 +438,3 @@ def look(tick: Any, data: Any, references: Any, out: Any) -> None:
     rear = f.roles[_REAR]
     o.sway[0] = r.com[_SIDE] - r.foot_position[rear, _SIDE]
     o.sway[1] = side_speed(t, r)
-
-
-@compiled
-def side_speed(t: Any, r: Any) -> float:
-    """Speed of a floating-base robot's CoM to the left, as the phase has the forward one [m/s].
-
-    ``t`` and ``r`` are of ``TICK`` and ``ROBOT_DATA``.
-    """
-    speed = r.com_velocity[_SIDE]
-    if t.mode.momentum_speed:
-        speed -= r.momentum[0] / (r.mass * t.sensed.state[1])
-        speed *= r.sway
-    return speed

@@ -217,8 +217,18 @@ class Biped(Robot):
 
         0 of a foot that is a point.
         """
-        ahead = self.spread[:, 0]
-        return 0.5 * min(float(np.ptp(ahead[list(group)])) for group in self.groups)
+        return self._half_side(0)
+
+    @property
+    def half_width(self) -> float:
+        """The same to the left and right [m]."""
+        return self._half_side(1)
+
+    def _half_side(self, axis: int) -> float:
+        if self.patches:
+            return min(float(p.half_sides[axis] - abs(p.centre[axis])) for p in self.patches)
+        places = self.spread[:, axis]
+        return 0.5 * min(float(np.ptp(places[list(group)])) for group in self.groups)
 
     @property
     def foot_jacobian(self) -> Array:

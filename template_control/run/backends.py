@@ -19,6 +19,7 @@ from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.robot_template import startable_slopes
 from template_control.embedding.standing.curves import standing_pose
+from template_control.embedding.standing.passes import CLOSING
 from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.filters import NoiseFilter
@@ -170,9 +171,13 @@ class PlanarBackend(RobotBackend):
 _REAR = 0  # the left foot stands where a run begins
 
 
-def _square_stand(z: Array, width: float) -> FloatingBasePose:
-    """At rest on both feet, next to each other and ``width`` [m] apart; ``z`` (3,) is at rest."""
+def _stand(z: Array, width: float, apart: float) -> FloatingBasePose:
+    """At rest on both feet, ``width`` [m] apart to the side; ``z`` (3,) is at rest.
+
+    The front one is ``apart`` [m] ahead.
+    """
     feet = np.zeros((2, 3))
+    feet[:, 0] = apart * np.array([-0.5, 0.5])
     feet[:, 1] = 0.5 * width * np.array(SIDES)
     return FloatingBasePose(
         com=np.array([0.0, 0.0, z[1]]),
@@ -228,7 +233,8 @@ class FloatingBackend(RobotBackend):
         lateral = motion.planner
         if route.section is REST:
             motion.command = o.heading
-            q, v = floating_state_in(self.robot, _square_stand(z, lateral.wish.width))
+            apart = CLOSING * route.parameters.rest_length if self.robot.patches else 0.0
+            q, v = floating_state_in(self.robot, _stand(z, lateral.wish.width, apart))
             controller.start(_REAR, first=first)
             return q, v
         side_speed, rate = o.heading(0.0)

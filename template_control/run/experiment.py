@@ -21,6 +21,7 @@ from template_control.embedding.free.trot import TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
     FREE_AHEAD,
+    SOLE_AHEAD,
     AheadOptions,
     AheadPlanner,
     check_feasibility,
@@ -32,7 +33,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_route import robot_route
-from template_control.embedding.robot_template import check_apex
+from template_control.embedding.robot_template import check_apex, standing_options
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import PlantOptions
@@ -294,16 +295,16 @@ class Experiment(Checked):
             push_off = None if isinstance(planner, Mapping) else _pushes_off(planner)
             motion = robot_route(robot, motion, push_off)
         if planner is None and self.free and isinstance(motion, SpeedRoute):
-            planner = FREE_AHEAD
+            planner = SOLE_AHEAD if robot.patches else FREE_AHEAD
         if planner is None:
-            return motion, default_planners(motion, half_length=robot.half_length)
+            return motion, default_planners(motion, standing=standing_options(robot))
         if isinstance(planner, Mapping):
             return motion, planner
         if isinstance(planner, AheadOptions):
             planner = AheadPlanner(motion.parameters, planner, first_speed(motion))
         elif isinstance(planner, _SPECS):
             planner = _planner(planner, walking_gait(motion.parameters, first_speed(motion)))
-        return motion, default_planners(motion, planner, half_length=robot.half_length)
+        return motion, default_planners(motion, planner, standing=standing_options(robot))
 
     @checked
     def save(self, path: str | Path) -> Path:

@@ -1,7 +1,10 @@
 """Humanoids on flat feet walk in both engines, with torques only, and are recorded and drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from places import EXAMPLES
 
 import template_control as tc
 from template_control.plant.bullet import PlantOptions
@@ -30,11 +33,31 @@ def check(record, steps):
     assert (np.nanmax(off[single], axis=0) <= record.soles[:, 2:] + 2e-3).all()
 
 
-@pytest.mark.slow(14)
-def test_g1_walks_in_both_engines(tmp_path):
-    for world in (PlantOptions(), tc.MujocoOptions()):
-        record = walk("g1", 6, world=world)
-        check(record, 6)
+@pytest.mark.slow(16)
+@pytest.mark.parametrize("world", [PlantOptions(), tc.MujocoOptions()])
+def test_g1_stands_walks_and_stands_again(world):
+    given = tc.Experiment.load(EXAMPLES / "zero_walk_zero.toml")
+    robot = tc.robot.RobotSpec("g1", free=True)
+    record = tc.simulate(replace(given, robot=robot, world=world))
+    assert record.fall_reason == ""
+    assert record.solved.all()
+    kinds = record.kinds_of_stride
+    assert kinds[: kinds.index("s")] == ["sw", "wp", "wp", "wp", "ws"]
+    walks = record.section_state[1:5, 0]
+    np.testing.assert_allclose(walks, record.section_target[1:4, 0].mean(), atol=0.07)
+    still = record.time > record.time[-1] - 1.0
+    # MuJoCo's feet creep by 0.2 mm/s.
+    assert np.ptp(record.space_com[still], axis=0).max() < 1e-3
+    assert (np.abs(record.torque) < 0.95 * record.torque_limit).all()
+    assert np.abs(record.attitude).max() < 0.01
+    off = np.abs(record.centre_of_pressure - record.soles[:, :2])
+    assert (np.nanmax(off[record.in_phase(Phase.SS)], axis=0) <= record.soles[:, 2:] + 2e-3).all()
+
+
+@pytest.mark.slow(8)
+def test_g1_walks_and_is_recorded(tmp_path):
+    record = walk("g1", 6)
+    check(record, 6)
     again = tc.load_record(record.save(tmp_path / "run.npz"))
     assert isinstance(again, SoleRecord)
     np.testing.assert_array_equal(again.sole_wrench, record.sole_wrench)

@@ -119,6 +119,11 @@ LATERAL = np.dtype(
         # and dy/dt [m, m/s].
         ("cycle", _F, (2,)),
         ("section_began", _F),  # time of the last section [s]
+        # -- the plan of a stand --
+        ("unit", _F),  # of time, over the reference template's
+        ("pressure", _F),  # y of the centre of pressure [m]; NaN: not planned
+        ("pressure_at", _F),  # when it was planned [s]
+        ("half_width", _F),  # by how far aside of its middle a foot bears; 0 of a point [m]
         # -- what the foothold is for: see LateralAim --
         ("state", _F, (2,)),
         ("step", _F),

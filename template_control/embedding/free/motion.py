@@ -92,6 +92,8 @@ class LateralMotion:
         wish = LateralWish(scaled(options, scale).step_width)
         planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway)
         data["bank_rate"] = BANK_RATE / scale.time
+        data["unit"], data["pressure"] = scale.time, np.nan
+        data["half_width"] = robot.half_width
         turns = TURN_RAMP / scale.time**2, RUN_RAMP / scale.time**2
         ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
         return cls(robot, planner, feet, references, BEYOND * scale.length, ramps)
@@ -221,7 +223,7 @@ class LateralMotion:
         planner = self.planner
         self._now[:] = 0.0
         planner.wish = replace(planner.wish, aside=0.0, turn=0.0)
-        planner.walk(None)
+        planner.walk(supervisor.planner.next_gait())
         planner.aim(SIDES[self._feet.landed])
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node

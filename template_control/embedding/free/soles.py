@@ -12,7 +12,15 @@ from typing import ClassVar
 
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.learners.lean import LeanOptions
-from template_control.embedding.phases import RUNNING_SWING, PhaseControl, Phases, running_phases
+from template_control.embedding.phases import (
+    RUNNING_SWING,
+    Clock,
+    PhaseControl,
+    Phases,
+    running_phases,
+    standing_phases,
+)
+from template_control.embedding.standing.supports import UNLOADING
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.whole_body.tasks import (
     ComTask,
@@ -62,6 +70,9 @@ _DOUBLE = PhaseControl(
     unload_legs=(Leg.REAR,),
 )
 
+_STANDING = replace(_DOUBLE, unload_legs=(), clock=Clock.TIME, follow_curve=True)
+_STEPPING = replace(_SINGLE, clock=Clock.TIME, follow_curve=True)
+
 SOLE_PHASES: Phases = {
     **running_phases(
         (
@@ -76,8 +87,9 @@ SOLE_PHASES: Phases = {
     # A planner with push-off leaves the trim nothing to do.
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,
+    **standing_phases(_STANDING, _STEPPING, UNLOADING),
 }
-"""Walking, and runs. Nodes of other gaits find the entry of their phase."""
+"""Standing, walking, and runs. Nodes of other gaits find the entry of their phase."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from template_control.embedding.phases import (
     PhaseControl,
     Phases,
     running_phases,
+    standing_phases,
 )
 from template_control.embedding.standing.supports import UNLOADING
 from template_control.robot.biped import Biped
@@ -29,9 +30,14 @@ from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.slip.lateral.gait import LateralOptions
 from template_control.slip.similarity import LENGTH, tuned
-from template_control.whole_body.stand_task import StandTask
 from template_control.whole_body.task import Task
-from template_control.whole_body.tasks import ComTask, FootTask, OrientationTask, SideFootTask
+from template_control.whole_body.tasks import (
+    ComTask,
+    FootTask,
+    OrientationTask,
+    SideFootTask,
+    SwayTask,
+)
 
 _LEVEL = OrientationTask((10.0, 10.0, 10.0), yaw_gains=(100.0, 20.0))
 
@@ -56,12 +62,10 @@ _DOUBLE = PhaseControl(
 
 # Four feet stand, and hold the CoM's y too.
 _STANDING = PhaseControl(
-    tasks=(ComTask((10.0, 10.0)), StandTask(), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+    tasks=(ComTask((10.0, 10.0)), SwayTask(10.0), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
     clock=Clock.TIME,
     follow_curve=True,
 )
-_COMING_TO_REST = replace(_STANDING, estimate_load=False)
-_LIFTING_OFF = replace(_COMING_TO_REST, unload_legs=(Leg.REAR,), unloading=UNLOADING)
 _STEPPING = replace(_STANCE, clock=Clock.TIME, follow_curve=True)
 
 TROT_PHASES: Phases = {
@@ -74,16 +78,7 @@ TROT_PHASES: Phases = {
     Phase.DS: replace(_DOUBLE, trim_momentum=True),
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,
-    "DS_ar^s": _STANDING,
-    "DS_br^ws": _COMING_TO_REST,
-    "DS_ar^sw": _LIFTING_OFF,
-    "DS_bl^ww": _LIFTING_OFF,
-    "DS_al^sf": _LIFTING_OFF,
-    "SS_bt^sf": _STEPPING,
-    "DS_br^sf": _COMING_TO_REST,
-    "DS_al^sb": replace(_LIFTING_OFF, unload_legs=(Leg.FRONT,)),
-    "SS_bt^sb": _STEPPING,
-    "DS_br^sb": _COMING_TO_REST,
+    **standing_phases(_STANDING, _STEPPING, UNLOADING),
 }
 """Standing, walking and running trot. Nodes of other gaits find the entry of their phase."""
 

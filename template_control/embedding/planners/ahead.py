@@ -91,6 +91,10 @@ class AheadOptions(Checked):
 FREE_AHEAD = AheadOptions(ease=0.5, dearest=20.0)
 """Of a floating base: the sideways motion is that of steps near a gait."""
 
+SOLE_AHEAD = replace(FREE_AHEAD, pace=0.09)
+"""Of a robot on soles. Its VLO comes out a little off its plan's: of a gait that is further away
+no plan was cheap in the second step, and the search led G1 to a slow one and to a fall."""
+
 
 class AheadPlanner(Planner):
     """Planner of several steps at once towards a gait of the family by speed.

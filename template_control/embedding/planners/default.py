@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from template_control.checks.checked import checked
-from template_control.checks.ranges import NotNegative
 from template_control.embedding.planners.ahead import AheadPlanner
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner, Planners
@@ -66,10 +65,10 @@ def first_speed(route: Route) -> float:
     return route.walking_speed if isinstance(route, SpeedRoute) else float(route.start[0])
 
 
-def _standing(route: Route, half_length: float) -> Planners:
+def _standing(route: Route, given: StandingOptions) -> Planners:
     """The planners of a scenario that stands, or a route that begins so; others need none.
 
-    ``half_length`` is of the template legs' feet [m].
+    ``given`` are the options, but for the height.
     """
     p, family = route.parameters, None
     if isinstance(route, SpeedRoute) and STAND in route.gaits:
@@ -81,14 +80,12 @@ def _standing(route: Route, half_length: float) -> Planners:
         height = float(route.start[1])
     else:
         return {}
-    unit = Scale.of(p).length
-    options = StandingOptions(height=height / unit, half_length=half_length / unit)
-    return standing_planners(p, options, family)
+    return standing_planners(p, replace(given, height=height / Scale.of(p).length), family)
 
 
 @checked
 def default_planners(
-    route: Route, walking: Planner | None = None, *, half_length: NotNegative = 0.0
+    route: Route, walking: Planner | None = None, *, standing: StandingOptions | None = None
 ) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 
@@ -99,8 +96,8 @@ def default_planners(
     Args:
         route: whose template and first target they are for.
         walking: plans the walking steps instead of the library's own planner.
-        half_length: by how far ahead of its middle a template leg's foot bears, and behind [m], as
-            the robot says; 0: it is a point.
+        standing: the robot's, for the reference template (:func:`.standing_options`); the height
+            is the route's. None: of feet that are points.
 
     Raises:
         GaitError: if there is no gait at the speed the route begins with.
@@ -113,16 +110,16 @@ def default_planners(
 
     if route.section == APEX:
         return {StrideKind.RUN: RunningPlanner(runs(speed))}
-    standing = _standing(route, half_length)
+    stands = _standing(route, standing or StandingOptions())
     if route.section == REST and not isinstance(route, ScenarioRoute | SpeedRoute):
-        return standing
+        return stands
     any_speed = isinstance(route, SpeedRoute) or (
         isinstance(route, ScenarioRoute) and route.pushes_off
     )
     if any_speed:
         walk = walking or AheadPlanner(p, speed=speed)
         if not (isinstance(route, SpeedRoute) and "run" in route.gaits):
-            return {walk.gait.stride: walk, **standing}
+            return {walk.gait.stride: walk, **stands}
     else:
         walk = walking or LqrPlanner(walking_gait(p, speed))
 
@@ -139,5 +136,5 @@ def default_planners(
         StrideKind.RUN: run,
         StrideKind.RUN_TO_WALK: TransitionPlanner(StrideKind.RUN_TO_WALK, run, walks, RUN_TO_WALK),
         **recovery_planners(walk, _RECOVERY),
-        **standing,
+        **stands,
     }

@@ -181,6 +181,10 @@ class Planner(Protocol):
         """The least cost that the planner knows from section state ``z`` (n,) on; nan: none."""
         return nan
 
+    def next_gait(self) -> Gait | None:
+        """The gait that the planned stride leads to, where :attr:`gait` is none with steps."""
+        return None
+
     def on_slope(self, slope: float) -> SlipParameters | None:
         """Plan for ground that rises from now on; :meth:`reset` makes it level.
 

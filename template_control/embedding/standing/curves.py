@@ -22,7 +22,7 @@ from template_control.embedding.com_path import TERMS, Quintic, quintics
 from template_control.robot.start import Pose
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.scenario import STAND_HEIGHT
-from template_control.slip.similarity import LENGTH, Scale, scaled, tuned
+from template_control.slip.similarity import LENGTH, TIME, Scale, scaled, tuned
 from template_control.warm_up import Part
 
 Array = NDArray[np.float64]
@@ -44,12 +44,15 @@ class StandingOptions(Checked):
         reach: longest way from a foot on the ground to the CoM, over l0.
         half_length: by how far ahead of its middle, and behind, a foot bears the centre of pressure
             [m]; 0: it is a point.
+        shift: shortest time from rest to a liftoff [s]: until then the CoM of a robot on two soles
+            has to be over the one that stays.
     """
 
     height: Positive = tuned(STAND_HEIGHT, LENGTH)
     slack: NotNegative = tuned(0.005, LENGTH)
     reach: Positive = tuned(1.025)
     half_length: NotNegative = tuned(0.0, LENGTH)
+    shift: NotNegative = tuned(0.0, TIME)
 
 
 @checked

@@ -129,6 +129,11 @@ class PassTable:
         first = float(np.clip(wanted, self._speeds[0], self._speeds[-1]))
         return [first, *sorted(inside, key=lambda v: abs(v - wanted))]
 
+    def nearest(self, speed: float) -> Gait:
+        """The gait whose speed at VLO is nearest to another one [m/s]."""
+        slowest, fastest = self.family.speeds
+        return self.family.gait(min(max(speed, slowest), fastest))
+
     def at(self, speed: float) -> SingleSupportPass:
         """The pass with a speed at VLO [m/s]."""
         if speed not in self._known:
@@ -136,9 +141,9 @@ class PassTable:
         return self._known[speed]
 
     def _made(self, speed: float) -> SingleSupportPass:
-        p, (slowest, fastest) = self.parameters, self.family.speeds
+        p, slowest = self.parameters, self.family.speeds[0]
         if speed >= slowest:
-            gait = self.family.gait(min(speed, fastest))
+            gait = self.nearest(speed)
             return SingleSupportPass(gait.state, float(gait.controls[Slot.K_SD]))
         own = float(self.family.gait(slowest).controls[Slot.K_SD])
         stiff = _SLOW_STIFFNESS * p.mass * p.gravity / p.rest_length

@@ -115,6 +115,7 @@ class CurvePlanner(Planner):
         self._passes, self._walk = passes, walk
         self._beat = BEAT * passes.scale.time
         self._launch = _LAUNCH * passes.parameters.rest_length
+        self._speed = 0.0  # at VLO, to which the last curve leads [m/s]
         stand = StandingGait.of(passes.parameters, passes.options)
         self.gait: Gait = stand if walk is None else walk.gait
 
@@ -147,6 +148,10 @@ class CurvePlanner(Planner):
         step, over = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS])
         return self._step(step, over.vlo, over.stiffness)
 
+    def next_gait(self) -> Gait | None:
+        """See :meth:`~.planner.Planner.next_gait`."""
+        return None if self._rests else self._passes.nearest(self._speed)
+
     def decide_rest(self, context: RestContext) -> Decision | None:
         """See :meth:`~.planner.Planner.decide_rest`."""
         return None if self._walk is None else self._walk.decide_rest(context)
@@ -166,7 +171,7 @@ class CurvePlanner(Planner):
         u[Slot.K_SD] = over.stiffness
         first = timed_stride(AUTOMATON, node, found.pieces, toes)
         second = self._passes.arriving(first.node, liftoff[:, :2].T.ravel(), u, first.toes)
-        speed = float(over.vlo[0])
+        speed = self._speed = float(over.vlo[0])
         accepted = None if speed == decision.predicted[0] else speed
         leads = found.excess <= self._launch
         chosen = replace(decision, controls=u, feasible=feet.fits(found), lasting=leads)

@@ -33,6 +33,7 @@ _SHARE = 0.8
 # Excess that a second more or less counts as [m/s]. Near its end a curve that is planned anew had
 # better miss it by millimetres than swing back once more.
 _PACE = 0.01
+_STILL = 0.01  # over sqrt(g l0): a CoM that is faster does not begin at rest
 _DURATIONS = np.geomspace(0.03, 1.6, 14)  # that are tried [s]
 UNLOADING = 0.06
 """Time over which a foot that is to lift off gives up its load [s, of the reference template]."""
@@ -44,7 +45,8 @@ class OverFeet(BetweenFeet):
 
     def to_rest(self, start: Array, lands: bool = False) -> Found:
         """See :meth:`.BetweenFeet.to_rest`."""
-        return self._best(start, self.at_rest(self.place(PLACE))[None], lands, 0.0, np.inf)[0]
+        rest = self.at_rest(self.place(PLACE))[None]
+        return self._best(start, rest, lands, 0.0, (0.0, np.inf))[0]
 
     def to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
         """See :meth:`.BetweenFeet.to_liftoff`; the rear foot has no load left at the end."""
@@ -53,14 +55,17 @@ class OverFeet(BetweenFeet):
         # Once the capture point is past the foot that stays, the CoM is not thrown back again.
         passes = speed > 0.0 and x + speed / rate > self.toes[1]
         longest = _PASSING * max(self.toes[1] - x, 0.0) / speed if passes else np.inf
-        return self._best(start, ends, lands, UNLOADING, longest)
+        moves = lands or speed > _STILL * self.parameters.speed_unit
+        shortest = 0.0 if moves else self.options.shift
+        return self._best(start, ends, lands, UNLOADING, (shortest, longest))
 
     def _best(
-        self, start: Array, ends: Array, lands: bool, unloading: float, longest: float
+        self, start: Array, ends: Array, lands: bool, unloading: float, within: tuple[float, float]
     ) -> tuple[Found, int]:
         """The best curve to one of several ends, and the end's number.
 
-        It takes at most ``longest`` [s]; ``unloading`` is of the reference template [s].
+        It takes from ``within[0]`` to ``within[1]`` [s]; ``unloading`` is of the reference
+        template [s].
         """
         unit, rules = Scale.of(self.parameters).time, self._rules
         middle, half = self.place(PLACE), _SHARE * self.options.half_length
@@ -80,7 +85,9 @@ class OverFeet(BetweenFeet):
         )
         p, rates = np.empty(_PIECES), np.empty(_PIECES)
         durations = _DURATIONS * unit
+        shortest, longest = within
         durations = durations[durations <= max(longest, durations[0])]
+        durations = np.unique(np.maximum(durations, shortest))
         cost, excess, end, i = best_pressure(start, ends, durations, ground, lands, p, rates)
         curve = _curve(start, ends[end], float(durations[i]), p, rates)
         return Found(curve, excess, cost), end

@@ -27,7 +27,7 @@ from template_control.slip.scenario.scenario_route import ScenarioRoute
 P = tc.SlipParameters()
 OPTIONS = StandingOptions()
 FAMILY = GaitsBySpeed(partial(walking_gait, P), speed_range(P))
-BODY = np.array([P.mass, P.gravity, 0.0, P.rest_length, 0.0])
+BODY = np.array([P.mass, P.gravity, 0.0, P.rest_length, 0.0, 0.0])
 STAND, WALK = Segment("stand", duration=1.0), Segment("walk", speed=0.8, duration=2.0)
 
 

@@ -1,0 +1,171 @@
+"""Lateral motion over feet that bear a moment: as the gait's, or by a plan of their pressure.
+
+Where both feet stand and the CoM follows a curve in time, and in a step from a stand, the lateral
+motion is planned as the curve's x is: by the quadratic program of :mod:`~..standing.pressure`
+through the phases that are to come, each with the feet that stand in it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from template_control.compiled import compiled
+from template_control.embedding.standing.pressure import ARRIVE, SMOOTH, Pieces, pressure
+from template_control.slip.automaton.vocabulary import Event
+
+Array = NDArray[np.float64]
+
+_SIDE_GAIN = 2.0  # by which the centre of pressure moves beyond the capture point's error
+_SIDE_SHARE = 0.7  # of half a sole's width, by which it moves at most
+_SIDE = 1
+_VLO, _TOUCHDOWN, _REST = int(Event.VLO), int(Event.TOUCHDOWN), int(Event.REST)
+_REAR_LIFTOFF, _FRONT_LIFTOFF = int(Event.REAR_LIFTOFF), int(Event.FRONT_LIFTOFF)
+_REAR, _FRONT = 0, 1
+_STAGES = 3  # both feet stand, one does, both do
+_PIECES = 8  # of each
+_SOLE = 0.8  # share of a foot's width that a plan uses, as the cones do
+_LOWEST = 0.1  # of the legs' length: the least height that the law is used with
+# For the reference template.
+_AGAIN = 0.01  # a plan is made anew after this time [s]
+_REST_IN = 0.5  # time in which the CoM comes to rest over both feet, at the soonest [s]
+
+
+@compiled
+def sway(t: Any, r: Any, want: Any) -> None:
+    """Write how a robot on soles, or on pairs of feet, is to sway.
+
+    ``t`` is of ``TICK``, ``r`` of ``ROBOT_DATA``, ``want`` of ``REFERENCES``. Along a planner's
+    curve the centre of pressure is planned:
+
+        s' = (z'' + g) / h (y - p).
+
+    Else as the template, in single stance held to its gait. The capture point xi = y + a s / w
+    diverges with w = sqrt(a g / h), s the lateral speed with the momentum, a the sway ratio. In the
+    gait's periodic motion it is at X*_y + X*_v / w from the stance foot at the section. The centre
+    of pressure moves beyond it where it is off:
+
+        s' = sum_i f_i (y - y_i) / (m h) - (z'' + g) / h clip(k e),
+        e = xi - y_i - (X*_y + X*_v / w) exp(w t), t since the section, or -t until it.
+    """
+    mode, forces, height = t.mode, t.path.forces, _height(t, r)
+    if mode.follow_curve:
+        want.sway = (want.com[5] + r.gravity) / height * (r.com[_SIDE] - _pressure(t, r))
+        return
+    t.lateral.pressure = np.nan
+    want.sway = 0.0
+    for leg in range(mode.stances):
+        foot = t.feet.roles[leg]
+        away = r.com[_SIDE] - r.foot_position[foot, _SIDE]
+        want.sway += forces[leg, 1] * away / (r.mass * height)
+    if mode.stances != 1:
+        return
+    lateral, foot, rate = t.lateral, t.feet.roles[0], np.sqrt(r.sway * r.gravity / height)
+    since = t.time - lateral.section_began
+    if mode.next_touchdown_leg < 0:
+        since = t.path.time - t.path.event_times[_VLO]
+    point = r.com[_SIDE] + side_speed(t, r) / rate - r.foot_position[foot, _SIDE]
+    wanted = (lateral.cycle[0] + lateral.cycle[1] / rate) * np.exp(rate * since)
+    if not np.isfinite(wanted):
+        return  # the path comes to no section
+    bound = _SIDE_SHARE * lateral.half_width
+    moved = min(max(_SIDE_GAIN * (point - wanted), -bound), bound)
+    want.sway -= (want.com[5] + r.gravity) / height * moved
+
+
+@compiled
+def _height(t: Any, r: Any) -> float:
+    """Height of the CoM over the ground [m]; of a robot that falls it may be below its feet."""
+    return max(t.sensed.state[1], _LOWEST * r.leg_length)
+
+
+@compiled
+def _pressure(t: Any, r: Any) -> float:
+    """y of the centre of pressure for now [m], planned anew from time to time."""
+    lateral = t.lateral
+    if np.isnan(lateral.pressure) or t.time - lateral.pressure_at >= _AGAIN * lateral.unit:
+        lateral.pressure, lateral.pressure_at = _planned(t, r), t.time
+    return lateral.pressure
+
+
+@compiled
+def closing_foothold(lateral: Any, stance: float, foot: float) -> float:
+    """y of the foothold of a stride that ends at rest [m]: as far away as the gait's.
+
+    ``lateral`` is of ``LATERAL``; ``stance`` and ``foot`` are y of the foot that stands and of the
+    other one [m].
+    """
+    return stance + np.copysign(lateral.step, foot - stance)
+
+
+@compiled
+def _planned(t: Any, r: Any) -> float:
+    """y of the first centre of pressure [m] of the plan to the end of the stride.
+
+    Both feet stand until a liftoff, if there is one; then one does, until the touchdown or the
+    section; then both. At VLO the CoM is to move as in the gait's periodic motion, at rest it is
+    to be in the middle of the feet.
+    """
+    mode, path, lateral = t.mode, t.path, t.lateral
+    due = np.maximum(path.event_times - path.time, 0.0)
+    lifts, ends = min(due[_REAR_LIFTOFF], due[_FRONT_LIFTOFF]), min(due[_REST], due[_VLO])
+    stays = t.feet.roles[_REAR]
+    if mode.stances > 1 and due[_REAR_LIFTOFF] <= due[_FRONT_LIFTOFF]:
+        stays = t.feet.roles[_FRONT]
+    here, half = r.foot_position[stays, _SIDE], _SOLE * lateral.half_width
+    other = r.foot_position[1 - stays, _SIDE]
+    steps = mode.stances == 1 or lifts < ends
+    lands = due[_TOUCHDOWN] if steps else 0.0
+    rests = due[_REST] <= due[_VLO]
+    if steps and rests:
+        other = closing_foothold(lateral, here, other)
+    middle = 0.5 * (here + other)
+    lasts = np.zeros(_STAGES)
+    if mode.stances > 1 and steps:
+        lasts[0] = lifts
+    if steps:
+        lasts[1] = max(min(lands, ends) - lasts[0], 0.0)
+    if rests:
+        lasts[2] = max(ends - lasts[0] - lasts[1], _REST_IN * lateral.unit)
+    n = 0
+    for stage in range(_STAGES):
+        n += _PIECES if lasts[stage] > 0.0 else 0
+    found = np.empty(n)
+    pieces = Pieces(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
+    rate, at = np.sqrt(r.sway * r.gravity / _height(t, r)), 0
+    for stage in range(_STAGES):
+        if lasts[stage] <= 0.0:
+            continue
+        for k in range(_PIECES):
+            pieces.duration[at], pieces.rate[at] = lasts[stage] / _PIECES, rate
+            # The foot that lifts off gives up its load before.
+            load = 1.0 if stage == 2 else 0.0
+            if stage == 0:
+                load = min((_PIECES - k - 1) * lasts[0] / _PIECES / mode.unloading, 1.0)
+            away = load * (other - here)
+            pieces.low[at] = here + min(away, 0.0) - half
+            pieces.high[at] = here + max(away, 0.0) + half
+            pieces.wish[at] = middle if stage == 2 else here
+            at += 1
+    start, end = np.empty(2), np.zeros(2)
+    start[0], start[1], end[0] = r.com[_SIDE], side_speed(t, r), middle
+    if not rests:
+        end[0], end[1] = here + lateral.cycle[0], lateral.cycle[1]
+    prices = (SMOOTH * lateral.unit, ARRIVE * lateral.unit)
+    pressure(pieces, start, end, lateral.pressure, prices, found)
+    return found[0]
+
+
+@compiled
+def side_speed(t: Any, r: Any) -> float:
+    """Speed of a floating-base robot's CoM to the left, as the phase has the forward one [m/s].
+
+    ``t`` and ``r`` are of ``TICK`` and ``ROBOT_DATA``.
+    """
+    speed = r.com_velocity[_SIDE]
+    if t.mode.momentum_speed:
+        speed -= r.momentum[0] / (r.mass * t.sensed.state[1])
+        speed *= r.sway
+    return speed
