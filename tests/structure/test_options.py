@@ -3,6 +3,7 @@
 import ast
 import re
 from dataclasses import fields, is_dataclass
+from functools import cache
 from importlib import import_module
 
 import pytest
@@ -25,6 +26,7 @@ def options():
     return sorted((kind for kind in found if issubclass(kind, Checked)), key=lambda k: k.__name__)
 
 
+@cache
 def set_somewhere():
     """Names that a call or a dictionary sets, or a line of TOML, or a key with dots."""
     found = set()
@@ -58,13 +60,10 @@ def named(text):
     return {*re.findall(r"\b(\w+) ?=", text), *(n for key in dotted for n in key.split("."))}
 
 
-SET = set_somewhere()
-
-
 @pytest.mark.parametrize("kind", options(), ids=lambda kind: kind.__name__)
 def test_every_option_is_set_somewhere(kind):
     own = [f for f in fields(kind) if not is_dataclass(f.default_factory)]  # else its own are
-    assert not [f.name for f in own if f.name not in SET]
+    assert not [f.name for f in own if f.name not in set_somewhere()]
 
 
 def test_what_sets_an_option_is_found():

@@ -6,6 +6,7 @@ import signal
 import threading
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from functools import partial
 
@@ -15,6 +16,7 @@ from sweep_work import COUNT, P, alive, drawn, kept, logged, quietly, wait_until
 
 from template_control.errors import SweepError
 from template_control.storage import to_jsonable
+from template_control.sweep import Study, run_study
 from template_control.sweep.sweep import grid
 
 pytestmark = pytest.mark.slow  # starting a cluster and its workers takes longest
@@ -127,3 +129,12 @@ def test_a_lost_dask_cluster_ends_the_sweep_with_what_is_safe(dask, tmp_path, lo
     result = quietly(logged, items, path, dask.get_executor())
     np.testing.assert_array_equal(result.column("square"), np.arange(COUNT) ** 2)
     assert max(Counter(kept(path)).values()) == 1
+
+
+def test_a_study_is_the_same_on_dask(dask):
+    study = Study(experiment={"steps": 1}, grid={"delay": (0.0, 0.002)}, figures=("mean_speed",))
+    with ThreadPoolExecutor(1) as thread:
+        alone = run_study(study, executor=thread)
+    spread = run_study(study, executor=dask.get_executor())
+    assert spread.results == alone.results
+    assert not spread.failures
