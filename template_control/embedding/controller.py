@@ -21,7 +21,7 @@ from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.trot import default_options
 from template_control.embedding.ground import SlopingGround
 from template_control.embedding.learners.learners import Learners
-from template_control.embedding.modes import PLACED, PathClock, RobotGuards, modes
+from template_control.embedding.modes import PLACED, PathClock, RobotGuards, check_legs, modes
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Cause, Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
@@ -134,6 +134,7 @@ class EmbeddingController:
         standing = self.contacts.standing
         self.observer = StateObserver(robot, self.feet, standing, com[4:], tick["sensed"])
         self._guards = RobotGuards(self.parameters, o.guards, tick["guards"])
+        check_legs(automaton, robot)
         self._modes = modes(automaton, robot.nv, o.phases)
         for mode in self._modes.values():
             mode.tasks.check(robot)

@@ -30,6 +30,7 @@ from template_control.embedding.state import SENSED, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import FEET, SwingOptions
 from template_control.errors import ParameterError
+from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import (
@@ -79,6 +80,7 @@ class GuardOptions(Checked):
 
 
 _F, _I = np.float64, np.int64
+_OTHER_LEG = (Reset.PLACE_FRONT, Reset.SHIFT, Reset.SWAP)
 _MOST_EDGES = 8  # of a node, to other nodes
 
 GUARDS = np.dtype(
@@ -257,6 +259,18 @@ def _mode(node: Node, number: int, control: PhaseControl, nv: int, trimmed: bool
         trimmed=trimmed,
         data=data,
     )
+
+
+def check_legs(automaton: Automaton, robot: Biped) -> None:
+    """Check that a robot with one leg has gaits of the rear leg alone; a ParameterError if not."""
+    if all(robot.groups):
+        return
+    for node in automaton.nodes:
+        if node.front is not None or any(edge.reset in _OTHER_LEG for edge in node.edges):
+            raise ParameterError(
+                f"{robot.name} has one leg, and node {node.name} of the automaton wants two: give"
+                " an automaton whose gaits have the rear leg alone"
+            )
 
 
 def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:

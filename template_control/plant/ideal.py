@@ -87,7 +87,7 @@ class IdealPlant:
 
     Attributes:
         contacts: indices of the feet on the ground.
-        impacts: impulses (2, 2) [N s] on the feet at each touchdown so far.
+        impacts: impulses (n, 2) [N s] on the feet at each touchdown so far.
         pulls: touchdowns and stances that could stick only by pulling at the ground; a real
             foot would have slid or bounced.
     """
@@ -102,7 +102,8 @@ class IdealPlant:
             model.inertias[joint] = pin.Inertia(
                 scale * inertia.mass, inertia.lever, scale * inertia.inertia
             )
-        self.robot = PlanarBiped(robot.path, robot.urdf, model, robot.feet, robot.foot_radius)
+        same = robot.feet, robot.foot_radius
+        self.robot = PlanarBiped(robot.path, robot.urdf, model, *same, groups=robot.groups)
         self.contacts: tuple[int, ...] = ()
         self.impacts: list[Array] = []
         self.pulls = 0
@@ -111,7 +112,8 @@ class IdealPlant:
         self._drive = np.zeros(robot.nv)
         self._push = 0.0
         self._feet = RollingFeet(self.robot, options.ground)
-        self._impulse = np.zeros((2, 2))
+        self._nothing = np.zeros((len(robot.feet), 2))
+        self._impulse = self._nothing.copy()
         check_damping(self.robot, options.time_step)
         self._rubbing = np.flatnonzero(robot.joint_friction) + PLANAR_DOF
         self._trunk_corners = tuple(trunk_corners(self.robot).T.tolist())
@@ -135,7 +137,7 @@ class IdealPlant:
         self._impulse[:] = 0.0
         self._see(self._q, self._v)
         low = self._feet.gaps() < 1e-6
-        self._land(low & (self.robot.foot_velocity[:, 1] <= 1e-9))
+        self._land(low & (self.robot.contact_velocity[:, 1] <= 1e-9))
         self._impulse[:] = 0.0
         self.impacts.clear()
 
@@ -144,7 +146,7 @@ class IdealPlant:
         q[:], v[:] = self._q, self._v
 
     def contact_forces(self, out: Array) -> None:
-        """Write the ground's force on each foot (2, 2) [N], x and y, into ``out``.
+        """Write the ground's force on each foot (n, 2) [N], x and y, into ``out``.
 
         Averages over the last time step, impacts included.
         """
@@ -194,7 +196,7 @@ class IdealPlant:
         rows, gamma = self._feet.rows()
         a, _ = solve(r.mass_matrix, self._right(self._q), rows, gamma, self.contacts)
         units = np.eye(r.nv)[joints]
-        none = np.zeros((2, 2))
+        none = self._nothing
         answer = [solve(r.mass_matrix, unit, rows, none, self.contacts)[0] for unit in units]
         per_torque = np.array(answer)[:, joints]
         ends = self._v[joints] / h + a[joints]
@@ -238,13 +240,13 @@ class IdealPlant:
         return right
 
     def _rates(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Acceleration (nv,) and forces (2, 2) along and out of the ground, ``contacts`` held."""
+        """Acceleration (nv,) and forces (n, 2) along and out of the ground, ``contacts`` held."""
         r = self.robot
         self._see(q, v)
         return solve(r.mass_matrix, self._right(q), *self._feet.rows(), self.contacts)
 
     def _flow(self, h: float, begin: tuple[Array, Array]) -> tuple[Array, Array, Array]:
-        """State after ``h`` seconds with the present contacts, and their impulse (2, 2).
+        """State after ``h`` seconds with the present contacts, and their impulse (n, 2).
 
         ``begin`` holds the rates at the beginning.
         """
@@ -292,19 +294,19 @@ class IdealPlant:
         weight, gaps = self.robot.mass * self.robot.gravity, self._feet.gaps()
         return min(
             force[i, 1] / weight + _PULL if i in self.contacts else float(gaps[i]) + _DEPTH
-            for i in range(2)
+            for i in range(len(gaps))
         )
 
     def _land(self, feet: NDArray[np.bool_]) -> None:
-        """Plastic impact of ``feet`` (2,) with the ground; the other one may be released."""
-        landing = tuple(i for i in range(2) if feet[i] and i not in self.contacts)
+        """Plastic impact of ``feet`` (n,) with the ground; another one may be released."""
+        landing = tuple(i for i in range(len(feet)) if feet[i] and i not in self.contacts)
         if not landing:
             return
         r = self.robot
         for i in landing:
             self._feet.meet(i, self._q)
         touching = tuple(sorted((*self.contacts, *landing)))
-        momentum, zero = r.mass_matrix @ self._v, np.zeros((2, 2))
+        momentum, zero = r.mass_matrix @ self._v, self._nothing
         rows, _ = self._feet.rows()
         held, v, impulse, clean = pressing(r.mass_matrix, momentum, rows, zero, touching)
         self.pulls += not clean
@@ -315,7 +317,7 @@ class IdealPlant:
         impulse = self._feet.in_world(impulse)
         self._impulse += impulse
         self.impacts.append(impulse)
-        self._commit(self._q, self._v, np.zeros((2, 2)))
+        self._commit(self._q, self._v, self._nothing)
 
     def _commit(self, q: Array, v: Array, impulse: Array) -> None:
         """Take over (q, v), projected onto the contacts; the robot's update is at it."""
@@ -323,7 +325,7 @@ class IdealPlant:
         self._impulse += impulse
         self._see(q, v)
         zero = np.zeros(r.nv)
-        error = np.zeros((2, 2))
+        error = self._nothing.copy()
         for i in self.contacts:
             error[i] = self._feet.errors(i, q)
         moved = np.abs(error).max() > _DRIFT
@@ -334,6 +336,6 @@ class IdealPlant:
         slip = rows[list(self.contacts)] @ v
         if slip.size and np.abs(slip).max() > _DRIFT:
             momentum = r.mass_matrix @ v
-            v, _ = solve(r.mass_matrix, momentum, rows, np.zeros((2, 2)), self.contacts)
+            v, _ = solve(r.mass_matrix, momentum, rows, self._nothing, self.contacts)
             self._see(q, v)
         self._q, self._v = q, v

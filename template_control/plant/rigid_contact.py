@@ -37,11 +37,11 @@ def solve(
 ) -> tuple[Array, Array]:
     """Solve the system with some of the contacts held.
 
-    ``right`` is (nv,); ``jacobian`` (2, 2, nv) and ``gamma`` (2, 2) have rows x and y of either
-    contact. Returns x (nv,), and f (2, 2), zero for contacts that are not held; a LinAlgError if
+    ``right`` is (nv,); ``jacobian`` (n, 2, nv) and ``gamma`` (n, 2) have rows x and y of each
+    contact. Returns x (nv,), and f (n, 2), zero for contacts that are not held; a LinAlgError if
     the held contacts' rows depend on each other.
     """
-    held = 0 in pressed, 1 in pressed
+    held = tuple(i in pressed for i in range(len(gamma)))
     determined, x, force = _solution(mass_matrix, right, jacobian, gamma, held)
     if not determined:
         raise np.linalg.LinAlgError("the contacts' rows depend on each other")
@@ -50,17 +50,17 @@ def solve(
 
 @compiled
 def _solution(
-    mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, held: tuple[bool, bool]
+    mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, held: tuple[bool, ...]
 ) -> tuple[bool, Array, Array]:
-    """As :func:`solve`; ``held`` says of either contact whether it is.
+    """As :func:`solve`; ``held`` says of each contact whether it is.
 
     With A = J M^-1 J^T: A f = -gamma - J M^-1 right, and x = M^-1 (right + J^T f). The first result
     is whether the contacts' rows determine f.
     """
     # Number by number: Numba compiles operations on whole arrays for seconds.
-    nv, count = right.shape[0], 0
-    rows, known = np.empty((4, nv)), np.empty((4, 1))
-    for i in range(2):
+    nv, contacts, count = right.shape[0], gamma.shape[0], 0
+    rows, known = np.empty((2 * contacts, nv)), np.empty((2 * contacts, 1))
+    for i in range(contacts):
         if held[i]:
             for axis in range(2):
                 known[count, 0] = -gamma[i, axis]
@@ -89,12 +89,12 @@ def _solution(
     # What is not finite has no solution, and is no fault of the contacts.
     determined = cholesky(gram, count) or not finite
     solve_cholesky(gram, count, known)
-    x, force, row = np.empty(nv), np.zeros((2, 2)), 0
+    x, force, row = np.empty(nv), np.zeros((contacts, 2)), 0
     for k in range(nv):
         x[k] = columns[k, 0]
         for other in range(count):
             x[k] += columns[k, 1 + other] * known[other, 0]
-    for i in range(2):
+    for i in range(contacts):
         if held[i]:
             for axis in range(2):
                 force[i, axis] = known[row, 0]
@@ -141,16 +141,17 @@ class RollingFeet:
     def __init__(self, robot: PlanarBiped, terrain: Terrain) -> None:
         self._robot = robot
         self._terrain = terrain
-        self._axes = np.tile(np.eye(2), (2, 1, 1))  # by foot: along its plane, and out of it
-        self._anchor = np.zeros((2, 2))  # where each foot holds, along both axes
+        feet = len(robot.feet)
+        self._axes = np.tile(np.eye(2), (feet, 1, 1))  # by foot: along its plane, and out of it
+        self._anchor = np.zeros((feet, 2))  # where each foot holds, along both axes
 
     def gaps(self) -> Array:
-        """(2,) distance of each foot from the ground, negative where it is inside [m]."""
+        """(n,) distance of each foot from the ground, negative where it is inside [m]."""
         r = self._robot
         if len(self._terrain.points) == 1:
-            return np.array(r.foot_position[:, 1])
+            return np.array(r.contact_position[:, 1])
         radius = r.foot_radius
-        found = (self._terrain.closest(x, y + radius) for x, y in r.foot_position.tolist())
+        found = (self._terrain.closest(x, y + radius) for x, y in r.contact_position.tolist())
         return np.array([closest.distance - radius for closest in found])
 
     def meet(self, foot: int, q: Array) -> None:
@@ -161,13 +162,13 @@ class RollingFeet:
         self._anchor[foot] = self._held(foot, q) - (0.0, closest.distance)
 
     def rows(self) -> tuple[Array, Array]:
-        """Jacobians (2, 2, nv) of the material points that touch, and their dJ/dt v (2, 2) [m/s^2].
+        """Jacobians (n, 2, nv) of the material points that touch, and their dJ/dt v (n, 2) [m/s^2].
 
         Rows are along and out of the plane of each foot.
         """
         r = self._robot
         found: tuple[Array, Array] = _rows(
-            self._axes, r.foot_radius, r.foot_jacobian, r.foot_turning, r.foot_bias
+            self._axes, r.foot_radius, r.contact_jacobian, r.foot_turning, r.contact_bias
         )
         return found
 
@@ -176,12 +177,12 @@ class RollingFeet:
         return self._held(foot, q) - (0.0, self._robot.foot_radius) - self._anchor[foot]
 
     def in_world(self, force: Array) -> Array:
-        """(2, 2) x and y of what is given (2, 2) along and out of each foot's plane."""
+        """(n, 2) x and y of what is given (n, 2) along and out of each foot's plane."""
         return np.einsum("fi,fij->fj", force, self._axes)
 
     def _centre(self, foot: int) -> Array:
         r = self._robot
-        return np.asarray(r.foot_position[foot] + (0.0, r.foot_radius))
+        return np.asarray(r.contact_position[foot] + (0.0, r.foot_radius))
 
     def _held(self, foot: int, q: Array) -> Array:
         """(2,) a sphere's centre along its plane, less what it rolled, and out of it [m]."""
@@ -196,12 +197,12 @@ def _rows(
 ) -> tuple[Array, Array]:
     """Rows as :meth:`RollingFeet.rows` returns them.
 
-    ``axes`` (2, 2, 2) are along and out of each foot's plane; ``lowest`` (2, 2, nv) is the Jacobian
-    of each sphere's lowest point, ``turning`` (2, nv) of its angle, and ``bias`` (2, 2) the point's
+    ``axes`` (n, 2, 2) are along and out of each foot's plane; ``lowest`` (n, 2, nv) is the Jacobian
+    of each sphere's lowest point, ``turning`` (n, nv) of its angle, and ``bias`` (n, 2) the point's
     dJ/dt v.
     """
-    jacobian, rates = np.empty_like(lowest), np.empty((2, 2))
-    for foot in range(2):
+    jacobian, rates = np.empty_like(lowest), np.empty_like(bias)
+    for foot in range(len(axes)):
         # From the sphere's lowest point, which is the model's, to the one that touches.
         x = radius * (1.0 - axes[foot, 1, 1])
         y = radius * axes[foot, 1, 0]

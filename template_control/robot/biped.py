@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -31,9 +31,25 @@ Array = NDArray[np.float64]
 SINGLE = ((0,), (1,))
 """Groups of a biped with point feet: each contact is a foot."""
 
+MONOPOD = ((0,), ())
+"""Groups of a robot with one leg: the front leg of the template has no contact."""
+
 _BENT = np.array([-0.4, 0.8, -0.4])  # of hip, knee and ankle [rad]
 _KNEE = 1  # place among the hinges of a leg
 _SAGITTAL = {2: 1, 3: UP}  # by directions: from forward to up
+
+
+def leg_means(values: Array, groups: Sequence[Sequence[int]], axis: int = 0) -> Array:
+    """Means over the contacts of each template leg; NaN of a leg without any.
+
+    Args:
+        values: of each contact along ``axis``, which the legs take the place of.
+        groups: contacts of each template leg.
+        axis: of the contacts.
+    """
+    missing = np.full_like(values.take(0, axis), np.nan)
+    means = [values.take(group, axis).mean(axis) if group else missing for group in groups]
+    return np.stack(means, axis)
 
 
 class Biped(Robot):
@@ -42,7 +58,8 @@ class Biped(Robot):
     It touches the ground at *contacts*: the lowest points of its foot spheres; or patches, the
     soles of flat feet, whose points are their toes. A leg of the template is a group of contacts,
     and its foot is their mean. A biped has two groups of one; of a quadruped that trots either
-    diagonal pair is a virtual leg (Raibert).
+    diagonal pair is a virtual leg (Raibert). A monopod's second group is empty: its
+    gaits have one leg.
 
     Sagittal quantities have two entries, x forward and y up: of a planar robot in the world, of a
     free one in its heading frame.
@@ -228,7 +245,7 @@ class Biped(Robot):
         if self.patches:
             return min(float(p.half_sides[axis] - abs(p.centre[axis])) for p in self.patches)
         places = self.spread[:, axis]
-        return 0.5 * min(float(np.ptp(places[list(group)])) for group in self.groups)
+        return 0.5 * min(float(np.ptp(places[list(group)])) for group in self.groups if group)
 
     @property
     def foot_jacobian(self) -> Array:
@@ -244,7 +261,7 @@ class Biped(Robot):
         """(2, ...) means over the groups of contacts; views of contacts that are feet."""
         if self.groups == SINGLE:
             return values
-        return np.array([values[list(group)].mean(axis=0) for group in self.groups])
+        return leg_means(values, self.groups)
 
     def changed(
         self, gravity: float | None = None, masses: Mapping[str, float] | None = None

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import RobotError
-from template_control.robot.biped import Biped
+from template_control.robot.biped import MONOPOD, SINGLE, Biped
 from template_control.robot.planarise import planarise
 from template_control.robot.requirements import (
     add_feet,
@@ -67,7 +67,7 @@ class PlanarBiped(Biped):
         self.trunk_com = float(self.trunk_lever[2])
         self.foot_turning: Array = np.zeros((2, self.nv))
         self.foot_turning[:, _PITCH] = 1.0
-        for row, leg in zip(self.foot_turning, self.legs, strict=True):
+        for row, leg in zip(self.foot_turning, self.legs, strict=False):
             row[[PLANAR_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
         effects, com, momentum, contact, _, joints = self.arrays[1:]
         self._out = effects, com, momentum, contact, joints
@@ -93,7 +93,7 @@ class PlanarBiped(Biped):
 
         Args:
             path: the URDF file.
-            feet: the two foot links; each has one sphere as collision geometry.
+            feet: the two foot links, or a monopod's one; each has one sphere as collision geometry.
             sagittal_joints: of a 3D URDF, the hips and knees; its other joints are locked.
             locked: angles [rad] of locked joints; 0 for those not named.
             foot_radius: of spheres to be put into the feet of a 3D URDF [m].
@@ -117,7 +117,7 @@ class PlanarBiped(Biped):
             planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius, foot_offset)
         urdf = complete(path, tree)
         model = build_model(path, urdf)
-        check_planar(path, model)
+        check_planar(path, model, len(feet))
         check_guide(path, model)
         only_3d = {"foot_radius": foot_radius, "foot_offset": foot_offset, "locked": locked or None}
         for name, value in only_3d.items():
@@ -129,7 +129,8 @@ class PlanarBiped(Biped):
         check_bodies(path, tree, model, PLANAR_DOF)
         check_planar_legs(path, model, feet)
         radius = add_feet(path, urdf, model, feet)
-        return cls(path, urdf, model, (feet[0], feet[1]), radius, walk)
+        groups = MONOPOD if len(feet) == 1 else SINGLE
+        return cls(path, urdf, model, tuple(feet), radius, walk, groups=groups)
 
     def update(self, q: Array, v: Array) -> None:
         """Compute everything the controller needs at (q, v), each quantity once.

@@ -49,7 +49,7 @@ def _check_legs_apart(path: Path, feet: Sequence[str], legs: Sequence[Sequence[i
             raise RobotError(f"{path}: feet {[one, other]} hang on the same leg: name one of each")
 
 
-def check_planar(path: Path, model: pin.Model) -> None:
+def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
     """Check that base and legs are those of a planar biped with hips and knees, and have limits."""
     kinds = [joint.shortname() for joint in model.joints][1:]
     names = list(model.names)[1:]
@@ -79,10 +79,10 @@ def check_planar(path: Path, model: pin.Model) -> None:
             " joints at 0, or a slide is not along the world's x or z: give the base's joints no"
             " offset"
         )
-    if model.nv != PLANAR_DOF + 4:
+    if model.nv != PLANAR_DOF + HINGES * legs:
         raise RobotError(
             f"{path}: {model.nv - PLANAR_DOF} hinges in its legs: a hip and a knee each is what is"
-            " controlled; name these four as sagittal_joints"
+            f" controlled; name these {HINGES * legs} as sagittal_joints"
         )
     hints = {"effort": "its torque limit", "velocity": "the speed [rad/s] that it can have"}
     _check_limits(path, model, range(PLANAR_DOF + 1, model.njoints), hints)
@@ -90,8 +90,8 @@ def check_planar(path: Path, model: pin.Model) -> None:
 
 def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
     """Check that each foot has a hip and a knee of its own, and the trunk turns at the hips."""
-    if len(feet) != LEGS:
-        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two")
+    if len(feet) not in (1, LEGS):
+        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two, a monopod one")
     _check_feet(path, model, feet)
     legs = leg_joints(model, feet, PLANAR_DOF)
     _check_legs_apart(path, feet, legs)

@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 _SHORT = 0.15  # of a step of Newton's method [rad]
 _LONGEST = 0.2  # the same, of a floating-base robot [rad, m]
 _EXACT = 1e-12  # [m, rad]
-_OUTPUTS = 7  # CoM (2), trunk (1), both feet (4)
 
 
 @dataclass(frozen=True)
@@ -242,24 +241,18 @@ def _newton(
 
 def _configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: float) -> Array | None:
     """(nv,) q of a pose by steps of at most ``longest`` [rad] from bent legs; None: not found."""
-    stance, swing = pose.rear, 1 - pose.rear
+    feet, wanted = _feet(robot, pose, pose.feet)
     q[:PLANAR_DOF] = pose.com[0], 0.8 * pose.com[1], pose.pitch
 
     def error(q: Array) -> Array:
-        return np.concatenate(
-            (
-                robot.com - pose.com,
-                [q[2] - pose.pitch],
-                robot.foot_position[stance] - pose.feet[0],
-                robot.foot_position[swing] - pose.feet[1],
-            )
-        )
+        away = (robot.foot_position[feet] - wanted).ravel()
+        return np.concatenate((robot.com - pose.com, [q[2] - pose.pitch], away))
 
     def step(_: Array, error: Array) -> Array:
-        rows = np.zeros((_OUTPUTS, robot.nv))
+        rows = np.zeros((robot.nv, robot.nv))
         rows[0:2] = robot.com_jacobian
         rows[2, 2] = 1.0
-        for i, foot in enumerate((stance, swing)):
+        for i, foot in enumerate(feet):
             rows[3 + 2 * i : 5 + 2 * i] = robot.foot_jacobian[foot]
             # The lowest point's path, not that of the material point which touches there.
             rows[3 + 2 * i] += robot.foot_radius * robot.foot_turning[foot]
@@ -268,10 +261,19 @@ def _configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: float) -> 
     return _newton(robot, q, error, step, longest, 50)
 
 
+def _feet(robot: PlanarBiped, pose: Pose, values: Array) -> tuple[list[int], Array]:
+    """Feet that the robot has, rear one first, and their rows of ``values`` (2, 2)."""
+    if not robot.groups[pose.rear]:
+        raise RobotError(f"{robot.name} has no foot {pose.rear}: give the pose another rear one")
+    both = enumerate((pose.rear, 1 - pose.rear))
+    legs, feet = zip(*((leg, foot) for leg, foot in both if robot.groups[foot]), strict=True)
+    return list(feet), values[list(legs)]
+
+
 def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:
     """(nv,) v of a pose at its configuration ``q``; the robot is updated to both."""
-    stance, swing = pose.rear, 1 - pose.rear
-    rows = np.zeros((_OUTPUTS, robot.nv))
+    feet, speeds = _feet(robot, pose, pose.feet_velocity)
+    rows = np.zeros((robot.nv, robot.nv))
     rows[0:2] = robot.com_jacobian
     if pose.momentum_speed:
         rows[0] += _angular_momentum_row(robot, q) / (robot.mass * pose.com[1])
@@ -279,9 +281,8 @@ def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:
         rows[2, 2] = 1.0
     else:
         rows[2] = _angular_momentum_row(robot, q)
-    rows[3:5] = robot.foot_jacobian[stance]
-    rows[5:7] = robot.foot_jacobian[swing]
-    wanted = [*pose.com_velocity, pose.angular_momentum or 0.0, *pose.feet_velocity.ravel()]
+    rows[3:] = robot.foot_jacobian[feet].reshape(-1, robot.nv)
+    wanted = [*pose.com_velocity, pose.angular_momentum or 0.0, *speeds.ravel()]
     v = _solved(robot, rows, np.array(wanted))
     robot.update(q, v)
     return v

@@ -228,9 +228,14 @@ def gather_planar(
 
 @compiled
 def _gather_feet(s: Any) -> None:
-    """Write the means over the groups of contacts; a contact by itself is the foot, as it is."""
+    """Write the means over the groups of contacts; a contact by itself is the foot, as it is.
+
+    That of a leg without contacts stays at the origin: the template's toes are to be finite.
+    """
     for leg in range(LEGS):
         members = s.members[leg]
+        if members == 0:
+            continue
         for k in range(3):
             place, speed = 0.0, 0.0
             for i in range(members):

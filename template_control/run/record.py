@@ -18,6 +18,7 @@ from template_control import settings, storage
 from template_control.checks.checked import checked
 from template_control.errors import RecordError, TemplateControlError
 from template_control.plant.terrain import GroundStep, Terrain
+from template_control.robot.biped import leg_means
 from template_control.run.facts import Facts
 from template_control.run.tables import Quantity, quantities, to_dataframe, to_xarray
 from template_control.slip.automaton.vocabulary import Phase
@@ -167,10 +168,12 @@ class Record(Facts):
     def of_legs(self, values: Array) -> Array:
         """(T, 2, ...) means of what each contact has, over the contacts of each template leg.
 
+        NaN of a leg without any.
+
         Args:
             values: (T, n, ...) such as ``foot``.
         """
-        return np.stack([values[:, list(group)].mean(axis=1) for group in self.groups], axis=1)
+        return leg_means(values, self.groups, axis=1)
 
     @property
     def com_error(self) -> Array:

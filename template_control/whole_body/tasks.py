@@ -88,7 +88,13 @@ class CompiledTask(Checked):
                 f"robot {robot.name} has point feet, and a {type(self).__name__} asks for soles:"
                 " take tasks of point feet"
             )
-        contact, members = getattr(self, "contact", 0), min(map(len, robot.groups))
+        leg = getattr(self, "leg", None)
+        if leg is not None and not robot.groups[leg]:
+            raise ParameterError(
+                f"a {type(self).__name__} asks for the {leg.name.lower()} leg, and {robot.name} has"
+                " no such leg: leave the task out"
+            )
+        contact, members = getattr(self, "contact", 0), min(map(len, filter(None, robot.groups)))
         if contact >= members:
             raise ParameterError(
                 f"a {type(self).__name__} asks for contact {contact} of a leg, and the legs of"

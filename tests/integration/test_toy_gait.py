@@ -6,6 +6,7 @@ docs/guides/your_gait.md leads through it.
 """
 
 from dataclasses import dataclass, replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -15,7 +16,11 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import Clock, PhaseControl
 from template_control.embedding.planners.planner import Decision, Planner
 from template_control.errors import ParameterError
-from template_control.robot.library import load_robot
+from template_control.plant.bullet import PlantOptions
+from template_control.plant.ideal import IdealOptions
+from template_control.plant.mujoco import MujocoOptions
+from template_control.robot.library import load_robot, robot_path
+from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose
 from template_control.run.experiment import Experiment
 from template_control.run.record import Record
@@ -156,8 +161,8 @@ class Deadbeat(Planner):
         self.offset[:2] += 0.3 * np.clip(z - decision.predicted[:2], -0.05, 0.05)
 
 
-def hop(hops=HOPS, **options):
-    """A recorded run of the five-link robot."""
+def hop(hops=HOPS, robot="five-link", **options):
+    """A recorded run."""
     planner = Deadbeat(HEIGHT)
     start = Pose(
         com=np.array([0.0, HEIGHT]),
@@ -168,11 +173,21 @@ def hop(hops=HOPS, **options):
     o = Experiment(
         steps=hops, pose=start, controller=EmbeddingOptions(phases=PHASES, torque_scale=2.0)
     )
-    return simulate(
-        replace(
-            replace(o, **options), robot=load_robot("five-link"), planner=planner, automaton=HOPPING
-        )
-    )
+    robot = load_robot(robot) if isinstance(robot, str) else robot
+    return simulate(replace(o, **options, robot=robot, planner=planner, automaton=HOPPING))
+
+
+def monopod(folder):
+    """A planar robot with one leg, and the template of ``P``: five-link without the right one."""
+    tree = ElementTree.parse(robot_path("five-link"))
+    links = tree.getroot()
+    for part in [e for e in links if e.get("name", "").startswith("right")]:
+        links.remove(part)
+    (trunk,) = (e.find("inertial") for e in links if e.get("name") == "trunk")
+    trunk.find("mass").set("value", "72.8")
+    trunk.find("origin").set("xyz", "0 0 0.25")
+    tree.write(folder / "monopod.urdf")
+    return PlanarBiped.from_urdf(folder / "monopod.urdf", feet=("left_foot",))
 
 
 @pytest.fixture(scope="module")
@@ -224,6 +239,47 @@ def test_a_table_that_does_not_fit_the_automaton_is_refused():
 
     assert "no entry of the phases serves node F_aa^hop" in refused({Phase.SS: PHASES[Phase.SS]})
     assert "'SS_sc^hpo', which is no node" in refused({**PHASES, "SS_sc^hpo": PHASES[Phase.SS]})
+
+
+@pytest.mark.parametrize(
+    "world", [PlantOptions(), MujocoOptions(), IdealOptions()], ids=lambda o: o.kind
+)
+def test_a_monopod_hops_on_its_only_leg(tmp_path, world):
+    """The template's front leg has no contact: no gait, phase or task asks for it."""
+    robot = monopod(tmp_path)
+    assert robot.groups == ((0,), ())
+    assert np.isnan(robot.foot_jacobian[1]).all()
+    of_one_leg = {
+        phase: replace(control, tasks=tuple(t for t in control.tasks if t is not TUCKED))
+        for phase, control in PHASES.items()
+    }
+    tuning = EmbeddingOptions(phases=of_one_leg, torque_scale=2.0)
+    record = hop(6, robot, controller=tuning, world=world)
+    assert record.fall_reason == ""
+    assert record.steps == 6
+    speed, height, _ = record.section_state[3:].T
+    assert np.max(np.abs(height - HEIGHT)) < 0.02
+    assert np.max(np.abs(speed)) < 0.15
+    assert record.solved.mean() > 0.99
+    assert record.contact_force.shape[1:] == (1, 2)
+    begin, end = np.searchsorted(record.time, record.section_time[[2, -1]])
+    weight = record.contact_force[begin:end, 0, 1].mean()
+    assert weight == pytest.approx(80.0 * 9.81, rel=0.05)
+    again = Record.load(record.save(tmp_path / "hop.npz"))
+    assert again.groups == ((0,), ())
+    legs = again.of_legs(again.foot)
+    np.testing.assert_array_equal(legs[:, 0], again.foot[:, 0])
+    assert np.isnan(legs[:, 1]).all()
+    assert save_figures(again, tmp_path, dpi=40, figures=("stick_diagram", "forces"))
+
+
+def test_a_monopod_is_asked_for_its_own_leg_only(tmp_path):
+    robot = monopod(tmp_path)
+    with pytest.raises(ParameterError, match=r"node SS_av\^w of the automaton wants two"):
+        simulate(Experiment(robot))
+    front = PhaseControl(tasks=(FootTask(Leg.FRONT),), clock=Clock.TIME, estimate_load=False)
+    with pytest.raises(ParameterError, match="FootTask asks for the front leg"):
+        hop(1, robot, controller=EmbeddingOptions(phases={**PHASES, Phase.F: front}))
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.robot.biped import leg_means
 from template_control.run.record import Record
 from template_control.view.replay.playback import CARRYING, force_arrows
 from template_control.view.replay.scene import points
@@ -76,7 +77,7 @@ class Body:
             heading=float(last["heading"][0]),
             com=com,
             template=template,
-            toes=np.stack([toes[list(self.groups[leg])].mean(axis=0) for leg in (rear, 1 - rear)]),
+            toes=leg_means(toes, [self.groups[leg] for leg in (rear, 1 - rear)]),
             loaded=pushes,
             foot=foot,
             stands=stands,

@@ -262,7 +262,7 @@ class LiveScene:
 def _spread(record: Record) -> float:
     """Largest distance of a contact from the middle of its template leg's [m]."""
     foot = record.foot[0]
-    groups = (foot[list(group)] for group in record.groups)
+    groups = (foot[list(group)] for group in record.groups if group)
     return float(max(np.abs(places - places.mean(axis=0)).max() for places in groups))
 
 
