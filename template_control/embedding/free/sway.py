@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from template_control.compiled import compiled
 from template_control.embedding.standing.pressure import ARRIVE, SMOOTH, Pieces, pressure
+from template_control.embedding.standing.supports import UNLOADING
 from template_control.slip.automaton.vocabulary import Event
 
 Array = NDArray[np.float64]
@@ -30,6 +31,7 @@ _SOLE = 0.8  # share of a foot's width that a plan uses, as the cones do
 _LOWEST = 0.1  # of the legs' length: the least height that the law is used with
 # For the reference template.
 _AGAIN = 0.01  # a plan is made anew after this time [s]
+_FAR = 3.0  # an event that is further away, or never comes, is planned for here [s]
 _REST_IN = 0.5  # time in which the CoM comes to rest over both feet, at the soonest [s]
 
 
@@ -109,7 +111,7 @@ def _planned(t: Any, r: Any) -> float:
     to be in the middle of the feet.
     """
     mode, path, lateral = t.mode, t.path, t.lateral
-    due = np.maximum(path.event_times - path.time, 0.0)
+    due = np.minimum(np.maximum(path.event_times - path.time, 0.0), _FAR * lateral.unit)
     lifts, ends = min(due[_REAR_LIFTOFF], due[_FRONT_LIFTOFF]), min(due[_REST], due[_VLO])
     stays = t.feet.roles[_REAR]
     if mode.stances > 1 and due[_REAR_LIFTOFF] <= due[_FRONT_LIFTOFF]:
@@ -143,7 +145,8 @@ def _planned(t: Any, r: Any) -> float:
             # The foot that lifts off gives up its load before.
             load = 1.0 if stage == 2 else 0.0
             if stage == 0:
-                load = min((_PIECES - k - 1) * lasts[0] / _PIECES / mode.unloading, 1.0)
+                left = (_PIECES - k - 1) * lasts[0] / _PIECES
+                load = min(left / (UNLOADING * lateral.unit), 1.0)
             away = load * (other - here)
             pieces.low[at] = here + min(away, 0.0) - half
             pieces.high[at] = here + max(away, 0.0) + half
