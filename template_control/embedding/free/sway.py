@@ -28,10 +28,10 @@ _REAR, _FRONT = 0, 1
 _STAGES = 3  # both feet stand, one does, both do
 _PIECES = 8  # of each
 _SOLE = 0.8  # share of a foot's width that a plan uses, as the cones do
-_LOWEST = 0.1  # of the legs' length: the least height that the law is used with
+_LOWEST = 0.3  # of the legs' length: the least height of the CoM that is planned with
 # For the reference template.
 _AGAIN = 0.01  # a plan is made anew after this time [s]
-_FAR = 3.0  # an event that is further away, or never comes, is planned for here [s]
+_FAR = 1.6  # an event that is further away, or never comes, is planned for here [s]
 _REST_IN = 0.5  # time in which the CoM comes to rest over both feet, at the soonest [s]
 
 
