@@ -17,7 +17,7 @@ HEAVY = (
 )  # fmt: skip
 COMMANDS = (
     "walk", "run", "go", "drive", "robots", "replay", "plots", "robustness", "campaign", "study",
-    "slip", "gaits", "automaton", "keys", "reproduce",
+    "slip", "gaits", "automaton", "keys", "warm-up", "completion", "reproduce",
 )  # fmt: skip
 ROOMS = (
     "slip", "robot", "whole_body", "estimation", "embedding", "plant", "run", "robustness",
@@ -84,7 +84,7 @@ def test_help_lists_every_command_with_its_line(capfd):
         main(["--help"])
     assert stop.value.code == 0
     listed = capfd.readouterr().out.partition("COMMAND\n")[2].partition("\n\n")[0]
-    lines = re.findall(r"^    (\w+)\s+((?:.|\n {5,})+)", listed, flags=re.MULTILINE)
+    lines = re.findall(r"^    ([\w-]+)\s+((?:.|\n {5,})+)", listed, flags=re.MULTILINE)
     assert tuple(name for name, _ in lines) == COMMANDS
     assert all(len(about.split()) > 4 for _, about in lines)
 
@@ -98,7 +98,7 @@ def test_every_command_has_its_own_help(command, capfd):
     assert out.startswith(f"usage: template-control {command} ")
     assert "%%" not in out
     options = [line.split()[0] for line in out.splitlines() if line.startswith("  --")]
-    assert options
+    assert options or command in ("warm-up", "completion")
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from template_control.run.specs import GaitSpec, OwnPlanner
 COMMANDS = ("walk", "run", "go", "drive", "robustness", "campaign")
 WITHOUT_EXPERIMENT = {
     "robots", "replay", "plots", "study", "slip", "gaits", "automaton", "keys", "warm-up",
+    "completion",
     "reproduce",
 }  # fmt: skip
 KEPT_ELSEWHERE = {
