@@ -1,5 +1,8 @@
 """Errors a user can cause; each carries one line that names the culprit and the mend."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class TemplateControlError(ValueError):
     """Base of every error this library raises for bad input."""
@@ -35,3 +38,8 @@ class MissingPackageError(TemplateControlError, ImportError):
 
 class SweepError(TemplateControlError):
     """A sweep that cannot start or go on: its items, its results file or its executor."""
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """Question for the known word that is nearest to an unknown one; "" if none is near."""
+    return "".join(f" (did you mean {near}?)" for near in get_close_matches(word, known, 1))

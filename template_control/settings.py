@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from enum import Enum
+from inspect import getdoc
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -23,7 +24,7 @@ import tomli_w
 
 from template_control.checks.checked import is_default
 from template_control.checks.fitting import unaliased
-from template_control.errors import ParameterError, TemplateControlError
+from template_control.errors import ParameterError, TemplateControlError, meant
 
 T = TypeVar("T")
 
@@ -33,6 +34,8 @@ PYTHON_ONLY = {"python_only": True}
 
 _NUMBERS = re.compile(r"""\[\n((?:\ +[^\s"'\[\]{},]+,\n)+)\ *\]""")
 """A list of numbers, one a line, as ``tomli_w`` writes it: texts have quotes, and no line break."""
+_ATTRIBUTES = re.compile(r"^(?:Attributes|Args):\n((?:(?:    .*)?\n?)+)", re.MULTILINE)
+_ATTRIBUTE = re.compile(r"^    (\w+(?:, \w+)*): ((?:.|\n {8,})*)", re.MULTILINE)
 _SCALARS = {
     bool: "true or false",
     int: "a whole number",
@@ -80,7 +83,7 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
         place = f"{where}.{key}" if where else key
         name = old_keys.get(key, key)
         if name not in known:
-            raise ParameterError(f"unknown key {place}: known are {', '.join(known)}")
+            raise _unknown(place, name, known)
         if name in values:
             raise ParameterError(f"{place} is given by two keys: give {name} only")
         usual = _usual_kind(known[name])
@@ -91,6 +94,11 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
         if name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise ParameterError(f"{where or 'the table'} has no {name}: give one")
     return _made(lambda: kind(**values), kind, where)
+
+
+def _unknown(place: str, name: str, known: Iterable[str]) -> ParameterError:
+    near = meant(name, known)
+    return ParameterError(f"unknown key {place}{near}: known are {', '.join(known)}")
 
 
 def _usual_kind(f: Field[Any]) -> str | None:
@@ -131,7 +139,7 @@ def _changed(options: T, entries: _Entries, where: str) -> T:
             continue  # its owner has looked at it
         place = f"{where}.{name}" if where else name
         if name not in known:
-            raise ParameterError(f"unknown key {place}: known are {', '.join(sorted(known))}")
+            raise _unknown(place, name, sorted(known))
         if not path:
             values[name] = _value(hints[name], value, place)
     for name in known & {path[0] for path, _ in entries if len(path) > 1}:
@@ -253,18 +261,19 @@ class Leaf(NamedTuple):
     """A key of a file that holds no table.
 
     ``path`` is dotted, ``hint`` its value's type; ``default`` is that of the first kind of table
-    that has the key, None where there is none.
+    that has the key, None where there is none, and ``about`` what the docstring of its class says.
     """
 
     path: str
     hint: Any
     default: Any
+    about: str
 
 
 def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
     """The keys that a dataclass's file can have, of all kinds of tables; ``where`` is its own."""
     found: dict[str, Leaf] = {}
-    hints = get_type_hints(kind)
+    hints, abouts = get_type_hints(kind), described(kind)
     for f in fields(kind):
         if f.metadata.keys() >= PYTHON_ONLY.keys():
             continue
@@ -275,14 +284,26 @@ def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
         if tables:
             if kinds := _kinds(tables):
                 usual = _usual_kind(f) or next(iter(kinds))
-                found.setdefault(f"{place}.{_KIND}", Leaf(f"{place}.{_KIND}", str, usual))
+                about = f"one of {', '.join(kinds)}"
+                found.setdefault(f"{place}.{_KIND}", Leaf(f"{place}.{_KIND}", str, usual, about))
             for table in tables:
                 for leaf in leaves(table, place):
                     found.setdefault(leaf.path, leaf)
         elif _said(hint):
             default = f.default if f.default_factory is MISSING else f.default_factory()
-            found.setdefault(place, Leaf(place, hint, None if default is MISSING else default))
+            default, about = None if default is MISSING else default, abouts.get(f.name, "")
+            found.setdefault(place, Leaf(place, hint, default, about))
     return iter(found.values())
+
+
+def described(kind: type) -> dict[str, str]:
+    """What the docstrings of a class and its bases say of its attributes, by their names."""
+    found: dict[str, str] = {}
+    for part in _ATTRIBUTES.findall("\n".join(getdoc(c) or "" for c in kind.__mro__[:-1])):
+        for names, text in _ATTRIBUTE.findall(part):
+            for name in names.split(", "):
+                found.setdefault(name, " ".join(text.split()))
+    return found
 
 
 def _is_union(hint: Any) -> bool:

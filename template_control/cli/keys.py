@@ -15,7 +15,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's description and options."""
     parser.description = (
         "List the keys of an experiment's file (run.toml) with their defaults for the reference"
-        " template. Each is an option of walk, run and go too, as in --world.friction 0.5."
+        " template, and a word about each. Each is an option of walk, run and go too, as in"
+        " --world.friction 0.5."
     )
     parser.add_argument("word", nargs="?", default="", help="only keys with this word in them")
     parser.add_argument("--json", action="store_true", help="print defaults by key as JSON")
@@ -35,5 +36,6 @@ def run(options: argparse.Namespace) -> int:
         return 0
     for leaf in found:
         default = "" if leaf.default is None else settings.literal(leaf.default)
-        print(f"{leaf.path} = {default}".rstrip())
+        about = leaf.about.partition(". ")[0].rstrip(".")
+        print(f"{leaf.path} = {default}".rstrip() + f"  # {about}" * bool(about))
     return 0

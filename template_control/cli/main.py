@@ -9,7 +9,7 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
@@ -23,7 +23,7 @@ from template_control.cli.interrupts import (
     stopped,
 )
 from template_control.cli.notices import notice, printed
-from template_control.errors import ParameterError, TemplateControlError
+from template_control.errors import ParameterError, TemplateControlError, meant
 
 # By name the module with its ``add_options(parser)`` and ``run(options)``, after a colon the object
 # of the module that has them; and one line about it.
@@ -108,7 +108,18 @@ class _Parser(argparse.ArgumentParser):
         option, ours, reason = re.sub(r"^argument (\S+): ", r"\1: ", message).partition(": is ")
         if ours:
             raise ParameterError(f"{option} is {reason}")
-        raise ParameterError(f"{option}; {self.prog} --help lists what there is")
+        unknown = re.match(r"unrecognized arguments: (--\S+)", message)
+        near = meant(unknown[1], _options(self)) if unknown else ""
+        raise ParameterError(f"{option}{near}; {self.prog} --help lists what there is")
+
+
+def _options(parser: argparse.ArgumentParser) -> Iterator[str]:
+    """Options of a parser and of its commands."""
+    for action in parser._actions:
+        yield from action.option_strings
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _options(command)
 
 
 def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:

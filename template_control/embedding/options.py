@@ -14,7 +14,7 @@ from template_control.embedding.modes import GuardOptions
 from template_control.embedding.phases import PHASES, PhaseControl, Phases
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.swing import SwingOptions, Swings
-from template_control.errors import ParameterError
+from template_control.errors import ParameterError, meant
 from template_control.estimation.delay import DelayOptions
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Phase
@@ -121,7 +121,8 @@ def _with_numbers(task: Task, numbers: Mapping[str, Any], where: str) -> Task:
     )
     for name in numbers:
         if name not in known:
-            raise ParameterError(f"unknown key {where}.{name}: known are {', '.join(known)}")
+            near = meant(name, known)
+            raise ParameterError(f"unknown key {where}.{name}{near}: known are {', '.join(known)}")
     try:
         return replace(task, **numbers)  # type: ignore[type-var]
     except ParameterError as error:

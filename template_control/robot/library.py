@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from template_control.checks.checked import checked
-from template_control.errors import RobotError
+from template_control.errors import RobotError, meant
 from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import LEGS
@@ -158,7 +158,8 @@ def robot_path(name: str) -> Path:
         RobotError: if there is no such robot.
     """
     if name not in _ENTRIES:
-        raise RobotError(f"there is no robot {name!r}: give one of {list(SHIPPED)} or a URDF file")
+        near, names = meant(name, SHIPPED), ", ".join(SHIPPED)
+        raise RobotError(f"there is no robot {name!r}{near}: give one of {names}, or a URDF file")
     entry = _ENTRIES[name]
     if entry.distribution:
         candidates = _files(entry)

@@ -49,17 +49,18 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     rates are those of a robot of the reference template's size (l0 = 1 m) that moves alike, in m,
     m/s and rad/s: what is learnt with one robot can be tried with another.
 
-    **Action** (1,) or, of a floating base, (2,), from -1 to 1: the mean speed, from the robot's
-    slowest to its fastest, and the turning rate, from its largest to the right to that to the left.
-    It holds from the next section on.
+    **Action** (1,) or, of a floating base, (2,), from -1 to 1, beyond which it is clipped: the mean
+    speed, from the robot's slowest to its fastest, and the turning rate, from its largest to the
+    right to that to the left. It holds from the next section on.
 
     With ``residuals`` the planner of a walk at the wanted speed keeps its say, and the action (3,)
     is added to its controls from the next section on: 1 is 0.05 rad of the touchdown angle, and a
     tenth of the template's stiffness before and after the bottom. The wanted turning rate is 0.
 
-    **Observation** (6,) or (11,): dx/dt, y and dy/dt of the CoM at the section, the trunk's pitch,
-    the mean speed of the last stride, the wanted one; of a floating base also y of the CoM from the
-    rear foot and its rate, the trunk's roll, the turning rate of the last stride, the wanted one.
+    **Observation** dx/dt, y and dy/dt of the CoM at the section, the trunk's pitch, the mean speed
+    of the last stride, the wanted one; of a floating base also y of the CoM from the rear foot and
+    its rate, the trunk's roll, the turning rate of the last stride, the wanted one; and at last the
+    action before, which the coming stride is planned with.
 
     **Reward** 1 - 4 abs(speed - wanted) - 4 abs(turning rate - wanted), and -10 for a fall.
 
@@ -98,11 +99,12 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         robot: Any = spec.load() if isinstance(spec, RobotSpec) else spec
         self._range = VelocityRange.of(robot)
         self._free = isinstance(robot, FloatingBaseBiped)
-        self._residuals = residuals
+        self._residuals, self._turns = residuals, self._free and not residuals
         actions = len(_RESIDUAL) if residuals else 1 + self._free
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (actions,), np.float32)
-        size = 11 if self._free else 6
+        size = (11 if self._free else 6) + actions
         self.observation_space = gymnasium.spaces.Box(-_MOST, _MOST, (size,), np.float32)
+        self._over = True
         self._run: LiveRun | None = None
 
     def reset(
@@ -113,13 +115,17 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         Args:
             seed: of all draws from now on; None: they go on.
             options: ``wanted``, the speed [m/s] and turning rate [rad/s] of the episode.
+
+        Raises:
+            ParameterError: if the robot does not walk like that, or an option is unknown.
         """
         super().reset(seed=seed)
         self.close()
         r, draw = self._range, self.np_random
-        turning = 0.0 if self._residuals else float(draw.uniform(-r.turning, r.turning))
-        drawn = float(draw.uniform(*r.speeds)), turning
-        self._wanted: tuple[float, float] = (options or {}).get("wanted", drawn)
+        turning = float(draw.uniform(-r.turning, r.turning))
+        drawn = float(draw.uniform(*r.speeds)), turning if self._turns else 0.0
+        self._wanted = self._asked(options) or drawn
+        self._action, self._over = np.zeros(self.action_space.shape or ()), False
         self._run = run = LiveRun(self._commanded(self._wanted[0]), keep=_KEPT)
         self._tick = next(run)
         self._scale = Scale.of(run.controller.parameters)
@@ -132,16 +138,21 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Walk a stride; see :class:`gymnasium.Env`."""
         run, r = self._run, self._range
-        if run is None:
-            raise ParameterError("the environment has no episode: call reset first")
-        before = self._tick
-        share = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        if run is None or self._over:
+            raise ParameterError("the environment has no episode, or it is over: call reset first")
+        given = np.asarray(action, dtype=float)
+        if given.shape != self.action_space.shape or not np.isfinite(given).all():
+            raise ParameterError(
+                f"the action is {given.tolist()}: give {self.action_space.shape} finite numbers"
+            )
+        before, self._action = self._tick, np.clip(given, -1.0, 1.0)
+        share = self._action
         if self._residuals:
             unit = [1.0, *[run.controller.parameters.leg_stiffness] * 2]
             self._planner.residual[list(_RESIDUAL)] = share * list(_RESIDUAL.values()) * unit
         else:
             low, high = r.speeds
-            turning = float(share[1]) * r.turning if self._free else 0.0
+            turning = float(share[1]) * r.turning if self._turns else 0.0
             speed = low + 0.5 * (float(share[0]) + 1.0) * (high - low)
             run.hand.set_velocity(speed, 0.0, turning)
         self._push(run)
@@ -156,6 +167,7 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         fell = bool(run.reason)
         reward = -_FALL if fell else 1.0 - _OFF * self._error()
         truncated = not fell and self._tick.steps >= self._strides
+        self._over = fell or truncated
         return self._observation(), reward, fell, truncated, self._info()
 
     def close(self) -> None:
@@ -163,6 +175,23 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._run is not None:
             self._run.close()
             self._run = None
+
+    def _asked(self, options: dict[str, Any] | None) -> tuple[float, float] | None:
+        """The wanted velocity of a reset's options; None where they have none."""
+        options, r = options or {}, self._range
+        if strange := options.keys() - {"wanted"}:
+            raise ParameterError(f"unknown option {min(strange)}: known is wanted")
+        if "wanted" not in options:
+            return None
+        wanted = np.asarray(options["wanted"], dtype=float)
+        most = r.turning if self._turns else 0.0
+        (slowest, fastest) = r.speeds
+        if wanted.shape != (2,) or not (slowest <= wanted[0] <= fastest and abs(wanted[1]) <= most):
+            raise ParameterError(
+                f"wanted is {options['wanted']}: give a speed from {slowest:.3g} to {fastest:.3g}"
+                f" m/s, and a turning rate within {most:.3g} rad/s"
+            )
+        return float(wanted[0]), float(wanted[1])
 
     def _commanded(self, speed: float) -> Experiment:
         """The experiment with the motion of an episode that wants this speed [m/s]."""
@@ -202,6 +231,7 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             sway, rate = last["sway"][0]
             values += [sway / scale.length, rate / scale.speed, last["attitude"][0, 0]]
             values += [self._walked[1] * scale.time, self._wanted[1] * scale.time]
+        values += self._action.tolist()
         return np.clip(np.array(values, dtype=np.float32), -_MOST, _MOST)
 
     def _info(self) -> dict[str, Any]:

@@ -77,7 +77,10 @@ def test_what_goes_out_comes_back_bit_by_bit(options):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("number = 1\nnumbr = 2", "unknown key numbr: known are number, count,"),
+        (
+            "number = 1\nnumbr = 2",
+            r"unknown key numbr \(did you mean number\?\): known are number, count,",
+        ),
         ("number = '1'", "number is '1': give a number"),
         ("number = true", "number is True: give a number"),
         ("count = 2.0", "count is 2.0: give a whole number"),

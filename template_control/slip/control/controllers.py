@@ -16,7 +16,7 @@ from template_control.slip.control.modified_walking import ModifiedMap
 from template_control.slip.control.step_solver import Step, StepProblem, StepSolution, Unknowns
 from template_control.slip.dynamics.stride import controls, finite
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import VLO, Section
+from template_control.slip.maps.section import APEX, VLO, Section
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -144,6 +144,7 @@ class Controller:
         unknowns = self.design.unknowns(step.parameters)
         self._problem = StepProblem(step, unknowns, weights, compression)
         self._grid = self.design.grid(step.parameters)
+        self._upper = unknowns.upper
 
     def solve(
         self,
@@ -165,6 +166,12 @@ class Controller:
         n, m = problem.step.dimensions
         start, aim = finite("section state", z, n), finite("target", target, m)
         self._check(aim)
+        if n == APEX.dimension:
+            # A steeper leg would be in the ground.
+            steepest = np.arcsin(min(start[1] / problem.step.parameters.rest_length, 1.0))
+            highest = [steepest if slot is _ANGLE else np.inf for slot in design.free]
+            upper = np.minimum(highest, self._upper)
+            problem.unknowns = replace(problem.unknowns, upper=upper)
         near = None if guess is None else problem.solve(start, aim, [guess])
         content = problem.tolerance if design.dense else problem.acceptable
         if near is not None and near.residual <= content:

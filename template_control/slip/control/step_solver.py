@@ -160,8 +160,9 @@ class StepProblem:
             self._aim[-1] = self.compression
 
     def _controls(self, start: Array, x: Array) -> Array:
-        u = start.copy()
-        u[self._slots] = x * self.unknowns.scale
+        """The controls within the bounds that are nearest to ``x``."""
+        u, b = start.copy(), self.unknowns
+        u[self._slots] = np.clip(x * b.scale, b.lower, b.upper)
         return u
 
     def _errors(self, x: Array, z: Array, start: Array) -> Array:
@@ -179,6 +180,7 @@ class StepProblem:
         if outcome is not Outcome.SECTION:
             slopes[:] = 0.0
         out = np.sign(self._excess(x))
+        slopes[:, out != 0.0] = 0.0  # the map stays what it is at the bound
         return np.vstack((slopes, np.diag(_PENALTY * out * out)))
 
     def _excess(self, x: Array) -> Array:
@@ -200,8 +202,7 @@ class StepProblem:
             maxfev=self._evaluations,
             full_output=True,
         )
-        b = self.unknowns
-        u = self._controls(start, np.clip(x, b.lower / b.scale, b.upper / b.scale))
+        u = self._controls(start, x)
         result, outcome = self.step.evaluate(z, u)
         error = self._weights * (self._aim - result[self._rows])
         residual = float(np.linalg.norm(error)) if outcome is Outcome.SECTION else np.inf

@@ -296,7 +296,8 @@ def test_all_keys_are_listed(capfd):
     assert main(["keys"]) == 0
     lines = capfd.readouterr().out.splitlines()
     assert [line.split(" = ")[0].removesuffix(" =") for line in lines] == list(LEAVES)
-    assert "world.friction = 0.7" in lines
+    assert "world.friction = 0.7  # Coulomb coefficient between foot and ground" in lines
+    assert not [leaf.path for leaf in LEAVES.values() if not leaf.about]
     assert main(["keys", "--json"]) == 0
     assert list(json.loads(capfd.readouterr().out)) == list(LEAVES)
     assert main(["keys", "friction"]) == 0

@@ -108,5 +108,22 @@ def test_environments_walk_side_by_side():
 def test_wrong_use_is_refused():
     with pytest.raises(ParameterError, match="the action is the robot's motion"):
         tc.run.WalkEnv(tc.Experiment(steps=3))
+    env = tc.run.WalkEnv(strides=1)
     with pytest.raises(ParameterError, match="call reset first"):
-        tc.run.WalkEnv().step(np.zeros(1, np.float32))
+        env.step(np.zeros(1, np.float32))
+    for options, why in (
+        ({"wanted": (5.0, 0.0)}, "give a speed from 0.3"),
+        ({"wanted": (0.8, 0.5)}, "a turning rate within 0 rad/s"),
+        ({"wanted": 0.8}, "wanted is 0.8"),
+        ({"want": (0.8, 0.0)}, "unknown option want"),
+    ):
+        with pytest.raises(ParameterError, match=why):
+            env.reset(options=options)
+    env.reset(seed=0)
+    for action in (np.zeros(3), [np.nan]):
+        with pytest.raises(ParameterError, match="the action is"):
+            env.step(action)
+    assert env.step(np.float32([0.5]))[0][-1] == 0.5
+    with pytest.raises(ParameterError, match="it is over"):
+        env.step(np.zeros(1, np.float32))
+    env.close()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import EXAMPLES
 
 from template_control.errors import ParameterError
 from template_control.paper import transitions
@@ -18,6 +19,8 @@ from template_control.slip.control.controllers import (
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.scenario import load_scenario
 
 P = SlipParameters()
 CLOSED = [MapKind.PAPER, MapKind.IMPROVED]
@@ -57,6 +60,21 @@ def test_table_4s_walk_to_run_gains_lead_into_a_run():
     assert mapped.state[1] == pytest.approx(0.98, abs=0.01)
     going_on = ActiveRunning(P).solve(mapped.state, [mapped.state[0] + 0.3, 0.98])
     assert going_on.reached
+
+
+def test_a_low_apex_is_left_with_the_leg_at_its_bound():
+    """The best touchdown angle is the one at which the leg touches the ground at the apex."""
+    z, target = [1.5422, 0.95377], [1.6576, 0.98]
+    solution = ActiveRunning(P).solve(z, target)
+    assert solution.outcome is Outcome.SECTION
+    assert solution.controls[Slot.TOUCHDOWN_ANGLE] == pytest.approx(np.arcsin(z[1]), abs=1e-3)
+    assert solution.residual < 0.045  # 0.038 is the least of 40 searches by Nelder and Mead
+
+
+def test_the_template_alone_runs_at_five_metres_per_second_and_walks_again():
+    record = simulate_scenario(load_scenario(EXAMPLES / "zero_five_zero.toml"))
+    assert record.completed
+    assert record.section_state[:, 0].max() > 4.9
 
 
 @pytest.mark.parametrize("kind", [MapKind.EXACT, MapKind.IMPROVED])
