@@ -207,10 +207,7 @@ def load_robot(name: str | Path) -> PlanarBiped:
         return PlanarBiped.from_urdf(text)
     path, entry = robot_path(text), _ENTRIES[text]
     if not entry.planar:
-        raise RobotError(
-            f"robot {text!r} is no planar biped: run it free, with --floating-base or"
-            " load_floating_robot"
-        )
+        raise RobotError(f"robot {text!r} has no planar model: load it with load_floating_robot")
     return PlanarBiped.from_urdf(
         path,
         entry.feet,

@@ -79,9 +79,12 @@ def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
             " joints at 0, or a slide is not along the world's x or z: give the base's joints no"
             " offset"
         )
-    if model.nv != PLANAR_DOF + HINGES * legs:
+    hinges = model.nv - PLANAR_DOF
+    if hinges == HINGES * LEGS and legs != LEGS:
+        raise RobotError(f"{legs} feet were named for {path}: a biped has two, a monopod one")
+    if hinges != HINGES * legs:
         raise RobotError(
-            f"{path}: {model.nv - PLANAR_DOF} hinges in its legs: a hip and a knee each is what is"
+            f"{path}: {hinges} hinges in its legs: a hip and a knee each is what is"
             f" controlled; name these {HINGES * legs} as sagittal_joints"
         )
     hints = {"effort": "its torque limit", "velocity": "the speed [rad/s] that it can have"}

@@ -13,6 +13,7 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import (
     FLAT_FEET,
     QUADRUPEDS,
+    ROBOTS,
     SHIPPED,
     load_floating_robot,
     load_robot,
@@ -35,7 +36,7 @@ class RobotSpec(Checked):
             are locked at 0.
         lossless: whether damping and friction of a URDF's joints are left out.
         free: whether nothing holds the robot; its URDF is a 3D one, and all joints that are not
-            locked move.
+            locked move. Shipped robots without a planar model are always free.
         gravity: that its model and its template have [m/s^2]; None: 9.81.
         masses: of links by name, instead of the URDF's [kg]; their inertias grow alike.
         flat_feet: whether a free robot stands on soles, as its feet's collision shapes have them;
@@ -53,6 +54,11 @@ class RobotSpec(Checked):
     gravity: Positive | None = None
     masses: Mapping[str, Positive] = field(default_factory=dict)
     flat_feet: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.model in SHIPPED and self.model not in ROBOTS:
+            object.__setattr__(self, "free", True)
 
     @property
     def trots(self) -> bool:

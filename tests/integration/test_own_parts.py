@@ -72,6 +72,11 @@ def _five(decision):
     return Decision(decision.controls[:5], decision.predicted, True, True, True)
 
 
+def _in_degrees(decision):
+    angle, *stiffnesses = decision.controls
+    return replace(decision, controls=np.array([np.degrees(angle), *stiffnesses]))
+
+
 def _nan(decision):
     return replace(decision, controls=decision.controls * np.nan)
 
@@ -90,6 +95,7 @@ FAILURES = [
         r"^Mine\.decide_rest returned 3: return a Decision",
     ),
     ("decide", _five, ParameterError, r"^Mine\.decide: .*an array of 6 numbers; it has 5"),
+    ("decide", _in_degrees, ParameterError, r"returned the touchdown angle 66.*: .*to pi, in rad"),
     ("decide", _nan, ParameterError, r"^Mine\.decide returned the controls \[nan, .*: return fin"),
     ("offset", lambda _: np.zeros(2), ParameterError, r"^Mine\.offset is .*: give an array of 3"),
 ]
@@ -240,7 +246,7 @@ def test_what_a_planner_lacks_is_named(robot):
 
 
 def test_a_planner_without_the_base_class_is_told_to_derive_from_it(robot, default_gait):
-    members = {name: lambda *_: None for name in ("offset", "reset", "decide", "observe")}
+    members = {name: lambda *_: None for name in ("offset", "reset", "decide", "observe", "cost")}
     bare = type("Bare", (), {"gait": default_gait, **members})()
     text = r"a Planner \(this one lacks .*forget.*: derive it from Planner\)"
     with pytest.raises(ParameterError, match=text):

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
-from math import isfinite, nan
+from math import isfinite, nan, pi
 from typing import Annotated, NamedTuple, ParamSpec, Protocol, runtime_checkable
 
 import numpy as np
@@ -16,7 +16,7 @@ from template_control.checks.checked import Checked
 from template_control.checks.fitting import answered, answered_or_none, name_of
 from template_control.checks.ranges import Shape
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
@@ -262,6 +262,11 @@ def _check_controls(method: Callable[..., object], decision: Decision) -> None:
     if not isfinite(sum(controls)):
         raise ParameterError(
             f"{name_of(method)} returned the controls {controls}: return finite numbers"
+        )
+    if not 0.0 <= controls[Slot.TOUCHDOWN_ANGLE] < pi:
+        raise ParameterError(
+            f"{name_of(method)} returned the touchdown angle {controls[Slot.TOUCHDOWN_ANGLE]:g}:"
+            " return one from 0 to pi, in rad"
         )
 
 

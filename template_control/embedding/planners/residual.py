@@ -88,6 +88,10 @@ class ResidualPlanner(Planner):
         """See :meth:`Planner.cost`."""
         return self.planner.cost(z)
 
+    def next_gait(self) -> Gait | None:
+        """See :meth:`Planner.next_gait`."""
+        return self.planner.next_gait()
+
     def on_slope(self, slope: float) -> SlipParameters | None:
         """See :meth:`Planner.on_slope`."""
         found = self.planner.on_slope(slope)

@@ -102,5 +102,7 @@ def test_what_is_no_quadruped_is_refused(feet, groups, message):
 
 
 def test_a_quadruped_is_no_planar_biped():
-    with pytest.raises(RobotError, match="'go2' is no planar biped: run it free"):
+    with pytest.raises(
+        RobotError, match="'go2' has no planar model: load it with load_floating_robot"
+    ):
         load_robot("go2")
