@@ -35,7 +35,7 @@ _COMMANDS = {
     "run": ("cli.motion:RUN", "run a robot that follows the SLIP template, headless, and report"),
     "go": (
         "cli.motion:GO",
-        "take a robot through a scenario of gaits and speeds, the template beside it",
+        "take a robot through a scenario of gaits and speeds, and the template alone too",
     ),
     "drive": ("cli.drive", "drive a robot in the browser: command, push and watch it"),
     "robots": ("cli.robots", "list the shipped robots, with the template scaled to each"),
@@ -43,15 +43,15 @@ _COMMANDS = {
     "plots": ("cli.plots", "draw the figures of a recorded run"),
     "robustness": (
         "cli.robustness",
-        "raise disturbances until a robot's walk breaks, and tell how much it takes",
+        "raise one disturbance after another until a robot's walk fails",
     ),
     "campaign": (
         "cli.campaign",
-        "disturb a robot by everything at once, many times, and tell how sure its gait is",
+        "disturb a robot by everything at once, many times, and measure the share of falls",
     ),
     "study": ("cli.study", "run an experiment over a grid or a sample of some of its keys"),
     "slip": ("cli.slip", "simulate the SLIP template through a scenario of gaits and speeds"),
-    "gaits": ("cli.gaits", "follow a branch of periodic gaits and tell its stability"),
+    "gaits": ("cli.gaits", "follow a branch of periodic gaits and their stability"),
     "automaton": (
         "cli.automaton",
         "show the hybrid automaton that simulator, planners and robot controller read",
@@ -70,7 +70,7 @@ _COMMANDS = {
     ),
     "reproduce": (
         "paper.command",
-        "reproduce a table or figure of the paper, ours beside the paper's",
+        "reproduce a table or figure of the paper, with the paper's numbers",
     ),
 }
 _USER_ERROR = 2

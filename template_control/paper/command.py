@@ -19,13 +19,15 @@ _ON_A_ROBOT = "fig10"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's description and options."""
-    parser.description = "Compute a table or figure of the paper again and print ours beside it."
+    parser.description = (
+        "Compute a table or figure of the paper again and print it with the paper's numbers."
+    )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(REPRODUCTIONS)}")
     parser.add_argument(
         "--robot",
         metavar="NAME|URDF",
-        help="of fig10: Example I on this robot, such as runner, its template beside it",
+        help="of fig10: Example I on this robot, such as runner, with its template alone",
     )
     values.add_folder(parser, "runs/reproduce", "folder for the figures")
     values.add_json(parser, "the numbers as JSON")
