@@ -81,7 +81,7 @@ def main() -> None:
         for i in range(_PHASES)
     ]
 
-    def told(intermediate_result: OptimizeResult) -> None:
+    def report(intermediate_result: OptimizeResult) -> None:
         r = intermediate_result
         print(f"{r.fun:.4f}", " ".join(f"{x:8.3f}" for x in r.x), flush=True)
 
@@ -98,7 +98,7 @@ def main() -> None:
             polish=False,
             workers=processes.map,
             updating="deferred",
-            callback=told,
+            callback=report,
         )
         for name, x in (("given", _GIVEN), ("found", tuple(found.x))):
             felled = processes.map(partial(falls, x=x, robot=o.robot, speed=o.speed), pushes)
