@@ -52,8 +52,8 @@ from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Leg
-from template_control.slip.maps.section import Section, section_of
+from template_control.slip.automaton.vocabulary import Leg, Reset
+from template_control.slip.maps.section import REST, Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
@@ -422,11 +422,13 @@ class EmbeddingController:
         supervisor = self.supervisor
         if supervisor.deciding:
             nominal = supervisor.decision.nominal
-            if lateral is not None:
-                flies = not self.mode.stance
-                if lateral.end_stride(self.lateral_state(), nominal, flies):
-                    self.robot.update(*self.ground.raw_state)
-                    self._read()
+            if lateral is not None and lateral.end_stride(
+                self.lateral_state(), nominal, section, self.time
+            ):
+                self.robot.update(*self.ground.raw_state)
+                self._read()
+                if section is REST:
+                    self._face_ahead()
             learners.end_stride(section, s.state, nominal)
         self._enter(supervisor.decide(section, s, self.time, learners.state).name)
         learners.begin_stride(supervisor, self.mode.trimmed)
@@ -434,6 +436,15 @@ class EmbeddingController:
             now = self.node, s, self.lateral_state(), self.time
             self._enter(lateral.begin_stride(section, supervisor, *now).name)
         self.path_clock.restart()
+
+    def _face_ahead(self) -> None:
+        """Of two feet that stand, the one that is ahead where the robot now goes is the front's."""
+        rear, front = self.feet.foot_of_leg
+        ahead = self.robot.foot_position[:, 0]
+        if ahead[front] < ahead[rear]:
+            self.feet.apply(Reset.SWAP)
+            self.observer.stand_on(rear)
+            self.observer.take_roles(self.mode.data)
 
     def _replan(self) -> None:
         """Plan from here where a touchdown is overdue or the robot has left its path."""

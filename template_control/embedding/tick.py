@@ -364,7 +364,7 @@ def _place_contacts(t: Any, r: Any, want: Any) -> None:
     for i in range(mode.swings):
         foot = f.roles[mode.swing_leg[i]]
         if r.members[foot] > 1:
-            spread_contacts(f, foot, r, want.lean[2], t.path.step_duration, want.offset)
+            spread_contacts(f, foot, r, r.facing + want.lean[2], t.path.step_duration, want.offset)
     for leg in range(mode.stances):
         foot = f.roles[leg]
         want.furthest[foot] = np.inf

@@ -229,6 +229,11 @@ class Biped(Robot):
         self.hips = now["hips"][0, ::UP]
 
     @property
+    def paired(self) -> bool:
+        """Whether the feet of the template's legs are groups of contacts, as a quadruped's."""
+        return any(len(group) > 1 for group in self.groups)
+
+    @property
     def half_length(self) -> float:
         """By how far ahead of its middle a template leg's foot bears, and behind [m].
 

@@ -142,8 +142,10 @@ class FloatingBaseBiped(Biped):
         space: all terms with three directions, in the heading frame.
         spare: of each leg with four hinges, the joint above the hip whose axis is nearest to the
             vertical: its index into ``joint_names``, and its angle in :meth:`neutral` [rad].
-        sway: of flat feet, dy/dt of the CoM over dy/dt - L_x / (m z) where the soles and the
-            attitude of the trunk rest, L the angular momentum about the CoM; 1 of point feet.
+        sway: of flat feet and of pairs, dy/dt of the CoM over dy/dt - L_x / (m z) where the feet
+            and the attitude of the trunk rest, L the angular momentum about the CoM; else 1.
+        facing: angle from the heading to where the trunk is to face, to the left positive [rad]:
+            the heading is the way that the robot goes.
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
     """
 
@@ -151,6 +153,7 @@ class FloatingBaseBiped(Biped):
     base_joints = _ROOT
     directions = 3
     sway = Number("sway")
+    facing = Number("facing")
 
     @staticmethod
     def _model_of(path: Path, urdf: str) -> pin.Model:
@@ -189,7 +192,7 @@ class FloatingBaseBiped(Biped):
         for i, (joint, angle) in enumerate(self.spare):
             now["spare_joint"][i], now["spare_angle"][i] = joint, angle
         self.heading_frame[4] = now["hips"][1]  # of the trunk's origin
-        if self.patches:
+        if self.patches or self.paired:
             now["sway"] = self._sway_ratio()
             self.update(self._neutral, np.zeros(self.nv))
         for leg, group in enumerate(self.groups):

@@ -72,7 +72,9 @@ ROBOT_DATA = np.dtype(
         ("contact_axes", _F, (MOST_CONTACTS, 3, 3)),  # of each patch, in columns
         ("foot_position", _F, (LEGS, 3)),  # of each template leg: the mean of its contacts [m]
         ("foot_velocity", _F, (LEGS, 3)),  # the same [m/s]
-        ("attitude", _F, (3,)),  # roll, pitch and yaw of the trunk [rad]
+        # Roll and pitch of the trunk in the heading frame, and its yaw from where it is to face.
+        ("attitude", _F, (3,)),  # [rad]
+        ("facing", _F),  # from the heading to where the trunk is to face, to the left [rad]
         ("turning", _F, (3,)),  # angular velocity of the trunk, by axis [rad/s]
         ("hips", _F, (3,)),  # the point the legs hang from [m]
         ("hip_speed", _F),  # its forward velocity [m/s]
@@ -389,9 +391,9 @@ def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any
     aside = c * rotation[1, 2] - s * rotation[0, 2]
     state.attitude[0] = np.arctan2(-aside, rotation[2, 2])
     state.attitude[1] = np.arctan2(ahead, rotation[2, 2])
-    state.attitude[2] = np.arctan2(
-        c * rotation[1, 0] - s * rotation[0, 0], c * rotation[0, 0] + s * rotation[1, 0]
-    )
+    ahead, aside = c * rotation[0, 0] + s * rotation[1, 0], c * rotation[1, 0] - s * rotation[0, 0]
+    c2, s2 = np.cos(state.facing), np.sin(state.facing)
+    state.attitude[2] = np.arctan2(c2 * aside - s2 * ahead, c2 * ahead + s2 * aside)
     middle = np.zeros(3)
     for i in range(len(places)):
         place, point = places[i], np.dot(axes[i], points[i])

@@ -237,7 +237,7 @@ class FloatingBackend(RobotBackend):
             q, v = floating_state_in(self.robot, _stand(z, lateral.wish.width, apart))
             controller.start(_REAR, first=first)
             return q, v
-        side_speed, rate = o.heading(0.0)
+        side_speed, rate, _ = o.heading(0.0)
         lateral.wish = LateralWish(
             o.course.step_width or lateral.wish.width,
             aside=side_speed * planner.gait.step_duration,

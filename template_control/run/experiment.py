@@ -15,6 +15,7 @@ import numpy as np
 from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
+from template_control.embedding.free.course import Course
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
 from template_control.embedding.free.soles import SoleOptions
 from template_control.embedding.free.trot import TrotOptions, default_options
@@ -47,7 +48,12 @@ from template_control.robot.start import Pose
 from template_control.run.options import FallOptions, HeadingCommand, Push, check_pushes
 from template_control.run.sensing import SensorOptions
 from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
-from template_control.run.velocity import VelocityCommand, VelocityProfile, velocity_route
+from template_control.run.velocity import (
+    VelocityCommand,
+    VelocityProfile,
+    course_at,
+    velocity_route,
+)
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import StrideKind
@@ -351,15 +357,15 @@ class PreparedExperiment(Experiment):
         """Itself."""
         return self
 
-    def heading(self, time: float) -> tuple[float, float]:
-        """Speed to the left [m/s] and turning rate [rad/s] of a floating-base robot at a time.
+    def heading(self, time: float) -> Course:
+        """Where a floating-base robot is to go at a time.
 
         Args:
             time: from the run's start [s].
         """
         if self.velocity is None:
-            return self.course.side_speed, self.course.rate(time)
-        return self.velocity.at(time)[1:]
+            return Course(self.course.side_speed, self.course.rate(time))
+        return course_at(self.velocity, time, self.robot)
 
     @property
     def planners(self) -> Planners:

@@ -94,6 +94,7 @@ def check_pushes(pushes: tuple[Push, ...], steps: int) -> None:
 
 TurningRate = Annotated[float, Range(-2.0, 2.0)]
 SideSpeed = Annotated[float, Range(-5.0, 5.0)]
+ForwardSpeed = Annotated[float, Range(-20.0, 20.0)]
 
 
 @dataclass(frozen=True)

@@ -290,7 +290,7 @@ class Recorder:
             self._first = self._before = now
         row, interval = self._block[self.ticks - self._block_start], now - self._before
         clocks = float(seconds), solution.solve_seconds
-        heading = 0.0 if self._floating is None else self._floating.heading
+        heading = 0.0 if self._floating is None else self._floating.heading + self._floating.facing
         numbers = float(now), float(push), interval, *clocks, float(solution.solved), heading
         write_row(row, numbers, (q, v, torque, force), self._robot, self._seen)
         self._before = now

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import atan2, hypot, nan
 from typing import ClassVar
 
 import numpy as np
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
-from template_control.checks.ranges import NotNegative, Positive, SpeedOrRest
+from template_control.checks.ranges import NotNegative, Positive
+from template_control.embedding.free.course import Course
 from template_control.embedding.robot_template import (
     can_run,
     can_stand,
@@ -20,7 +22,7 @@ from template_control.embedding.robot_template import (
 from template_control.errors import GaitError, ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.run.options import HeadingCommand, SideSpeed, TurningRate
+from template_control.run.options import ForwardSpeed, HeadingCommand, SideSpeed, TurningRate
 from template_control.slip.gaits.walking_by_speed import family_speeds
 from template_control.slip.scenario.scenario import Gait
 from template_control.slip.scenario.speed_route import GaitChangeOptions, SpeedRoute
@@ -46,7 +48,7 @@ class VelocityProfile(Checked):
 
     The motion of an :class:`~template_control.run.Experiment`: the robot moves at any speed of its
     gaits. Footholds and heading follow from one step to the next; the forward speed
-    changes as fast as the planner finds steps.
+    changes as fast as the planner finds steps. A quadruped goes backward too, at a negative speed.
 
     Attributes:
         velocities: times, rising from 0 [s], each with the mean velocity forward and to the left
@@ -64,7 +66,7 @@ class VelocityProfile(Checked):
 
     kind: ClassVar[str] = "velocity"
 
-    velocities: tuple[tuple[NotNegative, SpeedOrRest, SideSpeed, TurningRate], ...]
+    velocities: tuple[tuple[NotNegative, ForwardSpeed, SideSpeed, TurningRate], ...]
     duration: Positive | None = None
     foreseen: bool = True
     gaits: tuple[Gait, ...] = ("walk",)
@@ -125,7 +127,7 @@ class VelocityCommand:
             ParameterError: if one of them is out of its range; the velocity stays as it was.
         """
         self._velocity: Velocity = (
-            check("the commanded forward speed", forward, SpeedOrRest, ParameterError),
+            check("the commanded forward speed", forward, ForwardSpeed, ParameterError),
             check("the commanded speed to the left", left, SideSpeed, ParameterError),
             check("the commanded turning rate", turning, TurningRate, ParameterError),
         )
@@ -188,6 +190,22 @@ class VelocityRange:
         return tuple(gait for gait, has in have.items() if has)
 
 
+def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: Biped) -> Course:
+    """Where a floating-base robot is to go.
+
+    One on pairs of feet goes along the velocity, and its trunk faces elsewhere.
+
+    Args:
+        velocity: the commanded.
+        time: from the run's start [s].
+        robot: which goes.
+    """
+    forward, left, turning = velocity.at(time)
+    if not robot.paired:
+        return Course(left, turning)
+    return Course(0.0, turning, -atan2(left, forward) if forward or left else nan)
+
+
 def velocity_route(
     robot: Biped, motion: VelocityProfile | VelocityCommand, course: HeadingCommand
 ) -> tuple[VelocityProfile | VelocityCommand, SpeedRoute]:
@@ -214,7 +232,15 @@ def velocity_route(
         speed, *others = velocity.at(time)
         if planar and any(others):
             raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
-        return speed
+        if not isinstance(robot, FloatingBaseBiped) or not robot.paired:
+            if speed < 0.0:
+                raise ParameterError(
+                    f"{robot.name} goes forward only, as a quadruped does not: command it a speed"
+                    " of 0 or more"
+                )
+            return speed
+        course = course_at(velocity, time, robot)
+        return 0.0 if course.turns_round(robot) else hypot(speed, others[0])
 
     if "stand" in motion.gaits and not can_stand(robot):
         raise ParameterError(

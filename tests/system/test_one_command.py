@@ -57,3 +57,30 @@ def test_what_a_planar_robot_cannot_do_is_refused():
     motion = VelocityProfile(((0.0, 0.6, 0.1, 0.0),), duration=1.0)
     with pytest.raises(tc.TemplateControlError, match="no velocity to the left"):
         tc.simulate(tc.Experiment(tc.load_robot("five-link"), motion))
+
+
+@pytest.mark.slow(seconds=7)
+def test_go2_goes_aside_and_turns_and_comes_back_backward():
+    rows = ((0.0, 0.5, 0.2, 0.3), (3.5, -0.4, 0.0, 0.0))
+    motion = VelocityProfile(rows, duration=10.0, foreseen=False, gaits=("stand", "walk"))
+    record = tc.simulate(tc.Experiment(tc.load_floating_robot("go2"), motion))
+    assert isinstance(record, tc.run.FloatingRecord)
+    assert not record.fell
+    velocity = np.gradient(record.space_com[:, :2], record.time, axis=0)
+    turn = record.heading[:, None]
+    ahead, left = np.hsplit(velocity, 2)
+    forward = np.cos(turn) * ahead + np.sin(turn) * left
+    aside = np.cos(turn) * left - np.sin(turn) * ahead
+    going, back = (record.time > 2.0) & (record.time < 3.4), record.time > 8.0
+    assert aside[going].mean() == pytest.approx(0.2, abs=0.04)
+    assert forward[back].mean() == pytest.approx(-0.4, abs=0.02)
+    assert aside[back].mean() == pytest.approx(0.0, abs=0.01)
+    assert record.heading[-1] > 0.6
+    assert np.abs(record.attitude[:, :2]).max() < 0.05
+    assert record.summary.qp_failures == 0
+
+
+def test_a_biped_does_not_go_backward():
+    motion = VelocityProfile(((0.0, -0.5, 0.0, 0.0),), duration=1.0)
+    with pytest.raises(tc.TemplateControlError, match="goes forward only"):
+        tc.simulate(tc.Experiment(tc.load_floating_robot("bolt"), motion))

@@ -34,7 +34,9 @@ from template_control.slip.lateral.placing import (
     LateralAim,
     LateralLearnt,
     Placement,
+    contact,
     lateral_aim,
+    pivot,
     place,
 )
 from template_control.slip.parameters import SlipParameters
@@ -106,6 +108,7 @@ LATERAL = np.dtype(
         ("section", _F),
         ("beside", _I),
         ("ratio", _F),
+        ("rolling", _F),  # of the feet, see pivot
         ("feet", _I, (2,)),  # that were rear and front at its start
         ("stood", _F, (2, 2)),  # x and y where each foot stands, or stood last [m]
         # -- the turn of a run's stride --
@@ -180,14 +183,17 @@ def lateral_foothold(
         reach=lateral.reach,
         stretch=lateral.stretch,
     )
-    found = place(path, aim, time, com, feet)
+    pivots = np.empty(2)
+    for k in range(2):
+        pivots[k] = pivot(feet[k], com[0], lateral.rolling)
+    found = place(path, aim, time, com, pivots)
     if found.left > lateral.hold or not lateral.placed:
         lateral.placed = 1
         lateral.y, lateral.wanted = found.y, found.wanted
         lateral.left, lateral.com = found.left, found.com
         for k in range(2):
             lateral.expected[k], lateral.slope[k] = found.expected[k], found.slope[k]
-    return lateral.y
+    return contact(lateral.y, lateral.com, lateral.rolling)
 
 
 SIDES = (Side.LEFT, Side.RIGHT)
@@ -199,7 +205,7 @@ class LateralPlanner:
 
     ``options`` are of the reference template; ``wish``, step width, lateral motion and turn, may be
     changed between two steps; ``data`` (1,) are of ``LATERAL``, which ticks read and write;
-    ``ratio`` is that of a :class:`.LateralPath`.
+    ``ratio`` is that of a :class:`.LateralPath`, ``rolling`` that of :func:`.pivot`.
     ``lessons`` is what the robot adds to the template's sideways motion, by kind of stride,
     ``cycle`` the wish's periodic motion.
     """
@@ -211,11 +217,13 @@ class LateralPlanner:
         wish: LateralWish,
         data: Any,
         ratio: float = 1.0,
+        rolling: float = 0.0,
     ) -> None:
         self.wish, self.data = wish, data
         self._unscaled = options
         self.options = scaled(options, Scale.of(parameters))
-        self._gravity, self._ratio = parameters.gravity, ratio
+        self._gravity, self._ratio = parameters.gravity, ratio * (1.0 - rolling)
+        data["rolling"] = rolling
         self.lessons: dict[str, LateralLearnt] = {}
         self.cycle: LateralCycle
         self._gait: Gait | None = None
@@ -270,6 +278,7 @@ class LateralPlanner:
         the CoM and dy/dt [m, m/s].
         """
         if self._landed is not None:
+            foot = pivot(foot, com[0], float(self.data[0]["rolling"]))
             surprise = com - (foot, 0.0) - self._landed.state(foot)
             learnt = self.learnt.after_step(stance.other, surprise, self.options.learning)
             self.lessons[self._kind] = learnt
@@ -312,7 +321,8 @@ class LateralPlanner:
         rear and front at the start of the path [m].
         """
         self._take(path)
-        return lateral_forecast(place(self._path, self._aim, 0.0, com, feet), self._aim)
+        pivots = pivot(feet, com[0], float(self.data[0]["rolling"]))
+        return lateral_forecast(place(self._path, self._aim, 0.0, com, pivots), self._aim)
 
     def follow(self, path: TemplatePath, feet: tuple[int, int]) -> tuple[Any, ...]:
         """Take the planar path that the robot is on from now on.

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.free.course import Course
 from template_control.embedding.free.lateral import (
     BEYOND,
     SIDES,
@@ -32,7 +33,7 @@ from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.lateral.placing import LATERAL
-from template_control.slip.maps.section import Section
+from template_control.slip.maps.section import APEX, REST, Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
@@ -45,6 +46,10 @@ SIDE_RAMP = 0.05  # change of the speed to the left [m/s^2]
 TURN_RAMP = 0.1  # change of a walk's turning rate [rad/s^2, of the reference template]
 RUN_RAMP = 0.15  # and of a run's, which leans into its turns
 BANK_RATE = 0.2  # of the roll into a turn's curve [rad/s, of the reference template]
+# A trunk that turns from its course turns the course, at this rate at most [rad/s, of the reference
+# template], and comes there with this time constant [s, the same].
+FACING_RATE = 0.18
+FACING_TIME = 1.7
 
 
 class LateralMotion:
@@ -52,9 +57,10 @@ class LateralMotion:
 
     ``robot`` is the nominal model, which every tick updates; ``side`` of ``references`` is kept
     here. A foothold that is wanted further than ``reach`` [m] beyond its bounds is out of reach.
-    ``command`` is the speed to the left [m/s] and the rate of the heading [rad/s] by time. They are
-    followed by ``ramps``: of that speed [m/s^2], and of a walk's and of a run's turning rate
-    [rad/s^2]. A jump would move the periodic motion further than one step reaches.
+    ``command`` is the :class:`~.course.Course` by time. It is followed by ``ramps``: of the speed
+    to the left [m/s^2], and of a walk's and of a run's turning rates [rad/s^2]. A jump would move
+    the periodic motion further than one step reaches. ``facing`` are :data:`FACING_RATE` and
+    :data:`FACING_TIME`, scaled.
     """
 
     def __init__(
@@ -65,13 +71,16 @@ class LateralMotion:
         references: References,
         reach: float,
         ramps: tuple[float, float, float],
+        facing: tuple[float, float] = (FACING_RATE, FACING_TIME),
     ) -> None:
         self.robot, self.planner = robot, planner
         self._feet, self._references, self._reach = feet, references, reach
         self._stood: Array = planner.data["stood"][0]
-        self._now: Array = np.zeros(2)  # speed to the left [m/s], rate of the heading [rad/s]
-        self._ramps = ramps
-        self.command: Callable[[float], tuple[float, float]] = lambda time: (0.0, 0.0)
+        # Speed to the left [m/s], rates of the trunk: in the world, and from its course [rad/s].
+        self._now: Array = np.zeros(3)
+        self._ramps, self._facing = ramps, facing
+        self._turns = 0.0  # of the trunk from the course, in the present stride [rad]
+        self.command: Callable[[float], Course] = lambda time: Course()
 
     @classmethod
     def of(
@@ -90,20 +99,23 @@ class LateralMotion:
         ready(LATERAL)
         scale = Scale.of(parameters)
         wish = LateralWish(scaled(options, scale).step_width)
-        planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway)
+        rolling = robot.foot_radius / parameters.rest_length if robot.paired else 0.0
+        planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway, rolling)
         data["bank_rate"] = BANK_RATE / scale.time
         data["unit"], data["pressure"] = scale.time, np.nan
         data["half_width"] = robot.half_width
         turns = TURN_RAMP / scale.time**2, RUN_RAMP / scale.time**2
         ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
-        return cls(robot, planner, feet, references, BEYOND * scale.length, ramps)
+        facing = FACING_RATE / scale.time, FACING_TIME * scale.time
+        return cls(robot, planner, feet, references, BEYOND * scale.length, ramps, facing)
 
     def begin(self, gaits: Iterable[Gait], in_flight: bool) -> None:
         """Begin a run with the first gait that has steps; nothing is learnt yet.
 
         It turns at once, unless it begins in flight.
         """
-        self._now[:] = self.command(0.0)
+        self._now[:2], self._now[2] = self.command(0.0)[:2], 0.0
+        self.robot.facing, self._turns = 0.0, 0.0
         if in_flight:
             self._now[1] = 0.0
         self.planner.reset(next((gait for gait in gaits if gait.step_length), None))
@@ -129,22 +141,27 @@ class LateralMotion:
         """A foot stands where it is now."""
         self._stood[foot] = self.robot.space.foot[foot, :2]
 
-    def end_stride(self, com: Array, nominal: bool, in_flight: bool) -> bool:
+    def end_stride(self, com: Array, nominal: bool, section: Section, time: float) -> bool:
         """Learn from the stride that has just ended, and turn the heading frame.
 
         ``com`` (2,) is :meth:`state` where it ended; ``nominal`` says whether it went near the
-        gait, ``in_flight`` that no foot stands there. True if the frame has turned: the robot has
-        to be read again.
+        gait, where it ended at ``section``. True if the frame has turned: the robot has to be read
+        again. A robot that rests may go anywhere next.
         """
         planner, stance = self.planner, self._feet.landed
         about = self._stood[stance].copy()
         if nominal:
             planner.end_step(SIDES[stance], about[_SIDE], com)
-        if planner.wish.turn:
-            if in_flight:
-                about[0] = self.robot.space.com[0]
-            self._turn(planner.wish.turn, about)
-        return bool(planner.wish.turn)
+        turn, turns = planner.wish.turn, self._turns
+        if section is REST:
+            turns = self.command(time).away(self.robot)
+            turn = -turns
+        if section is APEX:
+            about[0] = self.robot.space.com[0]
+        if turn or turns:
+            self._turn(turn, about)
+            self.robot.facing += turns
+        return bool(turn or turns)
 
     def _turn(self, angle: float, about: Array) -> None:
         """Turn the heading frame about a point of it; what is kept in it turns back."""
@@ -182,10 +199,11 @@ class LateralMotion:
         if not gait.step_length:
             return self._stand(node, supervisor)
         side_ramp, walk_ramp, run_ramp = self._ramps
-        most = gait.step_duration * np.array([side_ramp, walk_ramp if node.stance else run_ramp])
-        self._now += np.clip(self.command(time) - self._now, -most, most)
-        aside, turn = (gait.step_duration * self._now).tolist()
-        planner.wish = replace(planner.wish, aside=aside, turn=turn)
+        turn_ramp = walk_ramp if node.stance else run_ramp
+        most = gait.step_duration * np.array([side_ramp, turn_ramp, turn_ramp])
+        self._now += np.clip(self._wanted(time) - self._now, -most, most)
+        aside, turn, self._turns = (gait.step_duration * self._now).tolist()
+        planner.wish = replace(planner.wish, aside=aside, turn=turn - self._turns)
         planner.walk(gait)
         planner.aim(SIDES[self._feet.landed], turned=True)
         z, target = section.of(sensed.state), supervisor.goal.target
@@ -215,13 +233,22 @@ class LateralMotion:
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node
 
+    def _wanted(self, time: float) -> Array:
+        """(3,) what the command wants of a robot that goes: see ``_now``."""
+        course = self.command(time)
+        if course.turns_round(self.robot):
+            return np.zeros(3)
+        fastest, constant = self._facing
+        turns = min(max(course.away(self.robot) / constant, -fastest), fastest)
+        return np.array([course.left, course.turning, turns])
+
     def _stand(self, node: Node, supervisor: StrideSupervisor) -> Node:
         """A stride that leads to a stand, or from it to a walk: it goes straight on.
 
         A foot that lands in it goes to where the last gait's would.
         """
         planner = self.planner
-        self._now[:] = 0.0
+        self._now[:], self._turns = 0.0, 0.0
         planner.wish = replace(planner.wish, aside=0.0, turn=0.0)
         planner.walk(supervisor.planner.next_gait())
         planner.aim(SIDES[self._feet.landed])
@@ -231,10 +258,10 @@ class LateralMotion:
     def _turn_in_run(self, sensed: TemplateState, duration: float, time: float) -> None:
         """Turn and bank in the stride of a run that begins."""
         data, turn = self.planner.data, self.planner.wish.turn
-        rate = turn / duration
+        data["bank"] = -atan2(sensed.state[2] * turn / duration, self.robot.gravity)
+        turn += self._turns
         data["turn"], data["begun"], data["duration"] = turn, time, duration
-        data["bank"] = -atan2(sensed.state[2] * rate, self.robot.gravity)
-        data["spin"] = self.robot.yaw_inertia() * rate
+        data["spin"] = self.robot.yaw_inertia() * turn / duration
 
     def touch_down(self, foot: int, lasted: float) -> None:
         """A foot has landed, ``lasted`` [s] after the section."""

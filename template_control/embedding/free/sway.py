@@ -46,8 +46,8 @@ def sway(t: Any, r: Any, want: Any) -> None:
 
     Else as the template, in single stance held to its gait. The capture point xi = y + a s / w
     diverges with w = sqrt(a g / h), s the lateral speed with the momentum, a the sway ratio. In the
-    gait's periodic motion it is at X*_y + X*_v / w from the stance foot at the section. The centre
-    of pressure moves beyond it where it is off:
+    gait's periodic motion it is at X*_y + X*_v / w from the stance foot at the section. A sole's
+    centre of pressure moves beyond it where it is off; a pair's would move forward or back too:
 
         s' = sum_i f_i (y - y_i) / (m h) - (z'' + g) / h clip(k e),
         e = xi - y_i - (X*_y + X*_v / w) exp(w t), t since the section, or -t until it.
@@ -72,7 +72,7 @@ def sway(t: Any, r: Any, want: Any) -> None:
     wanted = (lateral.cycle[0] + lateral.cycle[1] / rate) * np.exp(rate * since)
     if not np.isfinite(wanted):
         return  # the path comes to no section
-    bound = _SIDE_SHARE * lateral.half_width
+    bound = _SIDE_SHARE * r.sole_half[r.group[foot, 0], _SIDE]
     moved = min(max(_SIDE_GAIN * (point - wanted), -bound), bound)
     want.sway -= (want.com[5] + r.gravity) / height * moved
 

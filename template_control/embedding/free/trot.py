@@ -54,9 +54,12 @@ _STANCE = PhaseControl(
     tasks=(ComTask((0.01, 10.0)), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
     swings=(Leg.FRONT,),
 )
-_RUNNING_STANCE = replace(_STANCE, swing=RUNNING_SWING)
+# The ground's force has no moment about the line between two feet, which is oblique: feedback that
+# moves x alone moves y too. A walk without push-off has no other means to keep its speed.
+_SWAYING = replace(_STANCE, tasks=(*_STANCE.tasks, SwayTask()))
+_RUNNING_STANCE = replace(_SWAYING, swing=RUNNING_SWING)
 _DOUBLE = PhaseControl(
-    tasks=(ComTask((1.0, 3.0)), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+    tasks=(ComTask((1.0, 3.0)), SwayTask(), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
     unload_legs=(Leg.REAR,),
 )
 
@@ -76,6 +79,8 @@ TROT_PHASES: Phases = {
     ),
     Phase.SS: _STANCE,
     Phase.DS: replace(_DOUBLE, trim_momentum=True),
+    "SS_av^wp": _SWAYING,
+    "SS_bv^wp": _SWAYING,
     "DS_sc^wp": _DOUBLE,
     "DS_sd^wp": _DOUBLE,
     **standing_phases(_STANDING, _STEPPING, UNLOADING),

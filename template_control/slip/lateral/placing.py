@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,6 +169,23 @@ def lateral_aim(
         reach=options.reach,
         stretch=learnt.stretch,
     )
+
+
+@compiled
+def pivot(contact: Any, com: Any, rolling: Any) -> Any:
+    """y of the point about which the CoM falls, of a foot that rolls on the ground [m].
+
+    ``contact`` is y of the foot's contact, ``com`` that of the CoM [m]; ``rolling`` is by how much
+    the contact moves per way of the CoM, the foot's radius over the leg's length. From the pivot,
+    which rests, the CoM is 1 / (1 - rolling) times as far away as from the contact.
+    """
+    return (contact - rolling * com) / (1.0 - rolling)
+
+
+@compiled
+def contact(pivot: Any, com: Any, rolling: Any) -> Any:
+    """y of the contact of a foot whose pivot is there: the inverse of :func:`pivot` [m]."""
+    return (1.0 - rolling) * pivot + rolling * com
 
 
 @compiled

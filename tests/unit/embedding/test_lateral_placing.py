@@ -25,6 +25,7 @@ from template_control.slip import (
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.lateral.path import transition
 from template_control.slip.lateral.placing import LATERAL as KERNELS
+from template_control.slip.lateral.placing import contact, pivot
 from template_control.slip.maps.section import VLO
 from template_control.warm_up import ready
 
@@ -224,3 +225,18 @@ def test_a_tick_compiles_nothing_anew():
     cycle, two = lateral_cycle(LATERAL, LateralWish(1)), np.zeros(2)
     place(PATH, lateral_aim(LATERAL, cycle, Side.LEFT, LateralLearnt(), options), 0.0, two, two)
     assert [len(f.signatures) for f in (place, transition)] == known
+
+
+def test_the_com_falls_away_from_the_pivot_of_a_foot_that_rolls():
+    rolling, stiffness, dt = 0.07, 29.0, 1e-4
+    y, speed, foot = 0.02, 0.1, -0.01
+    rests = pivot(foot, y, rolling)
+    rate, ahead, start = np.sqrt((1.0 - rolling) * stiffness), speed, y - rests
+    for _ in range(2000):
+        speed += 0.5 * dt * stiffness * (y - foot)
+        y, foot = y + dt * speed, foot + rolling * dt * speed
+        speed += 0.5 * dt * stiffness * (y - foot)
+    time = 2000 * dt
+    falls = start * np.cosh(rate * time) + ahead / rate * np.sinh(rate * time)
+    assert y == pytest.approx(rests + falls, rel=1e-6)
+    assert foot == pytest.approx(contact(rests, y, rolling), abs=1e-12)

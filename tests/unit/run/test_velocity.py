@@ -26,7 +26,7 @@ def test_times_rise_from_zero(times):
 def test_a_command_stays_as_it_was_where_it_is_set_to_none():
     command = tc.run.VelocityCommand(0.5)
     command.set(0.6, 0.1, -0.2)
-    for wrong in ((-0.5, 0.0, 0.0), (0.5, np.nan, 0.0), (0.5, 0.0, 7.0)):
+    for wrong in ((-30.0, 0.0, 0.0), (0.5, np.nan, 0.0), (0.5, 0.0, 7.0)):
         with pytest.raises(ParameterError, match="commanded"):
             command.set(*wrong)
     assert command.at(3.0) == (0.6, 0.1, -0.2)
@@ -38,7 +38,7 @@ def test_a_profile_is_in_the_experiments_file(tmp_path):
     assert 'kind = "velocity"' in path.read_text()
     prepared = tc.Experiment.load(path).prepare()
     assert prepared.velocity == PROFILE
-    assert prepared.heading(3.0) == (0.05, 0.2)
+    assert prepared.heading(3.0)[:2] == (0.05, 0.2)
     goal = prepared.motion.next(prepared.motion.section, prepared.motion.start, 3.0)
     assert goal.wanted_speed == 0.6
 

@@ -1,0 +1,51 @@
+"""Where a floating-base robot is to go, and where its trunk is to face."""
+
+from math import nan, pi
+
+import pytest
+
+import template_control as tc
+from template_control.embedding.free.course import Course
+from template_control.run.velocity import VelocityCommand, course_at
+
+
+@pytest.fixture(scope="module")
+def go2():
+    return tc.load_floating_robot("go2")
+
+
+@pytest.mark.parametrize(
+    ("velocity", "facing"),
+    [((0.5, 0.0), 0.0), ((0.0, 0.4), -0.5 * pi), ((-0.4, 0.0), -pi), ((0.3, -0.3), 0.25 * pi)],
+)
+def test_a_quadruped_goes_along_its_velocity(go2, velocity, facing):
+    course = course_at(VelocityCommand(*velocity, 0.1), 0.0, go2)
+    assert course == (0.0, 0.1, pytest.approx(facing))
+
+
+def test_at_rest_it_faces_as_it_does(go2):
+    course = course_at(VelocityCommand(0.0), 0.0, go2)
+    go2.facing = 2.0
+    assert course.away(go2) == 0.0
+    assert not course.turns_round(go2)
+
+
+def test_it_turns_the_shorter_way_and_stops_before_it_turns_round(go2):
+    go2.facing = -3.0
+    assert Course(facing=3.0).away(go2) == pytest.approx(6.0 - 2.0 * pi)
+    assert not Course(facing=3.0).turns_round(go2)
+    assert Course(facing=0.0).turns_round(go2)
+
+
+def test_a_biped_places_its_feet_aside():
+    bolt = tc.load_floating_robot("bolt")
+    course = course_at(VelocityCommand(0.5, 0.05, 0.1), 0.0, bolt)
+    assert course == pytest.approx((0.05, 0.1, nan), nan_ok=True)
+
+
+def test_the_yaw_is_that_from_where_the_trunk_is_to_face(go2):
+    q = go2.neutral()
+    go2.facing = 0.4
+    go2.face(-0.3, go2.origin.copy())
+    go2.update(q, 0.0 * go2.space.turning_jacobian[0])
+    assert go2.roll_pitch_yaw() == pytest.approx((0.0, 0.0, -0.1), abs=1e-12)
