@@ -196,6 +196,7 @@ class LateralMotion:
         robot is in then.
         """
         planner, gait = self.planner, supervisor.planner.gait
+        planner.data["section_began"] = time
         if not gait.step_length:
             return self._stand(node, supervisor)
         side_ramp, walk_ramp, run_ramp = self._ramps
@@ -222,7 +223,6 @@ class LateralMotion:
             feet = self._stood[list(supervisor.feet), _SIDE]
             return planner.forecast(supervisor.path, com, feet)
 
-        planner.data["section_began"] = time
         if not node.stance:
             planner.expect(inf)
             self._turn_in_run(sensed, gait.step_duration, time)
