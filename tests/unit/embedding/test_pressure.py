@@ -1,5 +1,7 @@
 """Centre of pressure through a list of phases, and the curves over feet that it gives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -112,3 +114,17 @@ def test_a_com_that_is_about_to_pass_is_not_thrown_back():
     late = np.array([[-0.1, 1.0, 0.0], [0.95, 0.2, 0.0]])
     found, _ = feet.to_liftoff(late, liftoff[None], False)
     assert samples(found)[0][-1] < 0.25
+
+
+def test_a_start_leaves_time_to_shift_the_com_aside():
+    liftoff = np.array([[0.08, 0.5, 0.0], [0.96, 0.1, 0.0]])
+
+    def lasts(shift, speed=0.0, lands=False):
+        feet = OverFeet((0.0, 0.1), P, replace(OPTIONS, shift=shift))
+        start = np.array([[0.05, speed, 0.0], [OPTIONS.height, 0.0, 0.0]])
+        found, _ = feet.to_liftoff(start, liftoff[None], lands)
+        return sum(piece.duration for piece in found.pieces)
+
+    assert lasts(0.0) < 0.8 <= lasts(0.8)
+    assert lasts(0.8, speed=0.3) == lasts(0.0, speed=0.3), "it does not begin at rest"
+    assert lasts(0.8, lands=True) == lasts(0.0, lands=True)

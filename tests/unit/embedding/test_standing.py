@@ -141,6 +141,9 @@ def test_a_start_leads_to_vlo(planners, spacing):
     u = decision.controls
     again = tc.simulate_stride(P, "SS_bv^w", before[:4], u, (spacing, spacing))
     np.testing.assert_allclose(again.state, stride.state, atol=1e-6)
+    gait = planner.next_gait()
+    assert gait.state[0] == pytest.approx(max(stride.state[2], FAMILY.speeds[0]))
+    assert planners["ws"].next_gait() is None
 
 
 def test_wider_feet_start_faster(planners):
