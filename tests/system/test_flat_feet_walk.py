@@ -11,6 +11,8 @@ from template_control.plant.bullet import PlantOptions
 from template_control.run.record import SoleRecord
 from template_control.run.specs import GaitSpec
 from template_control.slip.automaton.vocabulary import Phase
+from template_control.view.replay.film import Stage
+from template_control.view.replay.playback import playback
 
 
 def walk(robot, steps, **given):
@@ -68,6 +70,10 @@ def test_g1_walks_and_is_recorded(tmp_path):
     assert record.plot("pressure").axes
     assert record.plot("stick_diagram").axes
     tc.save_html(record, tmp_path / "replay.html")
+    stage = Stage(playback(record, fps=2.0))
+    trunk = stage.seen(stage.body.trunk())[:, 1]
+    low, high = stage.figure.axes[0].get_ylim()
+    assert low < trunk.min() < trunk.max() < high, "its trunk is in the film"
 
 
 @pytest.mark.slow(6)

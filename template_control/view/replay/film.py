@@ -27,8 +27,9 @@ from template_control.view.style import COM, SIDES, TEMPLATE, TRUNK, as_text, fe
 
 Array = NDArray[np.float64]
 
-_WIDTH = 2.6  # of the picture, in rest lengths
-_HIGH = 0.75 * _WIDTH  # of the picture
+_WIDTH = 2.6  # of the picture, in rest lengths, at the least
+_FLATTER = 0.75  # height of the picture over its width
+_OVER = 1.3  # height over the ground that is shown, over the robot's, at the least
 _BELOW = 0.08, 0.22  # share of the picture's height under the ground, planar and in space
 _AROUND = 3.0  # rest lengths of ground that are drawn next to the path
 _LEFTWARD, _ABOVE = np.radians(-25.0), np.radians(18.0)  # the camera's, from a view from the right
@@ -73,6 +74,10 @@ class Stage:
         axes.set_aspect("equal", adjustable="box")
         self._draw_ground(flat)
         self._level = smoothed(record.ground, self._space.com[playback.rows, 0], length)
+        self.body.place(record.q[playback.rows[0]])
+        tall = float(self.body.trunk()[:, 2].max() - self._level[0]) * self.camera[1, 2]
+        high = max(_FLATTER * _WIDTH * length, _OVER * tall / (1.0 - self._below))
+        self._size = high / _FLATTER, high
 
         def line(marker: str, zorder: float, **look: Any) -> Line2D:
             return axes.plot([], [], marker, zorder=zorder, **look)[0]
@@ -158,8 +163,8 @@ class Stage:
         self._forces.set_offsets(seen(feet))
         self._forces.set_UVC(*seen(space.arrow[row]).T)
         x, y = seen(np.array([com[0], com[1], self._level[frame]])).tolist()
-        half, high = 0.5 * _WIDTH * self._length, _HIGH * self._length
-        self._axes.set_xlim(x - half, x + half)
+        wide, high = self._size
+        self._axes.set_xlim(x - 0.5 * wide, x + 0.5 * wide)
         self._axes.set_ylim(y - self._below * high, y + (1.0 - self._below) * high)
         self._time.set_text(f"{record.time[row]:.2f} s")
 
