@@ -14,7 +14,7 @@ from template_control.plant.plant import Plant
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.experiment import PreparedExperiment
 from template_control.run.options import Push
-from template_control.run.velocity import Velocity, VelocityCommand
+from template_control.run.velocity import Velocity, VelocityCommand, check_direction
 
 
 class Hand:
@@ -40,8 +40,7 @@ class Hand:
     """
 
     def __init__(self, o: PreparedExperiment, plant: Plant) -> None:
-        self._plant, self._planar = plant, not isinstance(o.robot, FloatingBaseBiped)
-        self._name = o.robot.name
+        self._plant, self._robot = plant, o.robot
         self._command = o.velocity if isinstance(o.velocity, VelocityCommand) else None
         self._changes = o.changes
         self.pushes = list(o.pushes)
@@ -68,8 +67,10 @@ class Hand:
             ParameterError: if a number is out of its range, or a planar robot is to be pushed
                 elsewhere than forward or backward.
         """
-        if self._planar and direction:
-            raise ParameterError(f"{self._name} is held in its plane: push it forward or backward")
+        if direction and not isinstance(self._robot, FloatingBaseBiped):
+            raise ParameterError(
+                f"{self._robot.name} is held in its plane: push it forward or backward"
+            )
         self._ask(Push(impulse, duration=duration, direction=direction, time=0.0))
 
     def set_friction(self, friction: float) -> None:
@@ -100,8 +101,7 @@ class Hand:
             raise ParameterError(
                 "the run's motion is not commanded: give its experiment a VelocityCommand"
             )
-        if self._planar and (left or turning):
-            raise ParameterError(f"{self._name} is held in its plane: command it only forward")
+        check_direction(self._robot, forward, left, turning)
         self._ask(VelocityCommand(forward, left, turning).at(0.0))
 
     def _ask(self, deed: Any) -> None:

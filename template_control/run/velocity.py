@@ -206,6 +206,17 @@ def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: B
     return Course(0.0, turning, -atan2(left, forward) if forward or left else nan)
 
 
+def check_direction(robot: Biped, forward: float, left: float, turning: float) -> None:
+    """Check that a robot can go in the direction of a velocity; a ParameterError if not."""
+    if not isinstance(robot, FloatingBaseBiped) and (left or turning):
+        raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
+    if forward < 0.0 and not robot.paired:
+        raise ParameterError(
+            f"{robot.name} goes forward only, as a quadruped does not: command it a speed of 0 or"
+            " more"
+        )
+
+
 def velocity_route(
     robot: Biped, motion: VelocityProfile | VelocityCommand, course: HeadingCommand
 ) -> tuple[VelocityProfile | VelocityCommand, SpeedRoute]:
@@ -230,14 +241,8 @@ def velocity_route(
 
     def forward(time: float) -> float:
         speed, *others = velocity.at(time)
-        if planar and any(others):
-            raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
-        if not isinstance(robot, FloatingBaseBiped) or not robot.paired:
-            if speed < 0.0:
-                raise ParameterError(
-                    f"{robot.name} goes forward only, as a quadruped does not: command it a speed"
-                    " of 0 or more"
-                )
+        check_direction(robot, speed, *others)
+        if not (isinstance(robot, FloatingBaseBiped) and robot.paired):
             return speed
         course = course_at(velocity, time, robot)
         return 0.0 if course.turns_round(robot) else hypot(speed, others[0])

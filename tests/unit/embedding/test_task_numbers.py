@@ -38,7 +38,10 @@ def test_a_phase_or_a_node_is_named_before_the_task():
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"com": {"gain": 1.0}}, r"unknown key EmbeddingOptions.tasks.com.gain: .* weight, gains"),
+        (
+            {"com": {"gain": 1.0}},
+            r"unknown key EmbeddingOptions.tasks.com.gain \(did you mean gains\?",
+        ),
         ({"com": {"gains": (1.0, -1.0)}}, "EmbeddingOptions.tasks.com.gains is"),
         ({"trunk": {"weight": 1.0}}, "tasks.trunk is no task of a phase: give one of com, foot"),
         ({"XX.com": {"weight": 1.0}}, "tasks.XX.com is no task"),

@@ -143,7 +143,7 @@ def test_long_walks_are_thinned_unless_told_otherwise(parsed, tmp_path):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("step = 3", "unknown key step: known are robot,"),
+        ("step = 3", "unknown key step (did you mean steps?): known are robot,"),
         ("steps = 'x'", "steps is 'x': give a whole number"),
         ("delay = 0.0005", "delay is 0.0005 s: give a multiple"),
         ("[world]\nkind = 'moon'", "world.kind is 'moon': give one of"),
