@@ -33,6 +33,10 @@ _FASTEST_WALK = 0.38
 """Mean speed over sqrt(g l0) above which a floating base that can run no longer walks: it has the
 room to turn and to step to the left there."""
 
+_FASTEST_ON_SOLES = 0.31
+"""The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of
+0.9 m/s, in whose swings its hips are at the end of their range."""
+
 Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
 
@@ -174,6 +178,8 @@ class VelocityRange:
             low, high = walking_speeds(robot)
         except GaitError:
             low, high = family_speeds(p)
+        if robot.patches:
+            high = min(high, _FASTEST_ON_SOLES * p.speed_unit)
         speeds = float(np.ceil(100.0 * low)) / 100.0, float(np.floor(100.0 * high)) / 100.0
         first = min(max(round(default_gait(robot).mean_speed, 2), speeds[0]), speeds[1])
         unit = p.speed_unit
