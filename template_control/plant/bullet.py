@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -35,6 +36,17 @@ _POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
 _ANGULAR_FIRST = (3, 4, 5, 0, 1, 2)  # places of a velocity's components, linear first
 AXES = {2: [0, 2], 3: [0, 1, 2]}
 """Of a force's components, by how many there are."""
+
+
+def moment(place: Sequence[float], force: Sequence[float]) -> tuple[float, float, float]:
+    """Moment of a force about the origin [N m]; NumPy's cross product takes 40 us.
+
+    Args:
+        place: (3,) where it acts [m].
+        force: (3,) [N].
+    """
+    (x, y, z), (fx, fy, fz) = place, force
+    return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
 
 @dataclass(frozen=True)
@@ -305,7 +317,8 @@ class BulletPlant:
             for i, part in enumerate(force):
                 forces[foot, i] += part
             if forces.shape[1] == PATCH:
-                forces[foot, 3:] += np.cross(contact[6], force)
+                for i, part in enumerate(moment(contact[6], force), 3):
+                    forces[foot, i] += part
 
     def step(self, torque: Array, push: float = 0.0) -> None:
         """Advance one physics step.

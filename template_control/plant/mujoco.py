@@ -13,7 +13,7 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_mass_matrix
-from template_control.plant.bullet import AXES, PlantOptions
+from template_control.plant.bullet import AXES, PlantOptions, moment
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.plant.terrain import pieces
 from template_control.robot.biped import Biped
@@ -169,7 +169,8 @@ class MujocoPlant:
             force = (contacts.frame[i].reshape(3, 3).T @ self._force[:3])[axes]
             force = force if ours else -force
             if rows == PATCH:
-                force = np.concatenate((force, np.cross(contacts.pos[i], force)))
+                turning = moment(contacts.pos[i].tolist(), force.tolist())
+                force = np.concatenate((force, turning))
             self._forces[foot] += force
 
     def step(self, torque: Array, push: float = 0.0) -> None:

@@ -8,7 +8,7 @@ import pytest
 from falling import DT, FREE, PLANAR, falls_as_pinocchio_says
 
 from template_control.errors import RobotError
-from template_control.plant.bullet import BulletPlant, PlantOptions
+from template_control.plant.bullet import BulletPlant, PlantOptions, moment
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import (
@@ -172,3 +172,9 @@ def changed_mjcf(robot):
     from template_control.plant.mjcf import mjcf
 
     return mjcf(robot, MujocoOptions(), 4e-3).replace("-0.45", "-0.451", 1)
+
+
+def test_a_moment_is_numpy_s_cross_product():
+    for place, force in np.random.default_rng(0).normal(size=(50, 2, 3)):
+        found = moment(place.tolist(), force.tolist())
+        np.testing.assert_array_equal(found, np.cross(place, force))
