@@ -38,13 +38,16 @@ def run(options: argparse.Namespace) -> int:
 
 
 def scenarios() -> None:
-    """The paper's controllers on all maps: Example I."""
+    """The paper's controllers on all maps: Example I, and a walking step without a guess."""
     from template_control.slip.automaton.vocabulary import MapKind
+    from template_control.slip.control.controllers import ModifiedWalking
+    from template_control.slip.parameters import SlipParameters
     from template_control.slip.scenario.run import simulate_scenario
     from template_control.slip.scenario.scenario import example_one
 
     for kind in MapKind:
         simulate_scenario(example_one(kind))
+        ModifiedWalking(SlipParameters(), kind).solve((1.1, 0.98, 0.0), (1.1, 0.98, 0.0))
 
 
 def basins() -> None:

