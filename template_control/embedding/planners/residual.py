@@ -59,6 +59,7 @@ class ResidualPlanner(Planner):
     def reset(self) -> None:
         """See :meth:`Planner.reset`; the residual stays."""
         self.planner.reset()
+        self._map = ReturnMap(self.gait.parameters, self.gait.stride)
 
     def decide(self, context: Context) -> Decision:
         """See :meth:`Planner.decide`."""
