@@ -21,19 +21,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the script; returns 0."""
-    from template_control.cli.main import full_parser
+    from template_control.cli.main import all_actions, full_parser
 
     parser = full_parser()
-    _show_all(parser)
+    for action in all_actions(parser):
+        if action.help == argparse.SUPPRESS:
+            action.help = ""  # a key, which no help lists and which is completed all the same
     print(shtab.complete(parser, options.shell))
     return 0
-
-
-def _show_all(parser: argparse.ArgumentParser) -> None:
-    """Let the keys be completed too, which no help lists."""
-    for action in parser._actions:
-        if action.help == argparse.SUPPRESS:
-            action.help = ""
-        if isinstance(action, argparse._SubParsersAction):
-            for command in action.choices.values():
-                _show_all(command)

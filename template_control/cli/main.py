@@ -109,17 +109,18 @@ class _Parser(argparse.ArgumentParser):
         if ours:
             raise ParameterError(f"{option} is {reason}")
         unknown = re.match(r"unrecognized arguments: (--\S+)", message)
-        near = meant(unknown[1], _options(self)) if unknown else ""
+        known = (option for action in all_actions(self) for option in action.option_strings)
+        near = meant(unknown[1], known) if unknown else ""
         raise ParameterError(f"{option}{near}; {self.prog} --help lists what there is")
 
 
-def _options(parser: argparse.ArgumentParser) -> Iterator[str]:
-    """Options of a parser and of its commands."""
+def all_actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Actions of a parser and of its commands."""
     for action in parser._actions:
-        yield from action.option_strings
+        yield action
         if isinstance(action, argparse._SubParsersAction):
             for command in action.choices.values():
-                yield from _options(command)
+                yield from all_actions(command)
 
 
 def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
