@@ -2,7 +2,8 @@
 
 Run: python benchmarks/live_page.py [--robots five-link go2] [--tabs 1] [--seconds 20]
 
-Where there is no graphics card, Chromium draws on the same cores: run nothing else meanwhile.
+Where there is no graphics card, Chromium draws on the same cores, at a lower priority: run nothing
+else meanwhile.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def measured(robot: str, tabs: int, seconds: float) -> str:
         shown = [
             subprocess.Popen(
                 [
-                    browser, *WAYS, "--remote-debugging-port=0", "--window-size=320,200",
+                    "nice", browser, *WAYS, "--remote-debugging-port=0", "--window-size=320,200",
                     f"--user-data-dir={folder}/{tab}", page.url,
                 ],
                 stderr=subprocess.DEVNULL,

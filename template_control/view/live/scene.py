@@ -32,10 +32,13 @@ _SEEN = 12.0  # of l0: the ground to all sides of the robot
 _RENEWED = 6.0  # of l0: so far the robot goes on a ground before it gets another one
 _SHADE = 0.85  # of a shape's colour: white ones are to be seen on white
 _TRUNK = 0.42  # opacity: the CoM and the template are in the trunk, and to be seen
+_VISIBLE = 2e-4  # of a place [m] or a quaternion: less than a pixel of the page
 _TRAIL, _TRAILED = 60, 2  # points of the CoM's trail, and frames between them
 _FOOTHOLDS = 6  # of each foot
 # From afar with a narrow view: little perspective, so that lengths can be compared.
 _PLANAR_EYE, _FLOATING_EYE, _VIEW = (1.6, -9.0, 1.0), (4.5, -7.5, 2.6), 0.24
+_MIDDLE = 0.62  # of l0: height of the middle of the picture, at the least
+_SHOWN = 0.53  # of the robot's height: size of a picture that has 0.07 of it to spare
 _NONE = np.zeros(3)
 
 
@@ -55,6 +58,23 @@ class _Span:
             self.node.scale = size if self.grows else (1.0, 1.0, size)
 
 
+class _Joint:
+    """A joint's node, to whose place relative to its parent's only visible changes are sent."""
+
+    def __init__(self, node: Any) -> None:
+        self.node, self._shown = node, np.zeros(7)
+
+    def put(self, place: pin.SE3) -> None:
+        """Let the node be at a place."""
+        pose = pin.SE3ToXYZQUAT(place)
+        moved = abs(pose - self._shown) > _VISIBLE
+        if moved[:3].any():
+            self.node.position = self._shown[:3] = pose[:3]
+        if moved[3:].any():
+            self._shown[3:] = pose[3:]
+            self.node.wxyz = pose[[6, 3, 4, 5]]
+
+
 def _turned(direction: Array) -> Array:
     """Quaternion w, x, y, z that turns the vertical into a direction (3,)."""
     return np.asarray(turned_to(direction[None])[0][[3, 0, 1, 2]])
@@ -67,6 +87,10 @@ class LiveScene:
         scene: viser's, of a server; all that is in it is removed.
         record: of the run so far; its robot and its facts are drawn.
         ground: that the robot walks on.
+
+    Attributes:
+        body: what all frames have in common.
+        joints: nodes of the robot's joints.
     """
 
     def __init__(self, scene: Any, record: Record, ground: Terrain) -> None:
@@ -79,11 +103,13 @@ class LiveScene:
         self._model, self._data = model, model.createData()
         self._length = length = self.body.length
         self._floating = isinstance(record, FloatingRecord)
-        self._size = length + _spread(record)
+        top = _top(model, shapes, record.q[0]) - float(ground.height_at(record.com[0, 0]))
+        self._middle = max(_MIDDLE * length, 0.5 * top)
+        self._size = max(length + _spread(record), _SHOWN * top)
         self._world = scene.add_frame("/world", show_axes=False)
         self._place: tuple[float, float] | None = None  # middle of the ground that is drawn
         hip = model.getJointId(record.joints[record.legs[0][0]])
-        self._joints = self._add_robot(shapes, visuals, trunk=model.parents[hip])
+        self.joints = self._add_robot(shapes, visuals, trunk=model.parents[hip])
         self._com = self._ball("com", 0.025, COM)
         self._template = self._ball("template", 0.016, TEMPLATE)
         self._legs = [self._add_leg(name) for name in ("rear_leg", "front_leg")]
@@ -104,14 +130,15 @@ class LiveScene:
         camera.position = tuple(self._size * x for x in eye)
         camera.look_at, camera.fov = (0.0, 0.0, 0.0), _VIEW
 
-    def _add_robot(self, shapes: pin.GeometryModel, visuals: Any, trunk: int) -> dict[int, Any]:
-        """Nodes of the joints that have a shape, by joint."""
-        nodes: dict[int, Any] = {}
+    def _add_robot(self, shapes: pin.GeometryModel, visuals: Any, trunk: int) -> list[_Joint]:
+        """Nodes of the robot's joints, each below that of its parent, and their shapes."""
+        model, scene = self._model, self._scene
+        paths = ["/world/robot"]
+        for joint in range(1, model.njoints):
+            paths.append(f"{paths[model.parents[joint]]}/{joint}")
+        nodes = [_Joint(scene.add_frame(path, show_axes=False)) for path in paths[1:]]
         for shape, visual in zip(shapes.geometryObjects, visuals, strict=True):
             joint = shape.parentJoint
-            path = f"/world/robot/{joint}"
-            if joint not in nodes:
-                nodes[joint] = self._scene.add_frame(path, show_axes=False)
             place = pin.SE3ToXYZQUAT(shape.placement)
             *color, opacity = visual.color
             look = {
@@ -123,7 +150,7 @@ class LiveScene:
                 "wxyz": place[[6, 3, 4, 5]],
                 "cast_shadow": False,
             }
-            self._add_shape(f"{path}/{visual.name}", shape.geometry, look)
+            self._add_shape(f"{paths[joint]}/{visual.name}", shape.geometry, look)
         return nodes
 
     def _add_shape(self, path: str, shape: Any, look: dict[str, Any]) -> None:
@@ -181,12 +208,11 @@ class LiveScene:
         """
         x, y, _ = frame.com.tolist()
         level = float(smoothed(self._terrain, np.array([x]), self._length)[0])
-        self._world.position = (-x, -y, -level - 0.62 * self._length)
+        self._world.position = (-x, -y, -level - self._middle)
         self._renew_ground(x, y)
         pin.forwardKinematics(self._model, self._data, frame.q)
-        for joint, node in self._joints.items():
-            place = pin.SE3ToXYZQUAT(self._data.oMi[joint])
-            node.position, node.wxyz = place[:3], place[[6, 3, 4, 5]]
+        for joint, node in enumerate(self.joints, start=1):
+            node.put(self._data.liMi[joint])
         self._com.position, self._template.position = frame.com, frame.template
         for leg, toe, loaded in zip(self._legs, frame.toes, frame.loaded.tolist(), strict=True):
             leg.reach(frame.template, toe - frame.template, loaded)
@@ -264,6 +290,18 @@ def _spread(record: Record) -> float:
     foot = record.foot[0]
     groups = (foot[list(group)] for group in record.groups if group)
     return float(max(np.abs(places - places.mean(axis=0)).max() for places in groups))
+
+
+def _top(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> float:
+    """Height of a robot's highest shape, taken for the ball around its box [m]."""
+    data, places = model.createData(), shapes.createData()
+    pin.updateGeometryPlacements(model, data, shapes, places, q)
+    tops = []
+    for shape, place in zip(shapes.geometryObjects, places.oMg, strict=True):
+        shape.geometry.computeLocalAABB()
+        ball = shape.geometry
+        tops.append(place.act(ball.aabb_center)[2] + ball.aabb_radius)
+    return float(max(tops))
 
 
 def _rgb(color: str) -> tuple[int, int, int]:

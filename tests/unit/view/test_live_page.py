@@ -8,6 +8,7 @@ import sys
 import time
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from chromium import CHROMIUM, NONE_HERE, Chromium, until
 
@@ -17,8 +18,9 @@ from template_control.view.live.figures import Figures, Step
 from template_control.view.live.frame import Body
 from template_control.view.live.pace import Pace
 from template_control.view.live.page import first_push
+from template_control.view.live.scene import LiveScene
 from template_control.view.live.server import PageServer, is_own
-from template_control.view.replay.robot_visuals import foot_sides, model_of
+from template_control.view.replay.robot_visuals import foot_sides, load_visuals, model_of
 from template_control.view.replay.scene import in_space
 
 # Clock.
@@ -89,6 +91,38 @@ def test_a_frame_is_what_a_replay_shows(floating):
     assert max(left, right) == pytest.approx(np.max(share / limit))
     assert ground == pytest.approx(columns["contact_force"][..., 1].sum() / 3.0 / record.weight)
     assert template == pytest.approx(columns["template_force"][..., 1].sum() / 3.0 / record.weight)
+
+
+def test_joints_are_drawn_where_they_are_and_what_stands_still_is_not_sent_again():
+    with tc.run.LiveRun(tc.Experiment(tc.load_floating_robot("bolt"))) as run:
+        for tick in run:
+            if tick.number == 150:
+                break
+        latest, record = run.recorder.latest(150), run.record()
+    server = PageServer(None)
+    try:
+        scene = LiveScene(server.viser.scene, record, tc.Terrain.flat())
+        at = [scene.body.frame({k: v[: i + 1] for k, v in latest.items()}) for i in (20, 149)]
+        for frame in at:
+            scene.draw(frame)
+        model, _, _ = load_visuals(record)
+        data = model.createData()
+        pin.forwardKinematics(model, data, at[-1].q)
+        places = {0: pin.SE3.Identity()}
+        for joint, drawn in enumerate(scene.joints, start=1):
+            turn = pin.Quaternion(*np.asarray(drawn.node.wxyz)).matrix()
+            places[joint] = places[model.parents[joint]] * pin.SE3(turn, drawn.node.position)
+            assert pin.log6(places[joint].actInv(data.oMi[joint])).vector == pytest.approx(
+                np.zeros(6), abs=2e-3
+            )
+        sent = []
+        server.viser.scene._websock_interface.queue_message = sent.append
+        for frame, moves in ((at[-1], False), (at[0], True)):
+            scene.draw(frame)
+            names = [getattr(message, "name", "") for message in sent]
+            assert any(name.startswith("/world/robot/") for name in names) is moves
+    finally:
+        server.close()
 
 
 def test_the_speed_is_that_of_the_last_step():
