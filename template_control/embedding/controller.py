@@ -155,7 +155,7 @@ class EmbeddingController:
             keeps = self.feet, self.references, tick["lateral"]
             self.lateral = LateralMotion.of(robot, self.parameters, given, *keeps)
         self._terms = robot.data, robot.arrays
-        self._memory = self.references.data, self.qp.data
+        self._memory = self._tick, robot.data, self.references.data, self.qp.data
         self.memory = tick, robot.data, self.references.data
 
     @property
@@ -275,7 +275,7 @@ class EmbeddingController:
         felt = NO_FORCE if force is None or self.lateral is not None else force
         if self.frame.angle != 0.0:
             felt = self.frame.inward(felt)
-        found = sense(self._tick, self.robot.data, *self._memory, contact, felt, dt)
+        found = sense(*self._memory, contact, felt, dt)
         if found == DIVERGED:
             raise self.observer.diverged()
         return bool(found != QUIET) or self._slope_unknown
@@ -300,23 +300,24 @@ class EmbeddingController:
         """Write the plan to where ticks read it."""
         now = self._tick[0]
         self.path_clock.take(self.supervisor)
-        stand(self._tick, self.robot.data, *self._memory)
+        stand(*self._memory)
         now["trim"] = self.learners.trim.acceleration
         sideways = None if self.lateral is None else self.lateral.arrays(self.supervisor)
-        self._path: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
+        tick, _, *memory = self._memory
+        path = tuple(self.supervisor.path.curve), sideways
+        self._parts: tuple[Any, ...] = tick, self._terms, *memory, *path
 
     def _act(self, dt: float) -> Solution:
         """References, rows and torques."""
         qp, tasks = self.qp, self.mode.tasks
-        room = qp.room(int(qp.data["contacts"][0]), self.learners.load.factor)
-        parts = self._tick, self._terms, *self._memory, *self._path
-        rows = tasks.program, tasks.table, dt
+        room = qp.room(self.learners.load.factor)
+        program, table = tasks.program, tasks.table
         if tasks.others:
-            advance(*parts, rows)
+            advance(*self._parts, (program, table, dt))
             tasks.write_others(self.robot, self.references)
-            kind = solve_free(qp.data, *self._terms, tasks.table, room)
+            kind = solve_free(qp.data, *self._terms, table, room)
         else:
-            kind = act(*parts, (*rows, room))
+            kind = act(*self._parts, (program, table, dt, room))
         solution = qp.finish(kind, tasks, room)
         if self.frame.angle == 0.0:
             return solution

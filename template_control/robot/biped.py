@@ -187,7 +187,9 @@ class Biped(Robot):
         )
         self.heading_frame: Array = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
         self.data["foot_radius"], self.data["leg_length"] = foot_radius, self.leg_length
-        self._sources = sources(model, data, self._foot_ids, self._joint_limits)
+        self._sources = sources(
+            model, data, self._foot_ids, self._joint_limits, planar=self.directions <= UP
+        )
         self._take_patches()
         self._look()
         self.spread = np.zeros((len(feet), 2))
@@ -310,14 +312,12 @@ class Biped(Robot):
             the world's axes [m/s^2, rad/s^2].
         """
         model, data = self.model, self._data
+        place, drift = pin.updateFramePlacement, pin.getFrameClassicalAcceleration
         pin.computeAllTerms(model, data, q, v)
         pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
-        drift = []
         for frame in self._foot_ids:
-            pin.updateFramePlacement(model, data, frame)
-            bias = pin.getFrameClassicalAcceleration(model, data, frame, WORLD_ALIGNED)
-            drift.append(bias.vector)
-        return tuple(drift)
+            place(model, data, frame)
+        return tuple([drift(model, data, i, WORLD_ALIGNED).vector for i in self._foot_ids])
 
     def neutral(self) -> Array:
         """(nq,) upright, with straight vertical legs."""

@@ -122,15 +122,17 @@ Sources = tuple[Any, ...]
 """Views into Pinocchio's data: a plain tuple, with which a call takes half of the time."""
 
 
-def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array) -> Sources:
+def sources(
+    model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array, *, planar: bool
+) -> Sources:
     """Views that :func:`gather_planar` reads in Pinocchio's data, which every update writes.
 
     ``frames`` are the contacts'; ``limits`` (4, nu) the joints' largest speeds [rad/s], lower and
-    upper stops [rad], damping [N m s/rad].
+    upper stops [rad], damping [N m s/rad]. A planar robot's have no rotations.
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.g)
     places = tuple(data.oMf[frame].translation for frame in frames)
-    turns = tuple(data.oMf[frame].rotation for frame in frames)
+    turns = () if planar else tuple(data.oMf[frame].rotation for frame in frames)
     return (*whole, places, turns, data.Jcom, data.Ag, data.J, carrying(model, frames), limits)
 
 

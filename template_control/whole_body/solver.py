@@ -291,6 +291,7 @@ class WholeBodyQp:
             for bounded in (0, nu)
         )
         self._torque = np.zeros(nu)
+        self._contacts, self._sizes = self.data["contacts"], (nu, robot.nv, robot.contact_rows)
         self._load = 1.0
         self.torque_limit = robot.torque_limit * o.torque_scale
         self._failing = False
@@ -322,23 +323,20 @@ class WholeBodyQp:
         now["contacts"], now["contact"][:count] = count, stance.contacts
         now["cap"][:count], directions = stance.cap, self.robot.contact_rows
         now["force"][:count, :directions] = stance.force.reshape(count, directions)
-        robot, room = self.robot, self.room(count, load)
+        robot, room = self.robot, self.room(load)
         kind = solve_free(self.data, robot.data, robot.arrays, tasks.table, room)
         return self.finish(kind, tasks, room)
 
-    def room(self, contacts: int, load: float) -> tuple[Any, ...]:
-        """Arrays for :func:`.problem.solve_free`; those of the answer are new.
+    def room(self, load: float) -> tuple[Any, ...]:
+        """Arrays for :func:`.problem.solve_free` of the stance in ``data``; the answer's are new.
 
-        Args:
-            contacts: on the ground.
-            load: as for :meth:`solve`.
+        ``load`` is as for :meth:`solve`.
         """
-        robot, w, empty = self.robot, self.workspaces[contacts], np.empty
-        torque, force = empty(len(self._torque)), empty(robot.contact_rows * contacts)
-        found = self._torque, torque, force, empty(robot.nv)
+        contacts, (nu, nv, rows), empty = int(self._contacts[0]), self._sizes, np.empty
+        w, found = self.workspaces[contacts], (empty(nu), empty(rows * contacts), empty(nv))
         if load != self._load:
             self._take_load(load)
-        return self._limit, w.bounds, w.work, found
+        return self._limit, w.bounds, w.work, (self._torque, *found)
 
     def finish(self, kind: int, tasks: TaskStack, room: tuple[Any, ...]) -> Solution:
         """The answer of a tick, by ProxQP where limits act.

@@ -59,7 +59,7 @@ def whole_tick() -> None:
     sense(tick, robot.data, *memory, np.zeros(2, dtype=bool), np.zeros((2, 2)), 1e-3)
     stand(tick, robot.data, *memory)
     curve = np.ones((2, 1, ORDER + 1)), np.ones((1, 7)), np.ones(3)
-    rest = tasks.program, tasks.table, 1e-3, qp.room(0, 1.0)
+    rest = tasks.program, tasks.table, 1e-3, qp.room(1.0)
     act(tick, (robot.data, robot.arrays), *memory, curve, None, rest)
 
 
