@@ -1,5 +1,9 @@
-"""Sphinx configuration of the site: ``python -m sphinx -W docs build/site``."""
+"""Sphinx configuration of the site: ``python -m sphinx -W docs build/site``.
 
+``python docs/versions.py build/site`` builds it for all released versions.
+"""
+
+import os
 import re
 from importlib.util import find_spec
 
@@ -26,6 +30,23 @@ html_theme = "furo"
 html_title = f"{project} {version}"
 html_static_path: list[str] = []
 html_copy_source = False
+
+# The other versions, where docs/versions.py builds them; the rest are Furo's.
+templates_path = ["_templates"]
+html_context = {
+    "versions": os.environ.get("DOCS_VERSIONS", "").split(),
+    "shown": os.environ.get("DOCS_VERSION", ""),
+}
+html_sidebars = {
+    "**": [
+        "sidebar/brand.html",
+        "sidebar/search.html",
+        "sidebar/scroll-start.html",
+        "sidebar/navigation.html",
+        "sidebar/versions.html",
+        "sidebar/scroll-end.html",
+    ]
+}
 
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3

@@ -30,6 +30,7 @@ from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link
 from .robot.library import load_floating_robot as load_floating_robot
 from .robot.library import load_robot as load_robot
+from .robot.library import robots as robots
 from .robot.planar_biped import PlanarBiped as PlanarBiped
 from .run.experiment import Experiment as Experiment
 from .run.options import HeadingCommand as HeadingCommand
@@ -40,7 +41,6 @@ from .run.recorder import Recorder as Recorder
 from .run.sensing import SensorOptions as SensorOptions
 from .run.simulation import simulate as simulate
 from .slip.automaton.vocabulary import MapKind as MapKind
-from .slip.control.controllers import ActiveRunning as ActiveRunning
 from .slip.dynamics.stride import simulate_stride as simulate_stride
 from .slip.gaits.gait import gait_at as gait_at
 from .slip.gaits.gait import gait_from_energy as gait_from_energy

@@ -150,6 +150,14 @@ QUADRUPEDS = tuple(name for name, entry in _ENTRIES.items() if len(entry.feet) >
 """Those of them that have four legs."""
 
 
+def robots() -> dict[str, str]:
+    """Names of all robots that come with the library, with a line about each.
+
+    Those of :data:`ROBOTS` have a planar model, those of :data:`FLOATING_ROBOTS` a floating base.
+    """
+    return dict(SHIPPED)
+
+
 @checked
 def robot_path(name: str) -> Path:
     """The URDF of a shipped robot, from a wheel or from a checkout.

@@ -6,10 +6,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import template_control as tc
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions, pybullet
-from template_control.robot.library import ROBOTS, load_robot, robot_path
+from template_control.robot.library import ROBOTS, SHIPPED, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
+
+
+def test_every_robot_that_is_listed_loads():
+    listed = tc.robots()
+    assert list(listed) == list(SHIPPED)
+    assert "Unitree's humanoid" in listed["g1"]
+    for name in listed:
+        assert robot_path(name).is_file()
 
 
 @pytest.fixture(params=ROBOTS)
