@@ -286,6 +286,7 @@ class Biped(Robot):
         if masses:
             urdf = with_masses(self.path, urdf, masses)
             model = self._model_of(self.path, urdf)
+            model.name = self.name
             for foot, patch in zip(self.feet, self.patches, strict=False):
                 add_foot_frame(model, foot, patch.placement)
             if not self.patches:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from template_control.errors import RobotError, meant
 from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import LEGS
+
+AnyBiped = TypeVar("AnyBiped", PlanarBiped, FloatingBaseBiped)
 
 _FILES = (".urdf", ".xacro")
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -203,6 +206,12 @@ def _name(name: str | Path) -> str:
     return text
 
 
+def _named(name: str, robot: AnyBiped) -> AnyBiped:
+    """The robot, by the name that users know it by and not its URDF's."""
+    robot.model.name = robot.name = name
+    return robot
+
+
 @checked
 def load_robot(name: str | Path) -> PlanarBiped:
     """A shipped robot by name, or any planar biped by the path of its URDF.
@@ -216,12 +225,15 @@ def load_robot(name: str | Path) -> PlanarBiped:
     path, entry = robot_path(text), _ENTRIES[text]
     if not entry.planar:
         raise RobotError(f"robot {text!r} has no planar model: load it with load_floating_robot")
-    return PlanarBiped.from_urdf(
-        path,
-        entry.feet,
-        entry.sagittal_joints,
-        foot_radius=entry.foot_radius,
-        walk=entry.walk,
+    return _named(
+        text,
+        PlanarBiped.from_urdf(
+            path,
+            entry.feet,
+            entry.sagittal_joints,
+            foot_radius=entry.foot_radius,
+            walk=entry.walk,
+        ),
     )
 
 
@@ -241,11 +253,14 @@ def load_floating_robot(name: str | Path) -> FloatingBaseBiped:
             f"robot {text!r} is planar and cannot walk free: give one of {list(FLOATING_ROBOTS)} or"
             " a URDF file"
         )
-    return FloatingBaseBiped.from_urdf(
-        path,
-        entry.feet,
-        entry.foot_radius,
-        limits=entry.limits,
-        walk=entry.walk,
-        flat_feet=entry.flat,
+    return _named(
+        text,
+        FloatingBaseBiped.from_urdf(
+            path,
+            entry.feet,
+            entry.foot_radius,
+            limits=entry.limits,
+            walk=entry.walk,
+            flat_feet=entry.flat,
+        ),
     )

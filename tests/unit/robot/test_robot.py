@@ -9,16 +9,24 @@ import pytest
 import template_control as tc
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions, pybullet
-from template_control.robot.library import ROBOTS, SHIPPED, load_robot, robot_path
+from template_control.robot.library import (
+    ROBOTS,
+    SHIPPED,
+    load_floating_robot,
+    load_robot,
+    robot_path,
+)
 from template_control.robot.planar_biped import PlanarBiped
 
 
-def test_every_robot_that_is_listed_loads():
+def test_robots_are_listed_and_called_by_the_names_that_load_them():
     listed = tc.robots()
     assert list(listed) == list(SHIPPED)
     assert "Unitree's humanoid" in listed["g1"]
-    for name in listed:
-        assert robot_path(name).is_file()
+    assert all(robot_path(name).is_file() for name in listed)
+    for robot, name in ((load_robot("human"), "human"), (load_floating_robot("go2"), "go2")):
+        assert robot.name == robot.changed(gravity=1.62).name == name
+    assert load_robot("human").changed(masses={"trunk": 40.0}).name == "human"
 
 
 @pytest.fixture(params=ROBOTS)

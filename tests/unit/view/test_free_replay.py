@@ -121,7 +121,7 @@ def test_the_command_replays_a_free_run(record, tmp_path, capfd):
     assert main(["replay", run, *words]) == 0, capfd.readouterr().err
     pictures = Image.open(film)
     assert pictures.n_frames == 6
-    assert "five_link_3d" in page.read_text()
+    assert "five-link-3d" in page.read_text()
 
 
 @pytest.mark.slow(seconds=1)
