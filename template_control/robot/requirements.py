@@ -24,6 +24,7 @@ from template_control.robot.terms import FLOATING_DOF, LEGS, PLANAR_DOF
 Array = NDArray[np.float64]
 
 UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
+_TURNS, _DEGREES = 12.6, 360.0  # stops between two turns in radians and one in degrees
 _CLOSE = 1e-4  # [m]
 _PARALLEL = 1e-6  # 1 - cosine of the angle between two axes
 _ROOT = 1  # Pinocchio's index of the free flyer
@@ -237,8 +238,20 @@ def feet_of_legs(
 def _check_limits(
     path: Path, model: pin.Model, joints: Iterable[int], hints: Mapping[str, str]
 ) -> None:
-    """Check that joints have limits of torque and speed; ``hints``: what to give of each kind."""
+    """Check that joints have limits of torque and speed; ``hints``: what to give of each kind.
+
+    Their stops are checked to be in radians.
+    """
     joints = list(joints)
+    for joint in joints:
+        place = model.idx_qs[joint]
+        stops = float(model.lowerPositionLimit[place]), float(model.upperPositionLimit[place])
+        if _TURNS < max(map(abs, stops)) <= _DEGREES:
+            low, high = stops
+            raise RobotError(
+                f"{path}: joint {model.names[joint]!r} goes from {low:g} to {high:g} rad, which"
+                " look like degrees: give its limits in radians, or make it continuous"
+            )
     for kind, limits in (("effort", model.effortLimit), ("velocity", model.velocityLimit)):
         for joint in joints:
             limit = limits[model.idx_vs[joint]]

@@ -192,6 +192,10 @@ def test_a_foot_without_a_size_is_refused(load, five_link, value):
         (('xyz="0 0 -0.225"', 'xyz="0 -0.225"'), "give 3 finite numbers"),
         (('effort="350"', 'effort="nan"'), "limit has effort 'nan'"),
         (('axis xyz="0 1 0"', 'axis xyz="0 0 0"'), "axis is 0 0 0"),
+        (
+            ('lower="0" upper="2.5"', 'lower="0" upper="143"'),
+            "from 0 to 143 rad, which look like deg",
+        ),
     ],
 )
 def test_other_numbers_are_read_or_refused(load, five_link, change, told):
