@@ -1,7 +1,7 @@
 """Move at a speed that changes at any time: random profiles, or one from a file.
 
     python examples/any_speed.py [--trials 4] [--first 0] [--duration 60] [--robot five-link]
-    python examples/any_speed.py --commands 3.0 [--trials 4] [--first 0] [--robot five-link]
+    python examples/any_speed.py --commands 3.0 [--backward 0.4] [--trials 4] [--first 0]
     python examples/any_speed.py --ramp 0.3 [--stay 5]
     python examples/any_speed.py --profile FILE [--save run.npz]
     python examples/any_speed.py --speeds 8 [--robot rabbit] [--starts 3]
@@ -9,8 +9,8 @@
 A random profile goes at 0.1 to 0.5 m/s^2 from one speed to the next, all within 0.3 to 1.4 m/s for
 l0 = 1 m, and keeps each for 1 to 5 s. Its number is its seed. With --commands the robot stands,
 walks and runs: the speed jumps to one between 0 and this one every 3 to 8 s, to 0 in a quarter of
-the cases. A ramp goes from 0.4 to 1.4 m/s with
-this acceleration, stays, and goes back. FILE is TOML with two lists, times [s] and speeds [m/s].
+the cases, and, with --backward, as often to this speed backward. A ramp goes from 0.4 to 1.4 m/s
+with this acceleration, stays, and goes back. FILE is TOML with two lists, times [s] and speeds [m/s].
 With --speeds the robot keeps so many speeds, spread evenly over its own range, for 50 steps each;
 with --starts also from so many starts off its gait.
 """
@@ -29,7 +29,6 @@ from template_control.slip import Scale, WalkingGait
 from template_control.slip.scenario.scenario import Gait
 
 _STEPS, _LAST = 50, 20  # of a run that keeps a speed, and those that it is judged by
-_JUMP = 1e-3  # duration of a jump of the speed [s]
 _ALL: tuple[Gait, ...] = ("stand", "walk", "run")
 
 
@@ -45,15 +44,20 @@ def random_profile(seed: int, duration: float, unit: float) -> tc.SpeedProfile:
     return tc.SpeedProfile(tuple(times), tuple(unit * v for v in speeds))
 
 
-def random_commands(seed: int, duration: float, fastest: float) -> tc.SpeedProfile:
-    """Speeds that jump, drawn with this seed; ``fastest`` [m/s]."""
-    rng = np.random.default_rng(seed)
-    times, speeds = [0.0], []
-    while times[-1] < duration:
-        speeds += 2 * [0.0 if rng.random() < 0.25 else rng.uniform(0.0, fastest)]
-        times += [times[-1] + rng.uniform(3.0, 8.0)] * 2
-        times[-1] += _JUMP
-    return tc.SpeedProfile(tuple(times[:-1]), tuple(speeds))
+def random_commands(
+    seed: int, duration: float, fastest: float, backward: float
+) -> tc.run.VelocityProfile:
+    """Speeds that jump, drawn with this seed; ``fastest`` ahead, and the one ``backward`` [m/s]."""
+    rng, time, rows = np.random.default_rng(seed), 0.0, []
+    while time < duration:
+        draw = rng.random()
+        if draw < 0.25:
+            speed = 0.0
+        else:
+            speed = -backward if draw < 0.5 and backward else rng.uniform(0.0, fastest)
+        rows.append((time, speed, 0.0, 0.0))
+        time += rng.uniform(3.0, 8.0)
+    return tc.run.VelocityProfile(tuple(rows), duration, gaits=_ALL)
 
 
 def ramp(acceleration: float, stay: float, unit: float) -> tc.SpeedProfile:
@@ -66,14 +70,14 @@ def ramp(acceleration: float, stay: float, unit: float) -> tc.SpeedProfile:
 def follow(
     name: str,
     robot: str,
-    profile: tc.SpeedProfile,
+    profile: tc.SpeedProfile | tc.run.VelocityProfile,
     duration: float,
-    gaits: tuple[Gait, ...] = ("walk",),
 ) -> tc.Record:
     """Follow a profile, and say how it went."""
-    model = tc.load_robot(robot)
-    route = tc.SpeedRoute(tc.template_for(model), profile, duration, gaits)
-    record = tc.simulate(tc.Experiment(model, route, record_every=10))
+    model, motion = tc.load_robot(robot), profile
+    if isinstance(motion, tc.SpeedProfile):
+        motion = tc.SpeedRoute(tc.template_for(model), motion, duration)
+    record = tc.simulate(tc.Experiment(model, motion, record_every=10))
     told, speed = summarise(record, None), record.section_state[:, 0]
     ended = f"FELL: {told['fall_reason']}" if record.fell else "no fall"
     accepted, torques = told["accepted_speed"], told["joint_torque"].values()
@@ -138,6 +142,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first trial")
     parser.add_argument("--duration", type=float, default=60.0, help="of a random profile [s]")
     parser.add_argument("--commands", type=float, help="fastest of random commands [m/s]")
+    parser.add_argument("--backward", type=float, default=0.0, help="speed of commands [m/s]")
     parser.add_argument("--ramp", type=float, help="acceleration [m/s^2]")
     parser.add_argument("--stay", type=float, default=5.0, help="at the end of a ramp [s]")
     parser.add_argument("--profile", type=Path, help="TOML with times and speeds")
@@ -159,11 +164,11 @@ def main() -> None:
     else:
         falls = 0
         for seed in range(chosen.first, chosen.first + chosen.trials):
-            if chosen.commands is None:
-                profile, gaits = random_profile(seed, chosen.duration, unit), _ALL[1:2]
-            else:
-                profile, gaits = random_commands(seed, chosen.duration, chosen.commands), _ALL
-            record = follow(f"seed {seed}", chosen.robot, profile, chosen.duration, gaits)
+            profile = random_profile(seed, chosen.duration, unit)
+            if chosen.commands is not None:
+                asked = chosen.duration, chosen.commands, chosen.backward
+                profile = random_commands(seed, *asked)
+            record = follow(f"seed {seed}", chosen.robot, profile, chosen.duration)
             falls += record.fell
         low, high = wilson_interval(chosen.trials - falls, chosen.trials)
         print(

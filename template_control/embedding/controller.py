@@ -8,6 +8,7 @@ clock, is looked up in the table of phases: the controller knows no gait.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any
 
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.embedding.contacts import EARLY, NO_FORCE, SETTLING, SINKING, ContactMonitor
+from template_control.embedding.free.course import Course
 from template_control.embedding.free.motion import LateralMotion
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.trot import default_options
@@ -93,6 +95,7 @@ class EmbeddingController:
         time: since the start [s].
         qp: the whole-body problem.
         lateral: heading, and footholds to the left and right; None in the plane.
+        course: where the robot is to go, by time [s].
         memory: (1,) each of ``TICK``, ``ROBOT_DATA`` and ``REFERENCES``, of the last tick.
     """
 
@@ -145,6 +148,7 @@ class EmbeddingController:
         self._enter(next(iter(self._modes)))
         self._slope_unknown = False  # the ground under feet that both stand where a run begins
         self.qp = WholeBodyQp(robot, o)
+        self.course: Callable[[float], Course] = lambda time: Course()
         self.lateral: LateralMotion | None = None
         if isinstance(robot, FloatingBaseBiped):
             if not isinstance(given, FreeOptions):
@@ -218,7 +222,8 @@ class EmbeddingController:
         self.frame.reset()
         if self.lateral is not None:
             others = (other.gait for other in self.supervisor.planners.values())
-            self.lateral.begin((planner.gait, *others), in_flight=not node.stance)
+            gaits = planner.gait, *others
+            self.lateral.begin(gaits, self.course(0.0), in_flight=not node.stance)
         self._enter(node.name)
         self.feet.begin(rear)
         half = 0.5 * planner.gait.step_duration
@@ -273,7 +278,7 @@ class EmbeddingController:
     def _sense(self, contact: NDArray[np.bool_], force: Array | None, dt: float) -> bool:
         """Take in what was measured; whether there is anything to decide."""
         felt = NO_FORCE if force is None or self.lateral is not None else force
-        if self.frame.angle != 0.0:
+        if not self.frame.of_world:
             felt = self.frame.inward(felt)
         found = sense(*self._memory, contact, felt, dt)
         if found == DIVERGED:
@@ -321,7 +326,7 @@ class EmbeddingController:
         solution = qp.finish(kind, tasks, room)
         if self.frame.angle == 0.0:
             return solution
-        return solution._replace(acceleration=self.frame.outward(solution.acceleration))
+        return solution._replace(acceleration=self.frame.leave(solution.acceleration))
 
     def _find_first_slope(self) -> None:
         """Both feet stand where a run begins: the line through them is the ground."""
@@ -423,10 +428,8 @@ class EmbeddingController:
         supervisor = self.supervisor
         if supervisor.deciding:
             nominal = supervisor.decision.nominal
-            if lateral is not None and lateral.end_stride(
-                self.lateral_state(), nominal, section, self.time
-            ):
-                self.robot.update(*self.ground.raw_state)
+            if self._turn(section, nominal):
+                self.robot.update(*self.frame.enter(*self.ground.raw_state))
                 self._read()
                 if section is REST:
                     self._face_ahead()
@@ -435,8 +438,20 @@ class EmbeddingController:
         learners.begin_stride(supervisor, self.mode.trimmed)
         if lateral is not None:
             now = self.node, s, self.lateral_state(), self.time
-            self._enter(lateral.begin_stride(section, supervisor, *now).name)
+            course = self.course(self.time)
+            self._enter(lateral.begin_stride(section, supervisor, course, *now).name)
         self.path_clock.restart()
+
+    def _turn(self, section: Section, nominal: bool) -> bool:
+        """Turn the axes to where the robot is to go; whether it has to be read again."""
+        course, lateral = self.course(self.time), self.lateral
+        if lateral is not None:
+            return lateral.end_stride(course, self.lateral_state(), nominal, section)
+        turns = section is REST and course.turns_round(self.robot)
+        if turns:
+            self.ground.turn_round(self.observer)
+            self.learners.lean.turn_round()
+        return turns
 
     def _face_ahead(self) -> None:
         """Of two feet that stand, the one that is ahead where the robot now goes is the front's."""

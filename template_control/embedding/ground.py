@@ -1,14 +1,15 @@
-"""Slope of the ground, as the feet feel it, and the axes that are turned with it.
+"""Slope of the ground, as the feet feel it, and the axes in which a robot moves on it.
 
-In those axes a slope is level, and gravity is not vertical. Template, planners, references and QP
-live in them; only here is the world known.
+In those axes a slope is level, and gravity is not vertical; their x points where the robot goes,
+which may be backward. Template, planners, references and QP live in them; only here is the world
+known.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from itertools import combinations
-from math import atan, cos, sin, tan
+from math import atan, cos, pi, sin, tan
 from statistics import median
 from typing import Any
 
@@ -20,6 +21,7 @@ from template_control.embedding.state import StateObserver
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.terms import onward
 
 Array = NDArray[np.float64]
 
@@ -100,36 +102,41 @@ _F, _I = np.float64, np.int64
 FRAME = np.dtype(
     [
         ("angle", _F),  # of the ground, uphill positive [rad]
-        ("turn", _F, (_BASE, _BASE)),  # vectors of the world into these axes
+        ("turn", _F, (_BASE, _BASE)),  # vectors of the world into axes that lean as it does
         ("shift", _F, (_BASE,)),  # of places, once they are turned [m]
-        ("level", _I),  # whether these are the world's axes
+        ("level", _I),  # whether those are the world's axes
+        ("on", _F),  # 1; -1 if these axes' x points the other way than theirs
     ],
     align=True,
 )
-"""Axes that are turned with the ground."""
+"""Axes that lean with the ground, and may be turned round about the normal to it."""
 
 
 @compiled
 def to_world(frame: Any, x: float, y: float, out: Array) -> None:
     """Write a place of the frame's axes in the world's, (2,) [m]; ``frame`` is of ``FRAME``."""
     if frame.level:
-        out[0], out[1] = x, y
+        out[0], out[1] = frame.on * x, y
     else:
-        vector_to_world(frame, x - frame.shift[0], y - frame.shift[1], out)
+        vector_to_world(frame, x - frame.on * frame.shift[0], y - frame.shift[1], out)
 
 
 @compiled
 def vector_to_world(frame: Any, x: float, y: float, out: Array) -> None:
     """As :func:`to_world`, of a vector."""
+    x *= frame.on
     out[0] = x * frame.turn[0, 0] + y * frame.turn[1, 0]
     out[1] = x * frame.turn[0, 1] + y * frame.turn[1, 1]
 
 
 class SlopeFrame:
-    """Turns states into the ground's axes, and results back into the world's.
+    """Turns states into axes that lean with the ground, and results back into the world's.
 
     The robot's gravity is turned as well; a free robot stays in the world's axes. ``angle`` is the
-    ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``, own memory if not given.
+    ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``, own memory if not given. The
+    axes' x points where a planar robot goes. Of its state only the sagittal terms are turned round
+    for that, by its model (``facing``), whose coordinates stay those of a trunk that faces uphill
+    or downhill as it does.
     """
 
     def __init__(self, robot: Biped, data: Any = None) -> None:
@@ -141,8 +148,10 @@ class SlopeFrame:
 
     def reset(self) -> None:
         """Back to the world's axes."""
+        self._on = self.data["on"][0] = 1.0
         self._take(0.0, np.eye(_BASE), np.zeros(_BASE))
         if self._planar is not None:
+            self._planar.facing = 0.0
             self._planar.turn_gravity(0.0)
 
     def _take(self, angle: float, turn: Array, shift: Array) -> None:
@@ -150,6 +159,18 @@ class SlopeFrame:
         self.angle = self.data["angle"][0] = angle
         self._turn[:], self._shift[:] = turn, shift
         self._level = self.data["level"][0] = angle == 0.0 and not shift.any()
+
+    def turn_round(self) -> None:
+        """Let x point the other way; takes effect at the robot's next update."""
+        assert self._planar is not None
+        self._planar.facing = 0.0 if self._planar.facing else pi
+        self._on = self.data["on"][0] = onward(self._planar.facing)
+        self.angle = self.data["angle"][0] = -self.angle
+
+    @property
+    def of_world(self) -> bool:
+        """True if the robot's terms are in the world's axes."""
+        return self.angle == 0.0 and self._on == 1.0
 
     @property
     def turns(self) -> bool:
@@ -164,50 +185,60 @@ class SlopeFrame:
         if self._planar is None or angle == self.angle:
             return
         fixed = self.world(place)
-        c, s = cos(angle), sin(angle)
+        rises = self._on * angle
+        c, s = cos(rises), sin(rises)
         turn = np.array([[c, s], [-s, c]])
-        self._take(angle, turn, place - turn @ fixed)
-        self._planar.turn_gravity(angle)
+        self._take(angle, turn, self._onward(place) - turn @ fixed)
+        self._planar.turn_gravity(rises)
 
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """q (nq,) and v (nv,) of the world in these axes; the given arrays stay as they are."""
+        """q (nq,) and v (nv,) for the model, of the world's; the given arrays stay as they are."""
         if self._level:
             return q, v
         inside, speed = q.copy(), v.copy()
         inside[:_BASE] = self._turn @ q[:_BASE] + self._shift
-        inside[_BASE] += self.angle
+        inside[_BASE] += self._on * self.angle
         speed[:_BASE] = self._turn @ v[:_BASE]
         return inside, speed
 
+    def leave(self, acceleration: Array) -> Array:
+        """(nv,) acceleration in the world's coordinates, from the model's."""
+        if self.angle == 0.0:
+            return acceleration
+        outside = acceleration.copy()
+        outside[:_BASE] = acceleration[:_BASE] @ self._turn
+        return outside
+
+    def _onward(self, vector: Array) -> Array:
+        """(..., 2) vectors with x the other way, if these axes' x is."""
+        return vector if self._on == 1.0 else vector * (self._on, 1.0)
+
     def inward(self, vector: Array) -> Array:
         """(..., 2) vectors in these axes, from the world's."""
-        return vector if self.angle == 0.0 else vector @ self._turn.T
+        return vector if self.of_world else self._onward(vector @ self._turn.T)
 
     def world(self, place: Array) -> Array:
         """(..., 2) places in the world, from these axes [m]."""
+        place = self._onward(place)
         return place if self._level else (place - self._shift) @ self._turn
 
     def point(self, x: float, y: float) -> tuple[float, float]:
         """As :meth:`world`, of one place."""
-        if not self._level:
+        if not self._level or self._on != 1.0:
             x, y = self.world(np.array([x, y])).tolist()
         return x, y
 
     def outward(self, vector: Array) -> Array:
-        """(..., n) vectors in the world's axes; their first two numbers are turned."""
-        if self.angle == 0.0:
-            return vector
-        turned = vector.copy()
-        turned[..., :_BASE] = vector[..., :_BASE] @ self._turn
-        return turned
+        """(..., 2) vectors in the world's axes, from these."""
+        return vector if self.of_world else self._onward(vector) @ self._turn
 
 
 class SlopingGround:
     """Learns how steep the ground is, and turns the axes as far as the planner knows slopes.
 
     Every tick updates the robot's model in these axes, ``frame``, of the ``data`` given;
-    ``length`` is the template's l0 [m]. ``slope`` is the estimate, ``raw_state`` the robot's q and
-    v in the world, as measured last.
+    ``length`` is the template's l0 [m]. ``slope`` is the estimate, uphill along the world's x,
+    ``raw_state`` the robot's q and v in the world, as measured last.
     """
 
     raw_state: tuple[Array, Array]
@@ -239,11 +270,11 @@ class SlopingGround:
     ) -> bool:
         """Turn the axes about a foot, and read the robot's model in them; True if they turned.
 
-        ``slope`` is the ground's [rad], as far as the supervisor plans for one; ``foot`` keeps its
-        coordinates. The observer's state has to be read again then.
+        ``slope`` is the ground's along the world's x [rad], as far as the supervisor plans for one;
+        ``foot`` keeps its coordinates. The observer's state has to be read again then.
         """
         robot, frame = self._robot, self.frame
-        slope = supervisor.on_slope(slope) if frame.turns else 0.0
+        slope = supervisor.on_slope(onward(robot.facing) * slope) if frame.turns else 0.0
         if slope == frame.angle:
             return False
         pre_impact_velocity = frame.outward(observer.pre_impact_velocity)
@@ -251,6 +282,11 @@ class SlopingGround:
         observer.pre_impact_velocity[:] = frame.inward(pre_impact_velocity)
         robot.update(*frame.enter(*self.raw_state))
         return True
+
+    def turn_round(self, observer: StateObserver) -> None:
+        """Let the robot go the other way; the observer's state has to be read again then."""
+        self.frame.turn_round()
+        observer.pre_impact_velocity[0] *= -1.0
 
     def _foothold(self, foot: int) -> tuple[float, float]:
         """x and height of a foot in the world [m]."""

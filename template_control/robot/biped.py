@@ -61,8 +61,8 @@ class Biped(Robot):
     diagonal pair is a virtual leg (Raibert). A monopod's second group is empty: its
     gaits have one leg.
 
-    Sagittal quantities have two entries, x forward and y up: of a planar robot in the world, of a
-    free one in its heading frame.
+    Sagittal quantities have two entries, x forward and y up: of a planar robot in the world, where
+    it goes backward turned round about the vertical; of a free one in its heading frame.
 
     Attributes are those of :class:`~.robot.Robot`, and these.
 
@@ -88,6 +88,9 @@ class Biped(Robot):
             hip the sign of their axis' y.
         leg_mass: of the heavier leg [kg].
         trunk_com: height of the trunk's own CoM above the hips [m].
+        facing: angle from the heading, the way that the robot goes, to where the trunk is to face,
+            to the left positive [rad]; takes effect at the next update. Of a planar robot, whose
+            trunk faces the world's x, 0 or half a turn.
         heading_frame: (5,) of a floating-base robot x and y of its heading frame's origin in the
             world [m], cosine and sine of the heading, y of the trunk's hips in it [m]; of a planar
             one the world.
@@ -148,6 +151,7 @@ class Biped(Robot):
     hip_speed = Number("hip_speed")
     pitch = Number("attitude", 1)
     pitch_rate = Number("turning", 1)
+    facing = Number("facing")
 
     def __init__(
         self,

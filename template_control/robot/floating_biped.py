@@ -144,8 +144,6 @@ class FloatingBaseBiped(Biped):
             vertical: its index into ``joint_names``, and its angle in :meth:`neutral` [rad].
         sway: of flat feet and of pairs, dy/dt of the CoM over dy/dt - L_x / (m z) where the feet
             and the attitude of the trunk rest, L the angular momentum about the CoM; else 1.
-        facing: angle from the heading to where the trunk is to face, to the left positive [rad]:
-            the heading is the way that the robot goes.
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
     """
 
@@ -153,7 +151,6 @@ class FloatingBaseBiped(Biped):
     base_joints = _ROOT
     directions = 3
     sway = Number("sway")
-    facing = Number("facing")
 
     @staticmethod
     def _model_of(path: Path, urdf: str) -> pin.Model:

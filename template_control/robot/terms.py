@@ -74,7 +74,9 @@ ROBOT_DATA = np.dtype(
         ("foot_velocity", _F, (LEGS, 3)),  # the same [m/s]
         # Roll and pitch of the trunk in the heading frame, and its yaw from where it is to face.
         ("attitude", _F, (3,)),  # [rad]
-        ("facing", _F),  # from the heading to where the trunk is to face, to the left [rad]
+        # From the heading to where the trunk is to face, to the left [rad]. A planar robot's trunk
+        # faces the world's x, and the robot goes there or, with half a turn, the other way.
+        ("facing", _F),
         ("turning", _F, (3,)),  # angular velocity of the trunk, by axis [rad/s]
         ("hips", _F, (3,)),  # the point the legs hang from [m]
         ("hip_speed", _F),  # its forward velocity [m/s]
@@ -178,10 +180,19 @@ def gather_joints(
 
 
 @compiled
+def onward(facing: float) -> float:
+    """1 of a planar robot that goes where its trunk faces; -1 of one that goes backward."""
+    return 1.0 if np.cos(facing) > 0.0 else -1.0
+
+
+@compiled
 def gather_planar(
     views: Sources, q: Array, v: Array, drift: tuple[Array, ...], data: Any, out: tuple[Any, ...]
 ) -> bool:
     """Write the planar terms at the state that Pinocchio has last computed; True if it is finite.
+
+    They are of the frame whose x points where the robot goes, as ``facing`` of the data says:
+    the world's, or that turned by half a turn about the vertical.
 
     Args:
         views: from :func:`sources`.
@@ -196,24 +207,24 @@ def gather_planar(
     com_jacobian, centroidal, jacobian, carries, limits = views[7:]
     effects, jcom, jspin, contact, joints = out
     s = data[0]
-    finite = gather_joints(q, v, limits, s, effects, joints)
-    s.com[0], s.com[UP] = centre[0], centre[2]
-    s.com_velocity[0], s.com_velocity[UP] = speed[0], speed[2]
-    s.com_bias[0], s.com_bias[UP] = pull[0], pull[2]
+    finite, on = gather_joints(q, v, limits, s, effects, joints), onward(s.facing)
+    s.com[0], s.com[UP] = on * centre[0], centre[2]
+    s.com_velocity[0], s.com_velocity[UP] = on * speed[0], speed[2]
+    s.com_bias[0], s.com_bias[UP] = on * pull[0], pull[2]
     for k in range(q.shape[0]):
-        jcom[0, k], jcom[1, k] = com_jacobian[0, k], com_jacobian[2, k]
-        jspin[0, k] = centroidal[4, k]
+        jcom[0, k], jcom[1, k] = on * com_jacobian[0, k], com_jacobian[2, k]
+        jspin[0, k] = on * centroidal[4, k]
     r = s.foot_radius
     for i in range(contact.shape[0]):
         place = places[i]
         x, z = place[0], place[2]
-        s.contact_position[i, 0], s.contact_position[i, UP] = x, z - r
+        s.contact_position[i, 0], s.contact_position[i, UP] = on * x, z - r
         for k in range(q.shape[0]):
             turn = jacobian[4, k]
             # Rolling without slip: the material point below the sphere's centre is at rest.
-            contact[i, 0, k] = (jacobian[0, k] + turn * z - r * turn) * carries[i, k]
+            contact[i, 0, k] = on * (jacobian[0, k] + turn * z - r * turn) * carries[i, k]
             contact[i, 1, k] = (jacobian[2, k] - turn * x) * carries[i, k]
-        s.contact_bias[i, 0] = drift[i][0] - r * drift[i][4]
+        s.contact_bias[i, 0] = on * (drift[i][0] - r * drift[i][4])
         s.contact_bias[i, UP] = drift[i][2]
         moving = np.dot(contact[i], v)
         s.contact_velocity[i, 0], s.contact_velocity[i, UP] = moving[0], moving[1]
@@ -223,10 +234,11 @@ def gather_planar(
     force_x = effects[0] - weight[0]
     force_z = effects[1] - weight[1]
     moment = effects[PLANAR_DOF - 1] - weight[PLANAR_DOF - 1]
-    s.momentum[1] = momentum[4]
-    s.momentum_bias[1] = moment - (s.com[UP] - q[1]) * force_x + (s.com[0] - q[0]) * force_z
-    s.attitude[1], s.turning[1] = q[PLANAR_DOF - 1], v[PLANAR_DOF - 1]
-    s.hips[0], s.hips[UP], s.hip_speed = q[0], q[1], v[0]
+    s.momentum[1] = on * momentum[4]
+    turning = moment - (s.com[UP] - q[1]) * force_x + (centre[0] - q[0]) * force_z
+    s.momentum_bias[1] = on * turning
+    s.attitude[1], s.turning[1] = on * q[PLANAR_DOF - 1], on * v[PLANAR_DOF - 1]
+    s.hips[0], s.hips[UP], s.hip_speed = on * q[0], q[1], on * v[0]
     return finite
 
 

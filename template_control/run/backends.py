@@ -110,6 +110,7 @@ class PlanarBackend(RobotBackend):
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns."""
         robot, route, pose = self.robot, controller.supervisor.route, o.pose
+        controller.course = o.heading
         first = planner, node = controller.supervisor.begin(route.section)
         z = route.start if o.start is None else np.array(o.start)
         if pose is None and route.section == APEX:
@@ -158,7 +159,9 @@ class PlanarBackend(RobotBackend):
         """See :meth:`RobotBackend.senses`."""
         parameters = controller.parameters
         if isinstance(o.sensors, ImuOptions):
-            return ImuSensors(o.sensors, self.robot, Scale.of(parameters), o.world.time_step)
+            # The controller's own model may be turned round.
+            own = self.robot.changed()
+            return ImuSensors(o.sensors, own, Scale.of(parameters), o.world.time_step)
         delay = DelayCompensation(controller.options.delay, self.robot, o.world.time_step)
         sensors = Sensors(o.sensors, self.robot, parameters)
         return ForeseeingSensors(sensors, delay)
@@ -230,9 +233,8 @@ class FloatingBackend(RobotBackend):
         z = route.start if o.start is None else np.array(o.start)
         first = controller.supervisor.begin(route.section)
         planner = first[0]
-        lateral = motion.planner
+        lateral, controller.course = motion.planner, o.heading
         if route.section is REST:
-            motion.command = o.heading
             apart = CLOSING * route.parameters.rest_length if self.robot.patches else 0.0
             q, v = floating_state_in(self.robot, _stand(z, lateral.wish.width, apart))
             controller.start(_REAR, first=first)
@@ -244,7 +246,6 @@ class FloatingBackend(RobotBackend):
             # A run leans into its turns by and by.
             turn=rate * planner.gait.step_duration if route.section == VLO else 0.0,
         )
-        motion.command = o.heading
         lateral.reset(planner.gait)
         width = lateral.wish.width
         if route.section == APEX:

@@ -95,13 +95,13 @@ class Hand:
 
         Raises:
             ParameterError: if the motion is no :class:`~.velocity.VelocityCommand`, a number is out
-                of its range, or a planar robot is to go elsewhere than forward.
+                of its range, or the robot cannot go there.
         """
         if self._command is None or self._changes is not None:
             raise ParameterError(
                 "the run's motion is not commanded: give its experiment a VelocityCommand"
             )
-        check_direction(self._robot, forward, left, turning)
+        check_direction(self._robot, self._command.gaits, forward, left, turning)
         self._ask(VelocityCommand(forward, left, turning).at(0.0))
 
     def _ask(self, deed: Any) -> None:

@@ -163,6 +163,8 @@ class LiveRun:
             self.plant = stack.enter_context(self._backend.plant(o.world))
             self.plant.reset(q, v)
             self.hand = Hand(o, self.plant)
+            # The robot's model is given back as one that goes where it faces.
+            stack.callback(setattr, o.robot, "facing", 0.0)
             self._held = stack.pop_all()
         self._ticks = self._loop(senses)
 

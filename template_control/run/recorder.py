@@ -281,8 +281,8 @@ class Recorder:
         if not known:
             q, v = (np.ascontiguousarray(values, dtype=np.float64) for values in (q, v))
             known = np.array_equal(q, seen_q) and np.array_equal(v, seen_v)
-        if not known or c.frame.angle != 0.0:
-            c.robot.update(q, v)
+        if not known or not c.frame.of_world:
+            self._update_in_world(q, v)
         after = c.time
         now = self._begins if time is None else time
         self._step, self._begins = after - self._begins, after
@@ -297,6 +297,15 @@ class Recorder:
         self.ticks += 1
         if self.ticks - self._block_start == _BLOCK:
             self._close_block()
+
+    def _update_in_world(self, q: Array, v: Array) -> None:
+        """Update the robot; the terms of a planar one are the world's, wherever it goes."""
+        robot = self.controller.robot
+        facing = robot.facing
+        if self._floating is None:
+            robot.facing = 0.0
+        robot.update(q, v)
+        robot.facing = facing
 
     def _close_block(self) -> None:
         """Count the ticks of the block, keep its samples, and begin anew."""

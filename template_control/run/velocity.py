@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot, nan
 from typing import ClassVar
@@ -48,11 +49,12 @@ _TURNING = 0.1  # of sqrt(g / l0)
 
 @dataclass(frozen=True)
 class VelocityProfile(Checked):
-    """Velocities by time, each kept until the next; of a planar robot all are forward.
+    """Velocities by time, each kept until the next; those of a planar robot are forward.
 
     The motion of an :class:`~template_control.run.Experiment`: the robot moves at any speed of its
     gaits. Footholds and heading follow from one step to the next; the forward speed
-    changes as fast as the planner finds steps. A quadruped goes backward too, at a negative speed.
+    changes as fast as the planner finds steps. Planar robots and quadrupeds go backward too, at a
+    negative speed: they stop, and start the other way.
 
     Attributes:
         velocities: times, rising from 0 [s], each with the mean velocity forward and to the left
@@ -197,9 +199,10 @@ class VelocityRange:
 
 
 def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: Biped) -> Course:
-    """Where a floating-base robot is to go.
+    """Where a robot is to go.
 
-    One on pairs of feet goes along the velocity, and its trunk faces elsewhere.
+    One on pairs of feet, or held in its plane, goes along the velocity, and its trunk faces
+    elsewhere.
 
     Args:
         velocity: the commanded.
@@ -207,19 +210,39 @@ def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: B
         robot: which goes.
     """
     forward, left, turning = velocity.at(time)
-    if not robot.paired:
+    if not _faces(robot):
         return Course(left, turning)
     return Course(0.0, turning, -atan2(left, forward) if forward or left else nan)
 
 
-def check_direction(robot: Biped, forward: float, left: float, turning: float) -> None:
-    """Check that a robot can go in the direction of a velocity; a ParameterError if not."""
+def _faces(robot: Biped) -> bool:
+    """Whether a robot can face away from its course."""
+    return robot.paired or not isinstance(robot, FloatingBaseBiped)
+
+
+def check_direction(
+    robot: Biped, gaits: Sequence[Gait], forward: float, left: float, turning: float
+) -> None:
+    """Check that a robot with these gaits can go in the direction of a velocity.
+
+    Raises:
+        ParameterError: if not.
+    """
     if not isinstance(robot, FloatingBaseBiped) and (left or turning):
-        raise ParameterError(f"{robot.name} is held in its plane: command it only forward")
-    if forward < 0.0 and not robot.paired:
         raise ParameterError(
-            f"{robot.name} goes forward only, as a quadruped does not: command it a speed of 0 or"
-            " more"
+            f"{robot.name} is held in its plane: command it only forward or backward"
+        )
+    if forward >= 0.0:
+        return
+    if not _faces(robot):
+        raise ParameterError(
+            f"{robot.name} goes forward only, as neither a quadruped nor a planar robot does:"
+            " command it a speed of 0 or more"
+        )
+    if "stand" not in gaits:
+        raise ParameterError(
+            f"{robot.name} stands before it goes backward: give it stand among its gaits, or"
+            " command it a speed of 0 or more"
         )
 
 
@@ -236,8 +259,8 @@ def velocity_route(
         course: of the experiment.
 
     Raises:
-        ParameterError: if the course has a velocity too, or when a planar robot is to go elsewhere
-            than forward.
+        ParameterError: if the course has a velocity too, or when the robot cannot go where it is
+            to.
     """
     if course.turning_rate or course.turns or course.side_speed:
         raise ParameterError("a course does not go with velocities, which turn: leave one out")
@@ -247,8 +270,8 @@ def velocity_route(
 
     def forward(time: float) -> float:
         speed, *others = velocity.at(time)
-        check_direction(robot, speed, *others)
-        if not (isinstance(robot, FloatingBaseBiped) and robot.paired):
+        check_direction(robot, motion.gaits, speed, *others)
+        if not _faces(robot):
             return speed
         course = course_at(velocity, time, robot)
         return 0.0 if course.turns_round(robot) else hypot(speed, others[0])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.robot.terms import UP
+from template_control.robot.terms import UP, onward
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ def momentum_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: A
 def posture_rows(task: Any, r: Any, want: Any, rows: Array) -> None:
     """Write the row of a :class:`PostureTask`; arguments as for :func:`write_rows`."""
     nv = rows.shape[1] - 3
-    rows[0, _PITCH] = 1.0
+    rows[0, _PITCH] = onward(r.facing)
     away = task.gains[0] * (want.pitch - r.attitude[1])
     rows[0, nv + DESIRED] = away - task.gains[1] * r.turning[1]
 

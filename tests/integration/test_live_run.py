@@ -142,7 +142,7 @@ def test_a_fall_ends_a_live_run_and_says_why():
         (lambda hand: hand.push(5.0, -1.0), "duration"),
         (lambda hand: hand.set_friction(0.0), "the friction"),
         (lambda hand: hand.set_velocity(0.5, 0.1), "command it only forward"),
-        (lambda hand: hand.set_velocity(-1.0), "five-link goes forward only"),
+        (lambda hand: hand.set_velocity(-1.0), "five-link stands before it goes backward"),
         (lambda hand: hand.set_velocity(100.0), "the commanded forward speed"),
     ],
 )

@@ -176,7 +176,8 @@ def test_axes_turn_about_a_place_and_back():
     np.testing.assert_allclose(frame.world(robot.com.copy()), com, atol=1e-12)
     np.testing.assert_allclose(robot.nonlinear_effects[3:], hinges, atol=1e-9)
     assert 0.5 * speed @ robot.mass_matrix @ speed == pytest.approx(energy, rel=1e-12)
-    np.testing.assert_allclose(frame.outward(speed), [*v[:2], *speed[2:]], atol=1e-12)
+    np.testing.assert_allclose(frame.leave(speed), [*v[:2], *speed[2:]], atol=1e-12)
+    np.testing.assert_allclose(frame.outward(speed[:2]), v[:2], atol=1e-12)
     np.testing.assert_allclose(frame.world(place), place, atol=1e-12)
     robot.update(q, v)
     weight = robot.nonlinear_effects[:2].copy()
@@ -187,6 +188,40 @@ def test_axes_turn_about_a_place_and_back():
     np.testing.assert_allclose(
         weight - turned @ bias, robot.nonlinear_effects[:2] - bias, atol=1e-9
     )
+
+
+def test_a_robot_that_goes_backward_is_seen_from_behind():
+    robot = tc.load_robot("five-link")
+    q, v = np.array([0.3, 0.9, 0.1, 0.4, -0.5, -0.2, -0.3]), np.linspace(-1.0, 1.0, 7)
+    frame = SlopeFrame(robot)
+    frame.tilt(0.1, np.zeros(2))
+    robot.update(*frame.enter(q, v))
+    names = ("com", "com_velocity", "com_bias", "foot_position", "foot_velocity", "foot_bias")
+    names += ("hips", "angular_momentum", "angular_momentum_bias", "pitch", "pitch_rate")
+    before = {name: np.copy(getattr(robot, name)) for name in names}
+    rows = robot.com_jacobian.copy(), robot.angular_momentum_jacobian.copy()
+    feet, places = robot.foot_jacobian.copy(), frame.world(robot.foot_position.copy())
+    frame.turn_round()
+    assert frame.angle == -0.1
+    robot.update(*frame.enter(q, v))
+    for name in names:
+        planar = before[name].ndim > 0
+        turned = before[name] * ((-1.0, 1.0) if planar else -1.0)
+        np.testing.assert_array_equal(getattr(robot, name), turned)
+    np.testing.assert_array_equal(robot.com_jacobian, rows[0] * [[-1.0], [1.0]])
+    np.testing.assert_array_equal(robot.angular_momentum_jacobian, -rows[1])
+    np.testing.assert_array_equal(robot.foot_jacobian, feet * [[-1.0], [1.0]])
+    np.testing.assert_allclose(frame.world(robot.foot_position.copy()), places, atol=1e-12)
+    # A slope that falls on the way back, and another one about a place that keeps its coordinates.
+    place = robot.com.copy()
+    world = frame.world(place)
+    frame.tilt(0.05, place)
+    np.testing.assert_allclose(frame.world(place), world, atol=1e-12)
+    robot.update(*frame.enter(q, v))
+    np.testing.assert_allclose(robot.com, place, atol=1e-12)
+    np.testing.assert_allclose(frame.inward(frame.outward(place)), place, atol=1e-12)
+    frame.reset()
+    assert frame.of_world
 
 
 def test_a_planner_goes_back_to_level_ground(level_gait):

@@ -80,6 +80,24 @@ def test_go2_goes_aside_and_turns_and_comes_back_backward():
     assert record.summary.qp_failures == 0
 
 
+@pytest.mark.slow(seconds=5)
+def test_five_link_walks_backward_from_and_to_a_stand():
+    rows = ((0.0, 0.5, 0.0, 0.0), (1.5, -0.4, 0.0, 0.0), (8.0, 0.0, 0.0, 0.0))
+    motion = VelocityProfile(rows, duration=10.5, foreseen=False, gaits=("stand", "walk"))
+    robot = tc.load_robot("five-link")
+    record = tc.simulate(tc.Experiment(robot, motion=motion))
+    assert not record.fell
+    back = (record.time > 6.0) & (record.time < 8.0)
+    assert record.com_velocity[back, 0].mean() == pytest.approx(-0.4, abs=0.03)
+    # What is recorded at sections is along the way that it goes.
+    assert record.section_state[record.section_time > 6.0, 0].min() > -0.01
+    assert abs(record.com_velocity[-1, 0]) < 0.01
+    # The template's place and force, and the feet's, are the world's.
+    np.testing.assert_allclose(record.template_com, record.com, atol=0.03)
+    assert record.summary.qp_failures == 0
+    assert robot.facing == 0.0
+
+
 def test_a_biped_does_not_go_backward():
     motion = VelocityProfile(((0.0, -0.5, 0.0, 0.0),), duration=1.0)
     with pytest.raises(tc.TemplateControlError, match="goes forward only"):

@@ -6,7 +6,7 @@ sees x and z in the heading frame. Here that frame is turned, and the feet are p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from math import atan2, cos, inf, sin
 from typing import Any
@@ -57,7 +57,7 @@ class LateralMotion:
 
     ``robot`` is the nominal model, which every tick updates; ``side`` of ``references`` is kept
     here. A foothold that is wanted further than ``reach`` [m] beyond its bounds is out of reach.
-    ``command`` is the :class:`~.course.Course` by time. It is followed by ``ramps``: of the speed
+    Courses are followed by ``ramps``: of the speed
     to the left [m/s^2], and of a walk's and of a run's turning rates [rad/s^2]. A jump would move
     the periodic motion further than one step reaches. ``facing`` are :data:`FACING_RATE` and
     :data:`FACING_TIME`, scaled.
@@ -80,7 +80,6 @@ class LateralMotion:
         self._now: Array = np.zeros(3)
         self._ramps, self._facing = ramps, facing
         self._turns = 0.0  # of the trunk from the course, in the present stride [rad]
-        self.command: Callable[[float], Course] = lambda time: Course()
 
     @classmethod
     def of(
@@ -109,12 +108,12 @@ class LateralMotion:
         facing = FACING_RATE / scale.time, FACING_TIME * scale.time
         return cls(robot, planner, feet, references, BEYOND * scale.length, ramps, facing)
 
-    def begin(self, gaits: Iterable[Gait], in_flight: bool) -> None:
+    def begin(self, gaits: Iterable[Gait], course: Course, in_flight: bool) -> None:
         """Begin a run with the first gait that has steps; nothing is learnt yet.
 
         It turns at once, unless it begins in flight.
         """
-        self._now[:2], self._now[2] = self.command(0.0)[:2], 0.0
+        self._now[:2], self._now[2] = course[:2], 0.0
         self.robot.facing, self._turns = 0.0, 0.0
         if in_flight:
             self._now[1] = 0.0
@@ -141,7 +140,7 @@ class LateralMotion:
         """A foot stands where it is now."""
         self._stood[foot] = self.robot.space.foot[foot, :2]
 
-    def end_stride(self, com: Array, nominal: bool, section: Section, time: float) -> bool:
+    def end_stride(self, course: Course, com: Array, nominal: bool, section: Section) -> bool:
         """Learn from the stride that has just ended, and turn the heading frame.
 
         ``com`` (2,) is :meth:`state` where it ended; ``nominal`` says whether it went near the
@@ -154,7 +153,7 @@ class LateralMotion:
             planner.end_step(SIDES[stance], about[_SIDE], com)
         turn, turns = planner.wish.turn, self._turns
         if section is REST:
-            turns = self.command(time).away(self.robot)
+            turns = course.away(self.robot)
             turn = -turns
         if section is APEX:
             about[0] = self.robot.space.com[0]
@@ -184,6 +183,7 @@ class LateralMotion:
         self,
         section: Section,
         supervisor: StrideSupervisor,
+        course: Course,
         node: Node,
         sensed: TemplateState,
         com: Array,
@@ -202,7 +202,7 @@ class LateralMotion:
         side_ramp, walk_ramp, run_ramp = self._ramps
         turn_ramp = walk_ramp if node.stance else run_ramp
         most = gait.step_duration * np.array([side_ramp, turn_ramp, turn_ramp])
-        self._now += np.clip(self._wanted(time) - self._now, -most, most)
+        self._now += np.clip(self._wanted(course) - self._now, -most, most)
         aside, turn, self._turns = (gait.step_duration * self._now).tolist()
         planner.wish = replace(planner.wish, aside=aside, turn=turn - self._turns)
         planner.walk(gait)
@@ -233,9 +233,8 @@ class LateralMotion:
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node
 
-    def _wanted(self, time: float) -> Array:
-        """(3,) what the command wants of a robot that goes: see ``_now``."""
-        course = self.command(time)
+    def _wanted(self, course: Course) -> Array:
+        """(3,) what a course wants of a robot that goes: see ``_now``."""
         if course.turns_round(self.robot):
             return np.zeros(3)
         fastest, constant = self._facing

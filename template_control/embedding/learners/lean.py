@@ -162,6 +162,10 @@ class TrunkLean:
         self._begun = False
         self._sum = self._time = 0.0
 
+    def turn_round(self) -> None:
+        """The robot is to go backward, or forward again: what leans ahead now leans back."""
+        self.mean, self.correction, self._lean = -self.mean, 0.0, None
+
     def aim(self, goal: StrideGoal) -> None:
         """Begin a stride with this goal."""
         lean = self.options.of(goal)

@@ -23,6 +23,15 @@ def test_a_quadruped_goes_along_its_velocity(go2, velocity, facing):
     assert course == (0.0, 0.1, pytest.approx(facing))
 
 
+def test_a_planar_robot_goes_forward_or_backward():
+    robot = tc.load_robot("five-link")
+    back = course_at(VelocityCommand(-0.4), 0.0, robot)
+    assert back.turns_round(robot)
+    robot.facing = back.facing
+    assert not back.turns_round(robot)
+    assert course_at(VelocityCommand(0.4), 0.0, robot).turns_round(robot)
+
+
 def test_at_rest_it_faces_as_it_does(go2):
     course = course_at(VelocityCommand(0.0), 0.0, go2)
     go2.facing = 2.0
