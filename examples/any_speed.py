@@ -10,7 +10,8 @@ A random profile goes at 0.1 to 0.5 m/s^2 from one speed to the next, all within
 l0 = 1 m, and keeps each for 1 to 5 s. Its number is its seed. With --commands the robot stands,
 walks and runs: the speed jumps to one between 0 and this one every 3 to 8 s, to 0 in a quarter of
 the cases, and, with --backward, as often to this speed backward. A ramp goes from 0.4 to 1.4 m/s
-with this acceleration, stays, and goes back. FILE is TOML with two lists, times [s] and speeds [m/s].
+with this acceleration, stays, and goes back. FILE is TOML with two lists, times [s] and speeds
+[m/s].
 With --speeds the robot keeps so many speeds, spread evenly over its own range, for 50 steps each;
 with --starts also from so many starts off its gait.
 """

@@ -96,6 +96,7 @@ class EmbeddingController:
         qp: the whole-body problem.
         lateral: heading, and footholds to the left and right; None in the plane.
         course: where the robot is to go, by time [s].
+        courses: what was taken of it, and where the trunk is to face, one a section.
         memory: (1,) each of ``TICK``, ``ROBOT_DATA`` and ``REFERENCES``, of the last tick.
     """
 
@@ -149,6 +150,7 @@ class EmbeddingController:
         self._slope_unknown = False  # the ground under feet that both stand where a run begins
         self.qp = WholeBodyQp(robot, o)
         self.course: Callable[[float], Course] = lambda time: Course()
+        self.courses: list[Course] = []
         self.lateral: LateralMotion | None = None
         if isinstance(robot, FloatingBaseBiped):
             if not isinstance(given, FreeOptions):
@@ -220,6 +222,7 @@ class EmbeddingController:
         planner, node = first or self.supervisor.begin(section)
         self.learners.lean.reset()
         self.frame.reset()
+        self.courses.clear()
         if self.lateral is not None:
             others = (other.gait for other in self.supervisor.planners.values())
             gaits = planner.gait, *others
@@ -440,6 +443,8 @@ class EmbeddingController:
             now = self.node, s, self.lateral_state(), self.time
             course = self.course(self.time)
             self._enter(lateral.begin_stride(section, supervisor, course, *now).name)
+        taken = Course() if lateral is None else lateral.taken
+        self.courses.append(taken._replace(facing=self.robot.facing))
         self.path_clock.restart()
 
     def _turn(self, section: Section, nominal: bool) -> bool:

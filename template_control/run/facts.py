@@ -81,6 +81,10 @@ class Facts:
         ticks: of the controller.
         summary: statistics over all of them.
         sections, strides: names that ``section`` and ``stride`` are indices into.
+        section_course: (S, 4) of the stride that begins at each section, as it was accepted: the
+            goal's speed along the way that the robot goes, its speed to the left of that way
+            [m/s], the trunk's turning rate [rad/s], and the angle from that way to where the trunk
+            faces, to the left [rad].
         metadata: all of these as plain data, as the file has them.
     """
 
@@ -132,6 +136,11 @@ class Facts:
     def soles(self) -> Array:
         """See the class; runs recorded before there were flat feet have none."""
         return np.array(self.metadata.get("soles", ())).reshape(-1, 4)
+
+    @property
+    def section_course(self) -> Array:
+        """See the class; runs recorded before there were courses have none."""
+        return np.array(self.metadata.get("courses", ())).reshape(-1, 4)
 
     @property
     def weight(self) -> float:

@@ -309,7 +309,8 @@ class FloatingRecord(Record):
         space_foot: (T, n, 3) lowest points of the foot spheres in the world [m].
         space_force: (T, n, 3) the ground's force on each of them in the world [N].
         attitude: (T, 3) roll, pitch and yaw of the trunk in the heading frame [rad].
-        heading: (T,) angle from the world's x to the heading frame's [rad].
+        heading: (T,) angle from the world's x to where the trunk is to face, which is along the
+            heading frame's but for ``facing`` [rad].
         sway: (T, 2) y of the CoM from the rear foot and dy/dt, in the heading frame; dy/dt has the
             angular momentum about the CoM as ``section_state`` has it [m, m/s].
         side_reference: (T, 2) y of the reference of each template leg's foot in the heading frame,
@@ -326,6 +327,26 @@ class FloatingRecord(Record):
     heading: Annotated[Array, Quantity("T", "rad")]
     sway: Annotated[Array, Quantity("T 2:sway_state")]
     side_reference: Annotated[Array, Quantity("T 2:group", "m")]
+
+    @property
+    def facing(self) -> Array:
+        """(T,) angle from the way that the robot goes, the heading frame's x, to ``heading``."""
+        if not len(self.section_course):
+            return np.zeros(len(self.time))
+        half = 0.5 * self.duration / max(len(self.tick_seconds), 1)  # of a tick
+        begun = np.searchsorted(self.section_time - half, self.time, side="right") - 1
+        return self.section_course[np.maximum(begun, 0), 3]
+
+    @property
+    def section_velocity(self) -> Array:
+        """(S, 3) accepted velocity in each stride, in the frame of ``heading``.
+
+        Forward and to the left [m/s], of a run or a walk by a commanded speed the mean; and the
+        turning rate [rad/s].
+        """
+        along, left, turning, facing = self.section_course.T
+        c, s = np.cos(facing), np.sin(facing)
+        return np.column_stack((c * along + s * left, c * left - s * along, turning))
 
 
 @dataclass(frozen=True, repr=False)

@@ -384,6 +384,7 @@ class Recorder:
             reports = [r for r in reports if r.time >= self._first] or reports[-1:]
         sections = list(dict.fromkeys(r.section.name for r in reports))
         strides = list(dict.fromkeys(r.goal.stride for r in reports))
+        courses = c.courses[-len(reports) :]
         metadata = {
             **self._about,
             **outcome(c, self.statistics()),
@@ -395,6 +396,10 @@ class Recorder:
             "ticks": self.ticks - self._forgotten,
             "sections": sections,
             "strides": strides,
+            "courses": [
+                (r.goal.wanted_speed + r.accepted - float(r.target[0]), *course)
+                for r, course in zip(reports, courses, strict=True)
+            ],
         }
         return kind(
             **data,

@@ -223,5 +223,5 @@ def step_widths(record: FloatingRecord) -> Array:
     begun = np.flatnonzero(np.diff(record.in_phase(Phase.DS).astype(np.int8)) == 1) + 1
     left, right = record.of_legs(record.space_foot)[begun, :, :2].swapaxes(0, 1)
     apart = left - right
-    angle = record.heading[begun]
+    angle = record.heading[begun] - record.facing[begun]
     return np.asarray(np.cos(angle) * apart[:, 1] - np.sin(angle) * apart[:, 0])

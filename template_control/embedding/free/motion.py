@@ -132,6 +132,12 @@ class LateralMotion:
             speed = (speed - s.momentum[0] / (self.robot.mass * height)) * self.robot.sway
         return np.array([s.com[_SIDE], speed])
 
+    @property
+    def taken(self) -> Course:
+        """What is taken of the course in the stride that begins."""
+        left, turning, _ = self._now.tolist()
+        return Course(left, turning)
+
     def side(self, foot: int) -> float:
         """y of a foot [m]."""
         return float(self.robot.space.foot[foot, _SIDE])
