@@ -75,9 +75,12 @@ def follow(
     duration: float,
 ) -> tc.Record:
     """Follow a profile, and say how it went."""
-    model, motion = tc.load_robot(robot), profile
-    if isinstance(motion, tc.SpeedProfile):
-        motion = tc.SpeedRoute(tc.template_for(model), motion, duration)
+    model = tc.load_robot(robot)
+    motion: tc.SpeedRoute | tc.run.VelocityProfile
+    if isinstance(profile, tc.SpeedProfile):
+        motion = tc.SpeedRoute(tc.template_for(model), profile, duration)
+    else:
+        motion = profile
     record = tc.simulate(tc.Experiment(model, motion, record_every=10))
     told, speed = summarise(record, None), record.section_state[:, 0]
     ended = f"FELL: {told['fall_reason']}" if record.fell else "no fall"
@@ -165,11 +168,12 @@ def main() -> None:
     else:
         falls = 0
         for seed in range(chosen.first, chosen.first + chosen.trials):
-            profile = random_profile(seed, chosen.duration, unit)
-            if chosen.commands is not None:
-                asked = chosen.duration, chosen.commands, chosen.backward
-                profile = random_commands(seed, *asked)
-            record = follow(f"seed {seed}", chosen.robot, profile, chosen.duration)
+            drawn: tc.SpeedProfile | tc.run.VelocityProfile
+            if chosen.commands is None:
+                drawn = random_profile(seed, chosen.duration, unit)
+            else:
+                drawn = random_commands(seed, chosen.duration, chosen.commands, chosen.backward)
+            record = follow(f"seed {seed}", chosen.robot, drawn, chosen.duration)
             falls += record.fell
         low, high = wilson_interval(chosen.trials - falls, chosen.trials)
         print(
