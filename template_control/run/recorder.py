@@ -397,7 +397,7 @@ class Recorder:
             "sections": sections,
             "strides": strides,
             "courses": [
-                (r.goal.wanted_speed + r.accepted - float(r.target[0]), *course)
+                [r.goal.wanted_speed + (r.accepted - float(r.target[0])), *course]
                 for r, course in zip(reports, courses, strict=True)
             ],
         }
