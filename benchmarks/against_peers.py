@@ -71,14 +71,14 @@ def measure(folder: Path) -> dict[str, float]:
     Args:
         folder: for the peers' environments, and for the walk whose states they get.
     """
-    from control_tick import GAITS, ticks_of  # which only this library's environment can import
+    from control_tick import start, ticks_of  # which only this library's environment can import
 
     folder.mkdir(parents=True, exist_ok=True)
-    start = GAITS["free"][0]()
-    robot = start.controller.robot
+    run = start("free")
+    robot = run.controller.robot
     ticks: list[float] = []
     steps: list[float] = []
-    under_way = ticks_of(start, ticks, steps)
+    under_way = ticks_of(run, ticks, steps)
     _prepare(robot, under_way, folder)
     peers = {name: _start(name, packages, folder) for name, packages in PEERS.items()}
     times: dict[str, list[float]] = {name: [] for name in peers}

@@ -6,9 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import template_control as tc
 from template_control.errors import RobotError
 from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.robot.library import load_floating_robot, robot_path
+from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
 from template_control.robot.sole import Sole
 from template_control.robot.spec import RobotSpec
 from template_control.robot.start import FloatingBasePose, floating_state_in
@@ -150,3 +151,10 @@ def test_a_start_puts_level_soles_on_the_ground(g1):
     sway = s.com_velocity[1] - s.momentum[0] / (g1.mass * pose.com[2])
     assert g1.sway * sway == pytest.approx(0.1)
     assert pin.log3(g1.rotation)[1] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("name", FLOATING_ROBOTS)
+def test_a_robot_walks_by_default_at_a_speed_of_its_range(name):
+    robot = load_floating_robot(name)
+    slowest, fastest = tc.walking_speeds(robot)
+    assert slowest <= tc.default_gait(robot).mean_speed <= fastest
