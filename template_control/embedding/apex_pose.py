@@ -31,6 +31,7 @@ from template_control.slip.maps.section import APEX
 Array = NDArray[np.float64]
 
 _NEAR = 0.9  # of l0: a distance from the CoM that any leg reaches
+_LEVEL = 1.0  # the same of a leg with a level sole: more bent, its ankle comes to its stop
 _REACH = 0.96  # of the leg: a straight knee may bend either way
 _TICK = 1e-3  # over which the references move on [s]; finer ones end in the same place
 
@@ -106,9 +107,9 @@ def apex_pose(
         angular_momentum=0.0,
     )
     # Fast references run ahead of what the legs reach. Where the feet are hardly moves the hips.
-    near = _within(pose, pose.com, _NEAR * gait.parameters.rest_length)
-    place(robot, replace(pose, feet=near))
-    hips = robot.data["hips"][0, [0, UP]]
+    reach = (_LEVEL if robot.patches else _NEAR) * gait.parameters.rest_length
+    place(robot, replace(pose, feet=_within(pose, pose.com, reach)))
+    hips = robot.data["hips"][0, [0, UP]] + (robot.toe_ahead, -robot.ankle_height)
     return replace(pose, feet=_within(pose, hips, _REACH * robot.leg_length))
 
 

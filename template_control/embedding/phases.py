@@ -116,7 +116,7 @@ def running_phases(
 
     Args:
         flight: tasks in flight.
-        stance: control of a run's stances.
+        stance: control of a run's stances; its swings begin in flight.
         double: control of the double stance that leads into a run.
     """
     landed = replace(stance, replan_at_touchdown=True)
@@ -127,7 +127,7 @@ def running_phases(
             clock=Clock.TIME,
             momentum_speed=False,
             estimate_load=False,
-            swing=RUNNING_SWING,
+            swing=stance.swing,
         ),
         "SS_sc^r": landed,
         "SS_sd^r": stance,

@@ -103,9 +103,7 @@ def template_for(robot: Biped) -> SlipParameters:
     Args:
         robot: its last update is overwritten.
     """
-    q = robot.neutral()
-    robot.update(q, np.zeros(robot.nv))
-    above_hip = float(robot.com[1] - robot.hip_height(q)) + robot.ankle_height
+    above_hip = _above_hips(robot)
     stretch = _SOLE_STRETCH if robot.patches else _STRETCH
     reach = stretch * (robot.leg_length + robot.foot_radius)
     sine, cosine = float(np.sin(_TOUCHDOWN)), float(np.cos(_TOUCHDOWN))
@@ -114,6 +112,16 @@ def template_for(robot: Biped) -> SlipParameters:
     relative = REFERENCE.leg_stiffness * REFERENCE.rest_length
     relative /= REFERENCE.mass * REFERENCE.gravity
     return SlipParameters(robot.mass, robot.gravity, length, relative * weight / length)
+
+
+def _above_hips(robot: Biped) -> float:
+    """Height of the CoM over the hips, and of the ankles over the ground, with straight legs [m].
+
+    The robot is left updated so.
+    """
+    q = robot.neutral()
+    robot.update(q, np.zeros(robot.nv))
+    return float(robot.com[1] - robot.hip_height(q)) + robot.ankle_height
 
 
 @checked
@@ -233,9 +241,7 @@ def knee_torque(robot: Biped, gait: RunningGait) -> float:
     A share of the template's leg force times the distance of a knee from the line between hip and
     foot, with a thigh as long as the shank. The robot's last update is overwritten.
     """
-    template_for(robot)  # which leaves the robot updated with straight legs
-    above_hip = float(robot.com[1])
-    leg = _shortest_leg(gait)
+    above_hip, leg = _above_hips(robot), _shortest_leg(gait)
     straight = 0.5 * robot.leg_length
     half = 0.5 * max(leg - above_hip - robot.foot_radius, 0.0)
     away = float(np.sqrt(max(straight**2 - half**2, 0.0)))

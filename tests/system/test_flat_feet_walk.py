@@ -87,3 +87,18 @@ def test_another_mass_walks_and_is_learnt(scale):
     record = walk("g1", 7, world=PlantOptions(mass_scale=scale))
     assert not record.fell
     assert record.section_load[-1] == pytest.approx(scale, abs=0.04)
+
+
+@pytest.mark.slow(3)
+def test_g1_runs():
+    """With flight, at its speed, and with its motors hardly ever at their limits."""
+    spec = tc.robot.RobotSpec("g1", free=True)
+    run = GaitSpec(name="run", speed=1.35)
+    record = tc.simulate(tc.Experiment(spec, motion=run, steps=10))
+    assert (record.fall_reason, record.steps) == ("", 10)
+    assert record.solved.all()
+    np.testing.assert_allclose(record.section_state[:, 0], 1.35, rtol=0.05)
+    flies = (record.contact_force[:, :, 1] == 0.0).all(axis=1)
+    assert flies.mean() > 0.15
+    assert (np.abs(record.torque) >= record.torque_limit).any(axis=1).mean() < 0.03
+    assert np.abs(record.attitude[:, 0]).max() < 0.15
