@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from template_control.cli.report import failures_text, nearest_text, speed_text
+from template_control.cli.report import failures_text, joint_table, nearest_text
 from template_control.run.record import Record
 from template_control.run.summary import OTHERS, STRIDES, summarise
 from template_control.slip.scenario.run import ScenarioRecord
@@ -16,8 +16,8 @@ from template_control.terminal import show, table
 NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in a walk"
 _FROM_THE_RUN = (
     "robot", "fell", "fall_reason", "duration", "speed_error_rms", "accepted_speed",
-    "nearest_speed_taken", "joint_torque", "joint_speed", "saturated_share", "qp_failures",
-    "qp_failed_share", "real_time_factor",
+    "nearest_speed_taken", "joint_torque", "joint_speed", "joint_angle", "saturated_share",
+    "qp_failures", "qp_failed_share", "real_time_factor",
 )  # fmt: skip
 
 
@@ -47,7 +47,8 @@ def summarise_route(record: Record, template: ScenarioRecord, path: str | None) 
 
 def print_route_table(figures: dict[str, Any]) -> None:
     """The figures of :func:`summarise_route` as a table on standard output."""
-    show(table(f"{figures['robot']} and its template", ("", "robot", "template"), _rows(figures)))
+    title, columns = f"{figures['robot']} and its template", ("", "robot", "template")
+    show(table(title, columns, _rows(figures)), joint_table(figures))
 
 
 def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, ...]]:
@@ -70,9 +71,6 @@ def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, ...]]:
     yield "duration", f"{figures['duration']:.2f} s"
     for name, count in figures["strides"].items():
         yield f"strides, {name}", f"{count}"
-    for joint, torque in figures["joint_torque"].items():
-        speed = speed_text(figures["joint_speed"][joint])
-        yield f"{joint}, peak", f"{torque['peak']:.0f} of {torque['limit']:g} N m, {speed}"
     yield "ticks with a torque at its limit", f"{100 * figures['saturated_share']:.2f} %"
     yield "QP failures", failures_text(figures)
     yield "record", figures["record"] or "not saved"

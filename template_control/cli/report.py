@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rich.table import Table
+
 from template_control.checks import option_types as values
 from template_control.cli.interrupts import stopped
 from template_control.cli.notices import notice, printed
@@ -22,7 +24,7 @@ from template_control.run.record import Record, RunInterrupted, one_line, record
 from template_control.run.simulation import simulate
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
-from template_control.terminal import figures_table, progress_bar, show
+from template_control.terminal import figures_table, progress_bar, show, table
 
 
 def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
@@ -133,7 +135,7 @@ _MEAN = 50  # strides at most whose section states the summary averages
 def print_table(figures: dict[str, Any]) -> None:
     """The summary, from :func:`~template_control.run.summary.summarise`, as a table on stdout."""
     title = f"{figures['robot']}, gait {figures['gait']}"
-    show(figures_table(title, _rows(figures)))
+    show(figures_table(title, _rows(figures)), joint_table(figures))
 
 
 def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -166,11 +168,6 @@ def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"CoM error in {axis}, RMS / max", errors
     if "attitude_rms" in figures:
         yield from floating_rows(figures)
-    for joint, torque in figures["joint_torque"].items():
-        sizes = f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g} N m"
-        yield f"{joint} torque, peak / RMS of limit", sizes
-    for joint, speed in figures["joint_speed"].items():
-        yield f"{joint} speed, peak", speed_text(speed)
     share = figures["flight_share"]
     if share["template"]:
         flight = figures["com_error_flight_rms"]
@@ -207,20 +204,30 @@ def floating_rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if width is not None:
         widths = f"{width['mean']:.3f} / {width['deviation']:.3f} / {width['least']:.3f} m"
         yield "step width, mean / deviation / least", widths
-    for joint, angle in figures.get("joint_angle", {}).items():  # earlier versions did not keep it
-        past = angle["least"] < angle["lower"] or angle["most"] > angle["upper"]
-        reached = f"{angle['least']:+.2f} to {angle['most']:+.2f}"
-        limits = f"{angle['lower']:g} to {angle['upper']:g} rad"
-        yield f"{joint} angle", f"{reached} of {limits}{past_limit(past)}"
 
 
-def speed_text(speed: dict[str, float]) -> str:
-    """Peak speed of a joint and its limit (of a summary), marked where it was exceeded."""
-    peak, limit = speed["peak"], speed["limit"]
-    return f"{peak:.3g} of {limit:g} rad/s" + past_limit(peak > limit)
+def joint_table(figures: dict[str, Any]) -> Table:
+    """What each joint did of what it may, marked where that was more."""
+    title = "joints: torque, peak / RMS of limit; speed, peak of limit; angle of range"
+    columns = ("", "torque [N m]", "speed [rad/s]", "angle [rad]")
+    return table(title, columns, _joint_rows(figures))
 
 
-def past_limit(past: bool) -> str:
+def _joint_rows(figures: dict[str, Any]) -> Iterator[tuple[str, ...]]:
+    for joint, torque in figures["joint_torque"].items():
+        speed, angle = figures["joint_speed"][joint], figures["joint_angle"][joint]
+        fast = _past_limit(speed["peak"] > speed["limit"])
+        far = _past_limit(angle["least"] < angle["lower"] or angle["most"] > angle["upper"])
+        yield (
+            joint,
+            f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g}",
+            f"{speed['peak']:.3g} of {speed['limit']:g}{fast}",
+            f"{angle['least']:.2f}..{angle['most']:.2f}"
+            f" of {angle['lower']:.2f}..{angle['upper']:.2f}{far}",
+        )
+
+
+def _past_limit(past: bool) -> str:
     """The mark of a figure that is past its limit."""
     return ", past its limit" if past else ""
 

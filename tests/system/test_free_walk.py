@@ -9,12 +9,13 @@ import pytest
 import template_control as tc
 from template_control.cli.experiment_options import experiment_from
 from template_control.cli.main import main
-from template_control.cli.report import floating_rows
+from template_control.cli.report import joint_table
 from template_control.errors import ParameterError
 from template_control.robot.library import load_floating_robot
 from template_control.run.record import load_record
 from template_control.run.summary import summarise
 from template_control.run.tables import columns
+from template_control.terminal import show
 
 STEPS = 12
 
@@ -145,22 +146,21 @@ def test_the_command_walks_free(tmp_path, capfd):
     }
 
 
-def test_a_joint_past_its_limit_is_told():
-    attitude = dict.fromkeys(("roll", "pitch", "yaw"), 0.0)
+def test_a_joint_past_its_limit_is_told(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    joints = ("hip", "knee")
     figures = {
-        "attitude_rms": attitude,
-        "attitude_max": attitude,
-        "turned": 0.0,
-        "mean_yaw_drift": 0.0,
-        "step_width": None,
+        "joint_torque": {joint: {"peak": 1.0, "rms": 0.5, "limit": 2.0} for joint in joints},
+        "joint_speed": {joint: {"peak": 3.0, "limit": 4.0} for joint in joints},
         "joint_angle": {
             "hip": {"least": -0.5, "most": 0.2, "lower": -0.4, "upper": 0.4},
             "knee": {"least": 0.1, "most": 1.0, "lower": 0.0, "upper": 2.0},
         },
     }
-    rows = dict(floating_rows(figures))
-    assert rows["hip angle"] == "-0.50 to +0.20 of -0.4 to 0.4 rad, past its limit"
-    assert rows["knee angle"] == "+0.10 to +1.00 of 0 to 2 rad"
+    show(joint_table(figures))
+    *_, hip, knee, _ = capsys.readouterr().out.splitlines()
+    assert hip.split("│")[-2].strip() == "-0.50..0.20 of -0.40..0.40, past its limit"
+    assert knee.split("│")[-2].strip() == "0.10..1.00 of 0.00..2.00"
 
 
 def test_what_a_free_robot_cannot_do_is_refused(refused):
