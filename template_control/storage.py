@@ -61,21 +61,21 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     RecordError. A link keeps its target; a device is written directly.
     """
     target = Path(os.path.realpath(path))
-    beside = target.with_name(f".part-{uuid.uuid4().hex[:12]}{target.suffix}")
+    partial = target.with_name(f".part-{uuid.uuid4().hex[:12]}{target.suffix}")
     device = False
     try:
         if target.exists() and not (target.is_file() or target.is_dir()):
-            device, beside = True, target
+            device, partial = True, target
         if target.is_dir() or (target.exists() and not os.access(target, os.W_OK)):
             target.open("ab").close()  # which raises what is the matter with it
-        beside.touch()
-        yield beside
+        partial.touch()
+        yield partial
         if not device:
-            with beside.open("rb+") as file:
+            with partial.open("rb+") as file:
                 os.fsync(file.fileno())  # some file systems notice only now that they are full
             if target.exists():
-                shutil.copymode(target, beside)
-            beside.replace(target)
+                shutil.copymode(target, partial)
+            partial.replace(target)
     except OSError as error:
         raise RecordError(
             f"cannot write {path}: {error.strerror or error}; make room, or give another place"
@@ -83,7 +83,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     finally:
         if not device:
             with suppress(OSError):
-                beside.unlink(missing_ok=True)
+                partial.unlink(missing_ok=True)
 
 
 class Files:

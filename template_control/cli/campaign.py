@@ -132,7 +132,7 @@ def report(found: Campaign, files: Files, folder: Path) -> Report:
         name="campaign.png",
         lines=("", f"The falls began with: {causes}.") if causes else (),
         details=("what went wrong", _DETAILS, details) if details else None,
-        note=f"and {more} more, each with its file beside these" if more > 0 else "",
+        note=f"and {more} more, each with its file in the same folder" if more > 0 else "",
     )
 
 
@@ -145,7 +145,7 @@ def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:
     """
     conditions = found.conditions
     table = settings.to_table(conditions.experiment.resolved())
-    told = ("number", "fell", "reason", "first", "speed_error", "severity")
+    columns = ("number", "fell", "reason", "first", "speed_error", "severity")
     return {
         "robot": conditions.experiment.robot_name,
         "gait": table["motion"],
@@ -156,7 +156,7 @@ def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:
         "astray": _share(found, found.off_gait),
         "reasons": found.reasons,
         "wrong": [
-            {name: getattr(t, name) for name in told}
+            {name: getattr(t, name) for name in columns}
             | {"config": str(falls[t.number]) if t.number in falls else None}
             for t in (*found.fell, *found.off_gait)
         ],

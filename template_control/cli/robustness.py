@@ -145,8 +145,8 @@ def _row(finding: Finding) -> list[str]:
     beyond, after = "", next((level for level in levels if level.rate < 1.0), None)
     if after is not None:
         counts = ((after.fell, "fell"), (after.off_gait, "off its gait"))
-        told = ", ".join(f"{n} {what}" for n, what in counts if n)
-        beyond = f"{d.shown(after.level)}: {told}"
+        failed = ", ".join(f"{n} {what}" for n, what in counts if n)
+        beyond = f"{d.shown(after.level)}: {failed}"
     return [
         d.title,
         str(d.trials),

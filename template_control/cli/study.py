@@ -42,8 +42,8 @@ def _report(study: Study, result: SweepResult, name: str) -> Report:
     rows, data = [], []
     for item, found, error in zip(result.items, result.results, result.errors, strict=True):
         keys = item["item"]
-        told = [_text(found[figure]) if found else "" for figure in study.figures]
-        rows.append([*map(_text, keys.values()), *told, error or ""])
+        figures = [_text(found[figure]) if found else "" for figure in study.figures]
+        rows.append([*map(_text, keys.values()), *figures, error or ""])
         data.append({"keys": keys, "figures": found, "error": error})
     failed = any(result.errors)
     columns = [*study.axes, *study.figures, *["why not"] * failed]

@@ -174,14 +174,14 @@ class BulletPlant:
         Raises:
             RobotError: naming the link that does not.
         """
-        told = link_masses(self.robot.urdf)
+        masses = link_masses(self.robot.urdf)
         for row in info:
             link = row[12].decode()
             mass = self._engine.getDynamicsInfo(self.body, row[0], physicsClientId=self.client)[0]
-            if abs(mass - told[link]) > _CLOSE * self.robot.mass:
+            if abs(mass - masses[link]) > _CLOSE * self.robot.mass:
                 raise RobotError(
                     f"{self.robot.path}: link {link!r} weighs {mass:g} kg in PyBullet and"
-                    f" {told[link]:g} kg in the URDF: give it an <inertial> with its mass"
+                    f" {masses[link]:g} kg in the URDF: give it an <inertial> with its mass"
                 )
 
     def _mass_matrix(self, q: Array) -> Array:
@@ -329,7 +329,7 @@ class BulletPlant:
         """
         self._advance(torque, push, 0.0)
 
-    def _advance(self, torque: Array, push: float, aside: float) -> None:
+    def _advance(self, torque: Array, push: float, left: float) -> None:
         """One physics step with a push along the world's x and y [N]."""
         p, c = self._engine, self.client
         self._stale = True
@@ -337,11 +337,11 @@ class BulletPlant:
         p.setJointMotorControlArray(
             self.body, self._actuated, p.TORQUE_CONTROL, forces=forces, physicsClientId=c
         )
-        if push or aside:
+        if push or left:
             p.applyExternalForce(
                 self.body,
                 self._trunk,
-                [push, aside, 0.0],
+                [push, left, 0.0],
                 self._trunk_com(),
                 p.WORLD_FRAME,
                 physicsClientId=c,
@@ -397,9 +397,9 @@ class FloatingBaseBulletPlant(BulletPlant):
     def _trunk_com(self) -> Any:
         return self._engine.getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
 
-    def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
+    def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
-        self._advance(torque, push, aside)
+        self._advance(torque, push, left)
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""

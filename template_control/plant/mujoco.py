@@ -197,9 +197,9 @@ class FloatingBaseMujocoPlant(MujocoPlant):
     quaternions begin with w.
     """
 
-    def step(self, torque: Array, push: float = 0.0, aside: float = 0.0) -> None:
+    def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
-        self.data.xfrc_applied[self._trunk, 1] = aside
+        self.data.xfrc_applied[self._trunk, 1] = left
         super().step(torque, push)
 
     def reset(self, q: Array, v: Array) -> None:

@@ -188,15 +188,15 @@ def read_losses(path: Path, robot: ET.Element, lossless: bool) -> None:
     _tell_rotors(path, robot)
     for joint in robot.findall("joint"):
         for dynamics in joint.findall("dynamics"):
-            told = [name for name in _LOSSES if dynamics.get(name) is not None]
-            for name in told:
+            given = [name for name in _LOSSES if dynamics.get(name) is not None]
+            for name in given:
                 text = str(dynamics.get(name))
                 if not _is_loss(text):
                     raise RobotError(
                         f"{path}: joint {joint.get('name')!r}: dynamics has {name} {text!r}: give a"
                         " finite number, not below zero"
                     )
-            if lossless or not told:
+            if lossless or not given:
                 joint.remove(dynamics)
 
 

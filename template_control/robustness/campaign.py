@@ -206,8 +206,8 @@ class CampaignConfig(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         engine(self.experiment)
-        aside = self.mix.direction != DisturbanceDistribution().direction
-        if aside and not self.experiment.free:
+        lateral = self.mix.direction != DisturbanceDistribution().direction
+        if lateral and not self.experiment.free:
             raise ParameterError(
                 f"the mix has the direction {list(self.mix.direction)}, and"
                 f" {self.experiment.robot_name} is held in its plane: leave it out, or take a"

@@ -242,7 +242,7 @@ class FloatingBackend(RobotBackend):
         side_speed, rate, _ = o.heading(0.0)
         lateral.wish = LateralWish(
             o.course.step_width or lateral.wish.width,
-            aside=side_speed * planner.gait.step_duration,
+            left=side_speed * planner.gait.step_duration,
             # A run leans into its turns by and by.
             turn=rate * planner.gait.step_duration if route.section == VLO else 0.0,
         )

@@ -46,14 +46,14 @@ def about(controller: EmbeddingController) -> dict[str, Any]:
 
 def conditions(o: Experiment) -> dict[str, Any]:
     """Conditions of a simulation; a plant of one's own is not data."""
-    told = {
+    options = {
         _NAMES.get(f.name, f.name): to_jsonable(getattr(o, f.name), _described)
         for f in fields(o)
         if f.name not in _APART
     }
     if not isinstance(o.world, PlantOptions | IdealOptions):
-        told["plant"] = {}
-    return {"plant": plant_name(o.world), "options": told}
+        options["plant"] = {}
+    return {"plant": plant_name(o.world), "options": options}
 
 
 def outcome(controller: EmbeddingController, figures: Statistics) -> dict[str, Any]:

@@ -21,7 +21,7 @@ class Course(NamedTuple):
     """Where a robot is to go; its speed is the route's.
 
     Attributes:
-        left: speed to the left of the course, by footholds aside [m/s].
+        left: speed to the left of the course, by footholds further to the left [m/s].
         turning: rate at which the trunk turns, to the left [rad/s].
         facing: angle from the course to where the trunk faces, to the left [rad]; NaN: as it is.
     """

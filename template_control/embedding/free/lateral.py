@@ -106,7 +106,7 @@ LATERAL = np.dtype(
         ("longest", _F),
         ("touchdown", _F),
         ("section", _F),
-        ("beside", _I),
+        ("stance", _I),
         ("ratio", _F),
         ("rolling", _F),  # of the feet, see pivot
         ("feet", _I, (2,)),  # that were rear and front at its start
@@ -126,7 +126,7 @@ LATERAL = np.dtype(
         ("unit", _F),  # of time, over the reference template's
         ("pressure", _F),  # y of the centre of pressure [m]; NaN: not planned
         ("pressure_at", _F),  # when it was planned [s]
-        ("half_width", _F),  # by how far aside of its middle a foot bears; 0 of a point [m]
+        ("half_width", _F),  # how far to either side of its middle a foot bears; 0 of a point [m]
         # -- what the foothold is for: see LateralAim --
         ("state", _F, (2,)),
         ("step", _F),
@@ -170,7 +170,7 @@ def lateral_foothold(
         longest=lateral.longest,
         touchdown=lateral.touchdown,
         section=lateral.section,
-        beside=lateral.beside,
+        stance=lateral.stance,
         ratio=lateral.ratio,
     )
     aim = LateralAim(
@@ -331,7 +331,7 @@ class LateralPlanner:
         """
         self._take(path)
         self.data["feet"] = feet
-        for name in ("gravity", "longest", "touchdown", "section", "beside", "ratio"):
+        for name in ("gravity", "longest", "touchdown", "section", "stance", "ratio"):
             self.data[name] = getattr(self._path, name)
         return self._path.coefficients, self._path.meta, self._path.footholds
 

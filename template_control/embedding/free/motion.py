@@ -209,8 +209,8 @@ class LateralMotion:
         turn_ramp = walk_ramp if node.stance else run_ramp
         most = gait.step_duration * np.array([side_ramp, turn_ramp, turn_ramp])
         self._now += np.clip(self._wanted(course) - self._now, -most, most)
-        aside, turn, self._turns = (gait.step_duration * self._now).tolist()
-        planner.wish = replace(planner.wish, aside=aside, turn=turn - self._turns)
+        left, turn, self._turns = (gait.step_duration * self._now).tolist()
+        planner.wish = replace(planner.wish, left=left, turn=turn - self._turns)
         planner.walk(gait)
         planner.aim(SIDES[self._feet.landed], turned=True)
         z, target = section.of(sensed.state), supervisor.goal.target
@@ -254,7 +254,7 @@ class LateralMotion:
         """
         planner = self.planner
         self._now[:], self._turns = 0.0, 0.0
-        planner.wish = replace(planner.wish, aside=0.0, turn=0.0)
+        planner.wish = replace(planner.wish, left=0.0, turn=0.0)
         planner.walk(supervisor.planner.next_gait())
         planner.aim(SIDES[self._feet.landed])
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))

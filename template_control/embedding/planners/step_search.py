@@ -252,8 +252,8 @@ def _fine(centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
         u[0] += (i // n2 / (0.5 * (n0 - 1)) - 1.0) * widths[0]
         u[2] += (i % n2 / (0.5 * (n2 - 1)) - 1.0) * widths[1]
     else:
-        beside = i - n0 * n2
-        u[1 + beside // 2 * 2] += (2 * (beside % 2) - 1) * widths[1]
+        place = i - n0 * n2
+        u[1 + place // 2 * 2] += (2 * (place % 2) - 1) * widths[1]
 
 
 @compiled

@@ -182,12 +182,12 @@ class LateralWish(Checked):
 
     Attributes:
         width: lateral distance between left and right footholds [m].
-        aside: distance to the left that each step moves the walk [m].
+        left: distance to the left that each step moves the walk [m].
         turn: angle by which the heading turns to the left at each section [rad].
     """
 
     width: NotNegative
-    aside: float = 0.0
+    left: float = 0.0
     turn: float = 0.0
 
 
@@ -226,10 +226,10 @@ def lateral_cycle(
     turning, moved = np.linalg.solve(
         np.column_stack((to_left[:, 0], -b)), -2.0 * half * a[:, 1] - half * to_left[:, 1]
     )
-    aside = np.linalg.solve(to_left, wish.aside * b + 0.5 * (added[0] + added[1]))
-    aside += (turning, half)
-    step = wish.aside + moved
+    left = np.linalg.solve(to_left, wish.left * b + 0.5 * (added[0] + added[1]))
+    left += (turning, half)
+    step = wish.left + moved
     return LateralCycle(
-        states=np.array([aside + mirrored, aside - mirrored]),
+        states=np.array([left + mirrored, left - mirrored]),
         steps=np.array([step - wish.width, step + wish.width]),
     )

@@ -54,7 +54,7 @@ class LateralPath(NamedTuple):
         touchdown: time of the next touchdown [s], inf if the path has none.
         section: time of the first section after it [s], inf if the path does not come there or
             starts below the ground.
-        beside: index, 0 or 1, of the foothold next to which the next foot lands.
+        stance: index, 0 or 1, of the foothold next to which the next foot lands.
         ratio: of dy/dt to that with the angular momentum about the CoM, as a robot sways; c_i is
             times it. 1 of the template, whose legs weigh nothing.
     """
@@ -66,7 +66,7 @@ class LateralPath(NamedTuple):
     longest: float
     touchdown: float
     section: float
-    beside: int
+    stance: int
     ratio: float
 
 
@@ -88,7 +88,7 @@ def lateral_path(strides: Sequence[Stride], gravity: float, ratio: float = 1.0) 
         if stride.completed:
             sections.append(offset)
     meta = np.concatenate(metas)
-    footholds, touchdown, beside = _footholds(meta, resets)
+    footholds, touchdown, stance = _footholds(meta, resets)
     height = float(strides[0].cy[0, 0])  # of a robot that falls it may be below its foot
     section = next((time for time in sections if time > touchdown), np.inf)
     return LateralPath(
@@ -99,7 +99,7 @@ def lateral_path(strides: Sequence[Stride], gravity: float, ratio: float = 1.0) 
         longest=_SHARE * float(np.sqrt(height / gravity)) if height > 0.0 else np.inf,
         touchdown=touchdown,
         section=section if height > 0.0 else np.inf,
-        beside=beside,
+        stance=stance,
         ratio=float(ratio),
     )
 
@@ -120,8 +120,8 @@ def _footholds(
             landings.append((time, int(legs[1 - role])))
         footholds[int(np.searchsorted(meta[:, 0], time - _SAME)) :] = legs
     footholds[meta[:, 5:7] == 0.0] = IN_AIR  # NaN where both legs stand without springs
-    first, beside = landings[0] if landings else (np.inf, 0)
-    return footholds, first, beside
+    first, stance = landings[0] if landings else (np.inf, 0)
+    return footholds, first, stance
 
 
 COLUMNS = 2 + NEXT + 1

@@ -215,7 +215,7 @@ def place(path: LateralPath, aim: LateralAim, time: float, com: Array, feet: Arr
         for i in range(2):
             ahead[k] += motion[k, _FOOTHOLDS + i] * feet[i]
         slope[k] = motion[k, _NEXT]
-    stance = feet[path.beside]
+    stance = feet[path.stance]
     # The error of the state is e + s p; that of the step p - stance - step.
     s0, s1 = slope[0] - 1.0, slope[1]
     e0, e1 = ahead[0] - aim.state[0], ahead[1] - aim.state[1]
@@ -244,7 +244,7 @@ def _left(path: LateralPath, time: float, stretch: float) -> float:
 
 
 def sideways() -> None:
-    """A step's motion aside, and the foothold that is chosen on it."""
+    """A step's motion to the left, and the foothold that is chosen on it."""
     p = SlipParameters()
     u = controls(1.152, p.leg_stiffness, p.leg_stiffness)
     stride = simulate_stride(p, STRIDE_START[StrideKind.WALK], VLO.state([1.1, 0.978, 0.0]), u)

@@ -62,7 +62,7 @@ def test_a_gait_symmetric_in_time_sways_symmetrically():
 
 
 def test_a_walk_aside_is_periodic_too():
-    cycle = lateral_cycle(LATERAL, LateralWish(0.2, aside=0.03))
+    cycle = lateral_cycle(LATERAL, LateralWish(0.2, left=0.03))
     for side in Side:
         ahead = LATERAL.a @ cycle.states[side.row] + LATERAL.b * cycle.steps[side.row]
         np.testing.assert_allclose(ahead, cycle.states[side.other.row], atol=1e-12)
@@ -177,7 +177,7 @@ def test_in_double_stance_the_next_foot_is_the_one_that_will_lift_off():
     following = simulate_stride(P, STRIDE_START["w"], rest.state, WALK.controls, rest.toes)
     path = lateral_path((rest, following), P.gravity)
     assert end[0] > start[0]
-    assert path.beside == 1
+    assert path.stance == 1
     assert path.footholds[0].tolist() == [0, 1]
     np.testing.assert_allclose(path.touchdown, rest.duration + PATH.touchdown, atol=1e-9)
 

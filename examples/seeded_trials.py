@@ -1,7 +1,7 @@
 """Robustness of a scenario with everything a little wrong at once, in either engine.
 
-    python examples/how_sure.py [--scenario examples/zero_five_zero.toml] [--robot runner]
-        [--plant pybullet] [--trials 20] [--results how_sure.jsonl]
+    python examples/seeded_trials.py [--scenario examples/zero_five_zero.toml] [--robot runner]
+        [--plant pybullet] [--trials 20] [--results seeded_trials.jsonl]
 
 Of each trial drawn with its number: friction 0.6 to 0.9, which the controller takes for 0.7, 3 %
 of mass too much or too little, feet 0.2 to 0.35 of l0 apart, noise of 0.2 mrad, 0 or 1 ms of delay.
@@ -50,7 +50,7 @@ def trial(about: dict[str, str], world: dict[str, float], seed: int) -> dict[str
 
 def main() -> None:
     """Run the trials and say how many arrived."""
-    parser = argparse.ArgumentParser(description="How sure a scenario is.")
+    parser = argparse.ArgumentParser(description="Falls of a scenario in seeded random trials.")
     parser.add_argument("--scenario", default="examples/zero_five_zero.toml")
     parser.add_argument("--robot", default="runner")
     parser.add_argument("--plant", choices=tuple(PLANTS), default="pybullet")
