@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import asin, atan2, hypot, inf, isnan
+from math import asin, atan2, hypot, inf, isnan, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -261,6 +261,8 @@ def _after_touchdown(rollout: TemplateRollout, s: Situation) -> Decision | None:
     if decision is not None:
         return decision
     angle = ballistic_touchdown_angle(s.sensed, rollout.planners.route.parameters)
+    if not 0.0 < angle < pi:
+        return None  # of a robot that falls: the CoM is below the foot
     start = rollout.automaton.start(s.goal.stride)
     return choose_all_controls(rollout, s._replace(node=start), (angle, angle))
 

@@ -38,6 +38,8 @@ _FASTEST_ON_SOLES = 0.31
 """The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of
 0.9 m/s, in whose swings its hips are at the end of their range."""
 
+_TAKE_OFF_ON_SOLES = 0.27  # dx/dt over sqrt(g l0) at the VLO where their runs begin: G1 ran with it
+
 Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
 
@@ -282,9 +284,13 @@ def velocity_route(
         )
     template, changes = template_for(robot), motion.changes
     if "run" in motion.gaits:
-        fastest = walking_speeds(robot)[1] if planar else _FASTEST_WALK * template.speed_unit
+        walk = _FASTEST_ON_SOLES if robot.patches else _FASTEST_WALK
+        fastest = walking_speeds(robot)[1] if planar else walk * template.speed_unit
         unit = Scale.of(template).speed
         changes = replace(changes, run=min(changes.run, fastest / unit))
+        if robot.patches:
+            most = _TAKE_OFF_ON_SOLES * template.speed_unit / unit
+            changes = replace(changes, take_off=min(changes.take_off, most))
     duration = getattr(motion, "duration", None)
     bears = robot.half_length > 0.0
     return velocity, SpeedRoute(template, forward, duration, motion.gaits, changes, bears=bears)

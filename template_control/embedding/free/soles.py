@@ -56,7 +56,14 @@ _RUNNING_SWING = replace(RUNNING_SWING, clearance=0.08, landing_speed=0.4)
 _RUNNING_STANCE = PhaseControl(
     # As point feet have it. To keep the trunk upright against the legs takes the hips' limits in
     # half of the stance, and the angular momentum that is left costs a fifth of the speed.
-    tasks=(ComTask((0.01, 10.0), _GAINS), SpinTask(), FootTask(), SideFootTask(), SoleTask()),
+    tasks=(
+        ComTask((0.01, 10.0), _GAINS),
+        # As fast as on point feet, a change of the speed turns the trunk until it falls.
+        SpinTask(bandwidth=35.0),
+        FootTask(),
+        SideFootTask(),
+        SoleTask(),
+    ),
     swings=(Leg.FRONT,),
     swing=_RUNNING_SWING,
 )

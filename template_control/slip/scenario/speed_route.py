@@ -27,7 +27,6 @@ Array = NDArray[np.float64]
 _FIRST_DURATION = 2.2  # of sqrt(l0 / g): guess of a step's duration before one was made
 # Changes of the gait, for the reference template.
 _SLOWEST = 0.3  # mean speed of the slowest walk that robots keep [m/s]; a slower one stands
-_TAKE_OFF = 1.1  # dx/dt at the VLO where a run begins and ends [m/s]
 _NEAR = 0.1  # difference from it with which a run begins [m/s]
 _FIRST = 1.3  # dx/dt at the first apex of a run [m/s]: the slower, the less torque it needs
 _LAST = 1.4  # dx/dt at apex from which on a run may end [m/s]
@@ -41,11 +40,13 @@ class GaitChangeOptions(Checked):
 
     Attributes:
         run: mean speed from which a robot runs, and below which it walks [m/s].
+        take_off: dx/dt at the VLO where a run begins and ends [m/s].
         hysteresis: width of the band about ``run`` in which it keeps its gait [m/s].
         acceleration: of the speed that is wanted of a run, on its way to another [m/s^2].
     """
 
     run: Positive = tuned(1.4, SPEED)
+    take_off: Positive = tuned(1.1, SPEED)
     hysteresis: NotNegative = tuned(0.1, SPEED)
     acceleration: Positive = tuned(0.35, ACCELERATION)
 
@@ -107,9 +108,10 @@ class SpeedRoute:
         self.gaits = frozenset((*gaits, "walk"))
         scale = Scale.of(parameters)
         self.changes = scaled(changes or GaitChangeOptions(), scale)
-        self._slowest, self._take_off, self._near, self._first, self._last, self._stop = (
-            speed * scale.speed for speed in (_SLOWEST, _TAKE_OFF, _NEAR, _FIRST, _LAST, _STOP)
+        self._slowest, self._near, self._first, self._last, self._stop = (
+            speed * scale.speed for speed in (_SLOWEST, _NEAR, _FIRST, _LAST, _STOP)
         )
+        self._take_off = self.changes.take_off
         self._lean = _LEAN * scale.time
         self._fastest = running_speeds(parameters)[1]
         self._speed, self._duration = speed, duration

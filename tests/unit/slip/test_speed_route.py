@@ -97,6 +97,12 @@ def test_the_border_may_be_elsewhere():
     assert StrideKind.RUN in kinds(followed(route, 10.0))
 
 
+def test_a_run_may_begin_slower():
+    changes = GaitChangeOptions(run=0.9, take_off=0.7)
+    goals = followed(tc.SpeedRoute(P, lambda _: 1.0, gaits=ALL, changes=changes), 10.0)
+    assert {g.target[0] for _, g in goals if g.then == StrideKind.WALK_TO_RUN} == {0.7}
+
+
 def test_without_their_gaits_a_robot_only_walks():
     wanted = tc.SpeedProfile((0.0, 5.0, 5.1), (3.0, 3.0, 0.0))
     assert kinds(followed(tc.SpeedRoute(P, wanted), 10.0)) == [StrideKind.WALK_PUSH_OFF]
