@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Leg, Reset
+from template_control.slip.automaton.vocabulary import Leg, Reset, StrideKind
 from template_control.slip.maps.section import REST, Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
@@ -448,8 +449,14 @@ class EmbeddingController:
         self.path_clock.restart()
 
     def _turn(self, section: Section, nominal: bool) -> bool:
-        """Turn the axes to where the robot is to go; whether it has to be read again."""
+        """Turn the axes to where the robot is to go; whether it has to be read again.
+
+        The step that closes the feet after a walk goes on where the walk went.
+        """
         course, lateral = self.course(self.time), self.lateral
+        closes = self.supervisor.goal.then == StrideKind.STEP_FORWARD
+        if section is REST and closes:
+            course = course._replace(facing=nan)
         if lateral is not None:
             return lateral.end_stride(course, self.lateral_state(), nominal, section)
         turns = section is REST and course.turns_round(self.robot)

@@ -36,6 +36,7 @@ from template_control.run.recorder import RECORD, Recorder
 from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
 from template_control.run.velocity import VelocityCommand, VelocityProfile
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, SteadyRoute
@@ -372,8 +373,12 @@ def _fallen(
     tilt = robot.tilt(q)
     if tilt > falls.pitch:
         return f"the trunk tilted to {degrees(tilt):.0f} degrees"
-    patience = falls.patience * controller.planner.gait.step_duration
-    if now - controller.supervisor.begun_at > patience:
+    supervisor, patience = controller.supervisor, falls.patience
+    duration = controller.planner.gait.step_duration
+    lasts, longest = now - supervisor.begun_at, patience * duration
+    # A stop may be planned to take longer; one that is planned again and again is none.
+    rests = supervisor.planned_at + supervisor.time_of(Event.REST) + duration
+    if lasts > longest and not (now < rests < inf and lasts < 2.0 * longest):
         return "the robot stopped walking"
     if plant.trunk_touches_ground():
         return "the trunk touched the ground"

@@ -69,7 +69,8 @@ class FallOptions(Checked):
         thrown: multiple of sqrt(g l0). Where the base is said to move faster, the simulation or
             what is sensed of it has diverged.
         pitch: a trunk that leans further than this has fallen [rad].
-        patience: number of the gait's step durations that may pass without a section.
+        patience: number of the gait's step durations that may pass without a section; twice as
+            many where the robot is on its way to rest, for as long as that is planned to take.
     """
 
     contact_force: NotNegative = tuned(0.005)

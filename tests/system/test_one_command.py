@@ -6,6 +6,7 @@ from places import EXAMPLES
 
 import template_control as tc
 from template_control.run import VelocityProfile
+from template_control.run.summary import step_widths
 
 
 @pytest.mark.slow(seconds=14)
@@ -76,6 +77,9 @@ def test_go2_goes_aside_and_turns_and_comes_back_backward():
     assert forward[back].mean() == pytest.approx(-0.4, abs=0.02)
     assert aside[back].mean() == pytest.approx(0.0, abs=0.01)
     assert record.heading[-1] > 0.6
+    # The pairs of feet step behind each other, whichever way the trunk faces.
+    assert np.abs(step_widths(record)).max() < 0.06
+    assert record.section_velocity[-2] == pytest.approx((-0.4, 0.0, 0.0), abs=0.01)
     assert np.abs(record.attitude[:, :2]).max() < 0.05
     assert record.summary.qp_failures == 0
 
