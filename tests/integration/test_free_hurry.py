@@ -41,8 +41,12 @@ def chosen(outlooks, feasible=(True, True, True)):
 
 def test_a_foothold_in_reach_is_left_alone():
     assert chosen([(0.02, 5.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)]) == (0.0, True)
-    nothing = float("nan")
-    assert chosen([(nothing, nothing)] + 3 * [(0.0, 0.0)]) == (0.0, True)
+
+
+def test_a_step_whose_path_comes_to_no_section_gives_way_to_one_that_does():
+    unknown = float("nan"), float("nan")
+    assert chosen([unknown, unknown, (0.0, 2.0), (0.0, 1.0)]) == (0.06, False)
+    assert chosen(4 * [unknown]) == (0.0, True)
 
 
 def test_the_step_that_leaves_the_least_error_is_taken():

@@ -78,15 +78,18 @@ def early_touchdown(
 ) -> Decision:
     """The decision for a step, with a steeper touchdown where the foothold is out of reach.
 
+    Or where the robot's path does not come to the next section, and no foothold is known.
     ``decision`` itself where its foothold is in reach, or no steeper step helps; else the step that
     leaves the least error, which is not nominal. ``decide`` makes the step with a touchdown angle
     of at least so much [rad], ``look`` is a decision's forecast to the side; a foothold that is
     wanted further than ``reach`` [m] beyond its bounds is out of it.
     """
     best, now = decision, look(decision)
-    if not now.beyond > reach:
+    known = np.isfinite(now.price)
+    if now.beyond <= reach or not (known or decision.feasible):
         return decision
-    angle, bar = float(decision.controls[Slot.TOUCHDOWN_ANGLE]), _GAIN * now.price
+    angle = float(decision.controls[Slot.TOUCHDOWN_ANGLE])
+    bar = _GAIN * now.price if known else np.inf
     for more in STEEPER:
         steeper = decide(angle + more)
         if not steeper.feasible:
@@ -188,7 +191,7 @@ def lateral_foothold(
         pivots[k] = pivot(feet[k], com[0], lateral.rolling)
     found = place(path, aim, time, com, pivots)
     if found.left > lateral.hold or not lateral.placed:
-        lateral.placed = 1
+        lateral.placed = 1 if np.isfinite(found.y) else 0
         lateral.y, lateral.wanted = found.y, found.wanted
         lateral.left, lateral.com = found.left, found.com
         for k in range(2):

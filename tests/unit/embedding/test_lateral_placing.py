@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import minimize_scalar
 
+from template_control.embedding.free.lateral import LATERAL as MEMORY
+from template_control.embedding.free.lateral import LateralPlanner, lateral_foothold
 from template_control.slip import (
     LateralLearnt,
     LateralOptions,
@@ -240,3 +242,23 @@ def test_the_com_falls_away_from_the_pivot_of_a_foot_that_rolls():
     falls = start * np.cosh(rate * time) + ahead / rate * np.sinh(rate * time)
     assert y == pytest.approx(rests + falls, rel=1e-6)
     assert foot == pytest.approx(contact(rests, y, rolling), abs=1e-12)
+
+
+def test_a_foothold_that_is_not_known_is_neither_kept_nor_learnt_from():
+    planner = LateralPlanner(P, OPTIONS, LateralWish(0.2), np.zeros(1, MEMORY))
+    data = planner.data
+    for name in ("gravity", "longest", "touchdown", "beside", "ratio"):
+        data[name] = getattr(PATH, name)
+    data["steps"], data["reach"], data["stretch"], data["step_cost"] = (-1.0, 1.0), 1.0, 1.0, 1.0
+    arrays = PATH.coefficients, PATH.meta, PATH.footholds
+
+    def foothold(section):
+        data["section"] = section
+        return lateral_foothold(data[0], arrays, 0.0, np.array([0.05, 0.0]), np.array([0.1, 0.0]))
+
+    assert np.isnan(foothold(np.inf))
+    assert planner.placed is None
+    known = foothold(PATH.section)
+    assert np.isfinite(known)
+    assert foothold(np.inf) == known
+    assert planner.placed.y == known
