@@ -55,7 +55,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
-from template_control.slip.automaton.vocabulary import Leg, Reset, StrideKind
+from template_control.slip.automaton.vocabulary import Leg, Reset
 from template_control.slip.maps.section import REST, Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
@@ -453,13 +453,15 @@ class EmbeddingController:
 
         The step that closes the feet after a walk goes on where the walk went.
         """
-        course, lateral = self.course(self.time), self.lateral
-        closes = self.supervisor.goal.then == StrideKind.STEP_FORWARD
-        if section is REST and closes:
+        rests = section is REST
+        if self.lateral is None and not rests:
+            return False
+        course = self.course(self.time)
+        if rests and self.supervisor.goal.closes:
             course = course._replace(facing=nan)
-        if lateral is not None:
-            return lateral.end_stride(course, self.lateral_state(), nominal, section)
-        turns = section is REST and course.turns_round(self.robot)
+        if self.lateral is not None:
+            return self.lateral.end_stride(course, self.lateral_state(), nominal, section)
+        turns = course.turns_round(self.robot)
         if turns:
             self.ground.turn_round(self.observer)
             self.learners.lean.turn_round()

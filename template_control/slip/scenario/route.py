@@ -20,6 +20,7 @@ from template_control.checks.ranges import SpeedOrRest
 from template_control.errors import ParameterError, ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.dynamics.stride import finite
 from template_control.slip.gaits.gait import Gait as PeriodicGait
 from template_control.slip.maps.section import Section, section_of
@@ -46,6 +47,11 @@ class StrideGoal:
     wanted_speed: float
     segment: int = 0
     then: str | None = None
+
+    @property
+    def closes(self) -> bool:
+        """Whether the feet are closed next, by a step."""
+        return self.then == StrideKind.STEP_FORWARD
 
 
 @runtime_checkable

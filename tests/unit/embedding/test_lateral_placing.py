@@ -247,7 +247,7 @@ def test_the_com_falls_away_from_the_pivot_of_a_foot_that_rolls():
 def test_a_foothold_that_is_not_known_is_neither_kept_nor_learnt_from():
     planner = LateralPlanner(P, OPTIONS, LateralWish(0.2), np.zeros(1, MEMORY))
     data = planner.data
-    for name in ("gravity", "longest", "touchdown", "beside", "ratio"):
+    for name in ("gravity", "longest", "touchdown", "stance", "ratio"):
         data[name] = getattr(PATH, name)
     data["steps"], data["reach"], data["stretch"], data["step_cost"] = (-1.0, 1.0), 1.0, 1.0, 1.0
     arrays = PATH.coefficients, PATH.meta, PATH.footholds
