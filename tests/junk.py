@@ -151,7 +151,7 @@ def targets(folder):
             "name": "mine", "parameters": P, "vlo": Z, "controls": U, "step_length": 0.5,
             "step_duration": 0.5,
         },
-        tc.ActiveRunning: {"parameters": P},
+        tc.slip.ActiveRunning: {"parameters": P},
         slip.ActiveWalking: {"parameters": P},
         slip.ModifiedWalking: {"parameters": P},
         slip.RunToWalk: {"parameters": P},
