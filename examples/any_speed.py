@@ -33,12 +33,14 @@ _STEPS, _LAST = 50, 20  # of a run that keeps a speed, and those that it is judg
 _ALL: tuple[Gait, ...] = ("stand", "walk", "run")
 
 
-def random_profile(seed: int, duration: float, unit: float) -> tc.SpeedProfile:
-    """A profile drawn with its seed; ``unit`` is that of speeds."""
+def random_profile(
+    seed: int, duration: float, unit: float, rates: tuple[float, float]
+) -> tc.SpeedProfile:
+    """A profile drawn with its seed; ``unit`` is that of speeds, ``rates`` bound accelerations."""
     rng = np.random.default_rng(seed)
     times, speeds = [0.0], [rng.uniform(0.3, 1.4)]
     while times[-1] < duration:
-        speed, acceleration = rng.uniform(0.3, 1.4), rng.uniform(0.1, 0.5)
+        speed, acceleration = rng.uniform(0.3, 1.4), rng.uniform(*rates)
         times.append(times[-1] + abs(speed - speeds[-1]) / acceleration)
         times.append(times[-1] + rng.uniform(1.0, 5.0))
         speeds += [speed, speed]
@@ -147,6 +149,9 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=60.0, help="of a random profile [s]")
     parser.add_argument("--commands", type=float, help="fastest of random commands [m/s]")
     parser.add_argument("--backward", type=float, default=0.0, help="speed of commands [m/s]")
+    parser.add_argument(
+        "--rates", type=float, nargs=2, default=(0.1, 0.5), help="of a random profile [m/s^2]"
+    )
     parser.add_argument("--ramp", type=float, help="acceleration [m/s^2]")
     parser.add_argument("--stay", type=float, default=5.0, help="at the end of a ramp [s]")
     parser.add_argument("--profile", type=Path, help="TOML with times and speeds")
@@ -170,7 +175,7 @@ def main() -> None:
         for seed in range(chosen.first, chosen.first + chosen.trials):
             drawn: tc.SpeedProfile | tc.run.VelocityProfile
             if chosen.commands is None:
-                drawn = random_profile(seed, chosen.duration, unit)
+                drawn = random_profile(seed, chosen.duration, unit, chosen.rates)
             else:
                 drawn = random_commands(seed, chosen.duration, chosen.commands, chosen.backward)
             record = follow(f"seed {seed}", chosen.robot, drawn, chosen.duration)
