@@ -37,6 +37,7 @@ _GAIT_NUMBERS = {
     "run": ("speed", "apex_height"),
 }
 _RUN = 3.0 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length))
+_SOLE_RUN = 0.53  # over sqrt(g l0): 1.35 m/s for G1, which falls with 2 m/s
 
 
 @dataclass(frozen=True)
@@ -103,8 +104,7 @@ class GaitSpec(Checked):
         """
         if self.speed is not None:
             return self.speed
-        template = template_for(robot)
-        return _RUN * template.speed_unit
+        return (_SOLE_RUN if robot.patches else _RUN) * template_for(robot).speed_unit
 
 
 _PLANNER_MEMBERS = ("gait", "offset", "reset", "decide", "observe")

@@ -38,7 +38,9 @@ _FASTEST_ON_SOLES = 0.31
 """The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of
 0.9 m/s, in whose swings its hips are at the end of their range."""
 
-_TAKE_OFF_ON_SOLES = 0.27  # dx/dt over sqrt(g l0) at the VLO where their runs begin: G1 ran with it
+# Of runs on soles, dx/dt over sqrt(g l0) at the VLO where they begin, and at the fastest's apexes:
+# G1 ran with these; at 1.75 m/s (0.69) a fifth of its ticks is at a limit, and at 2 m/s it falls.
+_TAKE_OFF_ON_SOLES, _FASTEST_RUN_ON_SOLES = 0.27, 0.53
 
 Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
@@ -289,8 +291,12 @@ def velocity_route(
         unit = Scale.of(template).speed
         changes = replace(changes, run=min(changes.run, fastest / unit))
         if robot.patches:
-            most = _TAKE_OFF_ON_SOLES * template.speed_unit / unit
-            changes = replace(changes, take_off=min(changes.take_off, most))
+            unit = template.speed_unit / unit
+            changes = replace(
+                changes,
+                take_off=min(changes.take_off, _TAKE_OFF_ON_SOLES * unit),
+                fastest=min(changes.fastest, _FASTEST_RUN_ON_SOLES * unit),
+            )
     duration = getattr(motion, "duration", None)
     bears = robot.half_length > 0.0
     return velocity, SpeedRoute(template, forward, duration, motion.gaits, changes, bears=bears)

@@ -41,12 +41,14 @@ class GaitChangeOptions(Checked):
     Attributes:
         run: mean speed from which a robot runs, and below which it walks [m/s].
         take_off: dx/dt at the VLO where a run begins and ends [m/s].
+        fastest: dx/dt at apex of the fastest run [m/s]; a faster one is not wanted of the template.
         hysteresis: width of the band about ``run`` in which it keeps its gait [m/s].
         acceleration: of the speed that is wanted of a run, on its way to another [m/s^2].
     """
 
     run: Positive = tuned(1.4, SPEED)
     take_off: Positive = tuned(1.1, SPEED)
+    fastest: Positive = tuned(6.0, SPEED)
     hysteresis: NotNegative = tuned(0.1, SPEED)
     acceleration: Positive = tuned(0.35, ACCELERATION)
 
@@ -113,7 +115,7 @@ class SpeedRoute:
         )
         self._take_off = self.changes.take_off
         self._lean = _LEAN * scale.time
-        self._fastest = running_speeds(parameters)[1]
+        self._fastest = min(running_speeds(parameters)[1], self.changes.fastest)
         self._speed, self._duration = speed, duration
         self._family = walking_by_speed()
         low, high = self._family.range(parameters)

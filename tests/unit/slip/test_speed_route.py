@@ -103,6 +103,12 @@ def test_a_run_may_begin_slower():
     assert {g.target[0] for _, g in goals if g.then == StrideKind.WALK_TO_RUN} == {0.7}
 
 
+def test_a_run_is_no_faster_than_it_may_be():
+    changes = GaitChangeOptions(fastest=1.8)
+    goals = followed(tc.SpeedRoute(P, lambda _: 3.0, gaits=ALL, changes=changes), 20.0)
+    assert max(g.target[0] for _, g in goals) == 1.8
+
+
 def test_without_their_gaits_a_robot_only_walks():
     wanted = tc.SpeedProfile((0.0, 5.0, 5.1), (3.0, 3.0, 0.0))
     assert kinds(followed(tc.SpeedRoute(P, wanted), 10.0)) == [StrideKind.WALK_PUSH_OFF]
