@@ -293,7 +293,9 @@ def test_ctrl_c_ends_a_drive_in_peace():
     asked.close()
     process.send_signal(signal.SIGINT)
     out, errors = process.communicate(timeout=60)
-    assert (process.returncode, out) == (0, "")
+    # Where the signal comes before Python has emptied what it has written, it writes that again.
+    assert process.returncode == 0
+    assert out in ("", line)
     assert "Traceback" not in errors
     with pytest.raises(OSError, match="refused"):
         http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=10).request("GET", "/")
