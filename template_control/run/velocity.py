@@ -291,11 +291,11 @@ def velocity_route(
         unit = Scale.of(template).speed
         changes = replace(changes, run=min(changes.run, fastest / unit))
         if robot.patches:
-            froude = template.speed_unit / unit
+            reference = template.speed_unit / unit
             changes = replace(
                 changes,
-                take_off=min(changes.take_off, _TAKE_OFF_ON_SOLES * froude),
-                fastest=min(changes.fastest, _FASTEST_RUN_ON_SOLES * froude),
+                take_off=min(changes.take_off, _TAKE_OFF_ON_SOLES * reference),
+                fastest=min(changes.fastest, _FASTEST_RUN_ON_SOLES * reference),
             )
     duration = getattr(motion, "duration", None)
     bears = robot.half_length > 0.0
