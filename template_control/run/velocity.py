@@ -24,6 +24,7 @@ from template_control.errors import GaitError, ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.options import ForwardSpeed, HeadingCommand, SideSpeed, TurningRate
+from template_control.run.specs import SOLE_RUN
 from template_control.slip.gaits.walking_by_speed import family_speeds
 from template_control.slip.scenario.scenario import Gait
 from template_control.slip.scenario.speed_route import GaitChangeOptions, SpeedRoute
@@ -38,9 +39,7 @@ _FASTEST_ON_SOLES = 0.31
 """The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of
 0.9 m/s, in whose swings its hips are at the end of their range."""
 
-# Of runs on soles, dx/dt over sqrt(g l0) at the VLO where they begin, and at the fastest's apexes:
-# G1 ran with these; at 1.75 m/s (0.69) a fifth of its ticks is at a limit, and at 2 m/s it falls.
-_TAKE_OFF_ON_SOLES, _FASTEST_RUN_ON_SOLES = 0.27, 0.53
+_TAKE_OFF_ON_SOLES = 0.27  # dx/dt over sqrt(g l0) at the VLO where their runs begin: G1 ran with it
 
 Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
@@ -295,7 +294,7 @@ def velocity_route(
             changes = replace(
                 changes,
                 take_off=min(changes.take_off, _TAKE_OFF_ON_SOLES * reference),
-                fastest=min(changes.fastest, _FASTEST_RUN_ON_SOLES * reference),
+                fastest=min(changes.fastest, SOLE_RUN * reference),
             )
     duration = getattr(motion, "duration", None)
     bears = robot.half_length > 0.0
