@@ -283,7 +283,7 @@ class FloatingBackend(RobotBackend):
         (planner, node), o = first, controller.options
         stood = SIDES[1 - _REAR]
         away, drift = lateral.cycle.states[stood.row]
-        foothold = 0.5 * stood * lateral.wish.width
+        foothold = -0.5 * lateral.cycle.steps[stood.row]
         y = [foothold + lateral.cycle.steps[stood.row], foothold]
 
         def lifted(pose: Pose) -> FloatingBasePose:

@@ -1,5 +1,7 @@
 """One command of the speed: a robot stands, walks, runs and stands again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from places import EXAMPLES
@@ -45,6 +47,20 @@ def test_go2_stands_trots_and_stands_again():
     assert not record.fell
     assert record.section_state[:, 0].max() == pytest.approx(1.0, rel=0.03)
     np.testing.assert_allclose(record.section_state[-1, 0], 0.0, atol=0.01)
+    assert record.summary.qp_failures == 0
+
+
+@pytest.mark.slow(seconds=14)
+def test_g1_stands_runs_and_stands_again_in_mujoco():
+    """With its feet as far apart as in the walk, it turns until it falls in the run."""
+    given = tc.Experiment.load(EXAMPLES / "zero_run_zero.toml")
+    robot = tc.robot.RobotSpec("g1", free=True)
+    record = tc.simulate(replace(given, robot=robot, world=tc.MujocoOptions()))
+    assert record.fall_reason == ""
+    time, speed = record.section_time, record.section_state[:, 0]
+    assert speed[(time > 10.5) & (time < 12.0)] == pytest.approx(1.354, rel=0.02)
+    assert abs(speed[-1]) < 0.01
+    assert np.abs(record.attitude[:, 2]).max() < 0.6
     assert record.summary.qp_failures == 0
 
 

@@ -23,6 +23,7 @@ from template_control.embedding.phases import (
 )
 from template_control.embedding.standing.supports import UNLOADING
 from template_control.slip.automaton.vocabulary import Leg, Phase
+from template_control.slip.lateral.gait import LateralOptions
 from template_control.whole_body.tasks import (
     ComTask,
     FootTask,
@@ -107,9 +108,12 @@ class SoleOptions(FreeOptions):
     Attributes:
         phases: tasks, clock, feet and learners of each phase.
         lean: none: the trunk stays upright.
+        lateral: heavy legs run with their feet at half of the walk's distance, just side by side;
+            at all of it they turn the trunk by 0.36 rad to either side, and by 0.7 as they begin.
     """
 
     kind: ClassVar[str] = "soles"
 
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(SOLE_PHASES))
     lean: LeanOptions = field(default_factory=lambda: LeanOptions({}))
+    lateral: LateralOptions = field(default_factory=lambda: LateralOptions(running_width=0.5))

@@ -59,6 +59,8 @@ class LateralOptions(Checked):
         step_cost: on the next foot's distance to the stance foot, over the gait's [1/m^2].
         widths: least and largest lateral distance between two footholds [m]: feet do not cross,
             and legs open so far only.
+        running_width: of a gait that begins in flight, over the wanted lateral distance of the
+            footholds. Nearer to the line below the CoM, heavy legs turn the trunk less.
         reach: largest lateral distance between CoM and foot at touchdown [m].
         hold: a foothold is not changed so shortly before touchdown [s]: the foot cannot follow.
         learning: how the robot's own part is learnt.
@@ -69,6 +71,7 @@ class LateralOptions(Checked):
     )
     step_cost: Positive = tuned(0.02, PER_LENGTH_SQUARED)
     widths: Interval = tuned((0.08, 0.6), LENGTH)
+    running_width: Share = tuned(1.0)
     reach: Positive = tuned(0.4, LENGTH)
     hold: NotNegative = tuned(0.042, TIME)
     learning: LateralLearningOptions = field(default_factory=LateralLearningOptions)
@@ -112,6 +115,7 @@ class LateralGait:
             on the state is part of it.
         gain: (2,) K of d = d_s - K e.
         speed: dx/dt at the section [m/s].
+        width: of its footholds, over the wanted one.
     """
 
     a: Array
@@ -119,6 +123,7 @@ class LateralGait:
     cost: Array
     gain: Array
     speed: float
+    width: float
 
     @property
     def open_loop(self) -> ComplexArray:
@@ -149,9 +154,10 @@ def lateral_gait(
     Raises:
         GaitError: if the gait's stride is not completed, or no foot lands in it.
     """
-    p, node = gait.parameters, automaton.start(gait.stride).name
+    p, start = gait.parameters, automaton.start(gait.stride)
+    node, state = start.name, gait.state
     section = section_of(automaton.sections(node)[0])
-    stride = simulate_stride(p, node, section.state(gait.state), gait.controls, automaton=automaton)
+    stride = simulate_stride(p, node, section.state(state), gait.controls, automaton=automaton)
     path = lateral_path((stride,), p.gravity, ratio)
     if not np.isfinite(path.section):
         raise GaitError(
@@ -162,7 +168,8 @@ def lateral_gait(
     o = scaled(options or LateralOptions(), Scale.of(p))
     cost = _cost_to_go(a, b, np.array(o.state_cost), o.step_cost)
     gain = (b @ cost @ a) / (o.step_cost + b @ cost @ b)
-    return LateralGait(a.copy(), b, cost, gain, float(gait.state[0]))
+    width = 1.0 if start.stance else o.running_width
+    return LateralGait(a.copy(), b, cost, gain, float(state[0]), width)
 
 
 def _cost_to_go(a: Array, b: Array, state_cost: Array, step_cost: float) -> Array:
@@ -218,9 +225,9 @@ def lateral_cycle(
         offset: (2, 2) what the robot adds to X' after a step from the left and from the right
             foot; None: nothing.
     """
-    a, b, one = lateral.a, lateral.b, np.eye(2)
+    a, b, one, width = lateral.a, lateral.b, np.eye(2), lateral.width * wish.width
     added = np.zeros((2, 2)) if offset is None else offset
-    mirrored = np.linalg.solve(one + a, wish.width * b - 0.5 * (added[0] - added[1]))
+    mirrored = np.linalg.solve(one + a, width * b - 0.5 * (added[0] - added[1]))
     half = 0.5 * lateral.speed * wish.turn
     to_left = one - a
     turning, moved = np.linalg.solve(
@@ -231,5 +238,5 @@ def lateral_cycle(
     step = wish.left + moved
     return LateralCycle(
         states=np.array([left + mirrored, left - mirrored]),
-        steps=np.array([step - wish.width, step + wish.width]),
+        steps=np.array([step - width, step + width]),
     )

@@ -58,6 +58,17 @@ def test_the_periodic_motion_is_its_own_mirror_image(gait):
     assert left[0] < 0.0  # the CoM is between the feet
 
 
+@pytest.mark.parametrize(("gait", "share"), [(WALK, 1.0), (RUN, 0.5)], ids=["walk", "run"])
+def test_a_run_may_be_narrower_than_a_walk(gait, share):
+    narrow = lateral_gait(gait, LateralOptions(running_width=0.5))
+    cycle, wide = (lateral_cycle(g, LateralWish(0.2)) for g in (narrow, lateral_gait(gait)))
+    np.testing.assert_allclose(cycle.steps, share * wide.steps)
+    np.testing.assert_allclose(cycle.states, share * wide.states)
+    # To the left it goes as far as a wide one.
+    cycle = lateral_cycle(narrow, LateralWish(0.2, left=0.03))
+    assert np.isclose(cycle.steps.sum(), 2 * 0.03)
+
+
 def test_a_gait_symmetric_in_time_sways_symmetrically():
     cycle = lateral_cycle(LATERAL, LateralWish(0.2))
     np.testing.assert_allclose(cycle.states[:, 1], 0.0, atol=1e-6)
