@@ -195,6 +195,9 @@ class Ground(NamedTuple):
 
 
 _LIGHTEST = 0.05  # of the weight: legs do not pull
+# Least height over the reach that is planned with: a CoM that falls diverges so fast below it that
+# nothing of the program is left but rounding.
+_LOWEST = 0.3
 _TERMS = 6
 
 
@@ -226,7 +229,7 @@ def best_pressure(
                 lasts[k] = t / n
                 y, _, lift = _at(rise, (k + 0.5) * t / n)
                 lift = max(ground.gravity + lift, _LIGHTEST * ground.gravity)
-                rate[k] = np.sqrt(lift / max(y, _LIGHTEST * ground.reach))
+                rate[k] = np.sqrt(lift / max(y, _LOWEST * ground.reach))
                 wish[k], left = goal, 1.0
                 if ground.unloading > 0.0:
                     left = min((n - k - 1) * t / n / ground.unloading, 1.0)

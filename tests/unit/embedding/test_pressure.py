@@ -108,6 +108,15 @@ def test_a_fast_walk_comes_to_rest_between_its_feet():
     assert not feet.fits(fast), "its capture point is beyond the feet"
 
 
+@pytest.mark.parametrize("height", [-0.5, 0.0, 0.05])
+def test_a_com_that_falls_cannot_be_held(height):
+    """Below its feet it would diverge so fast that nothing of the plan is left but rounding."""
+    feet = OverFeet((0.0, 0.3), P, replace(OPTIONS, half_length=0.1))
+    found = feet.to_rest(np.array([[-1.0, 0.0, 0.0], [height, -6.0, -9.0]]))
+    assert not feet.fits(found)
+    assert np.isfinite([piece.coefficients for piece in found.pieces]).all()
+
+
 def test_a_com_that_is_about_to_pass_is_not_thrown_back():
     feet = OverFeet((0.0, 0.0), P, OPTIONS)
     liftoff = np.array([[-0.05, 0.9, 0.0], [0.96, 0.1, 0.0]])
