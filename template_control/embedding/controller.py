@@ -48,6 +48,7 @@ from template_control.embedding.tick import (
     fired_edge,
     look,
     sense,
+    solve,
     stand,
 )
 from template_control.errors import ParameterError
@@ -59,8 +60,8 @@ from template_control.slip.automaton.vocabulary import Leg, Reset
 from template_control.slip.maps.section import REST, Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
+from template_control.structured import keep
 from template_control.warm_up import ready
-from template_control.whole_body.problem import solve_free
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.task import References
 
@@ -161,7 +162,6 @@ class EmbeddingController:
                 )
             keeps = self.feet, self.references, tick["lateral"]
             self.lateral = LateralMotion.of(robot, self.parameters, given, *keeps)
-        self._terms = robot.data, robot.arrays
         self._memory = self._tick, robot.data, self.references.data, self.qp.data
         self.memory = tick, robot.data, self.references.data
 
@@ -312,22 +312,23 @@ class EmbeddingController:
         stand(*self._memory)
         now["trim"] = self.learners.trim.acceleration
         sideways = None if self.lateral is None else self.lateral.arrays(self.supervisor)
-        tick, _, *memory = self._memory
-        path = tuple(self.supervisor.path.curve), sideways
-        self._parts: tuple[Any, ...] = tick, self._terms, *memory, *path
+        self._plan: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
+        self._room: tuple[Array, ...] | None = None  # all of ``_kept`` is to be kept anew
 
     def _act(self, dt: float) -> Solution:
         """References, rows and torques."""
         qp, tasks = self.qp, self.mode.tasks
-        room = qp.room(self.learners.load.factor)
-        program, table = tasks.program, tasks.table
+        room, found = qp.room(self.learners.load.factor), qp.unknowns()
+        if room is not self._room:
+            memory, rows = (*self._memory, self.robot.arrays), (tasks.program, tasks.table)
+            self._room, self._kept = room, keep((memory, self._plan, rows, room))
         if tasks.others:
-            advance(*self._parts, (program, table, dt))
+            advance(self._kept, dt)
             tasks.write_others(self.robot, self.references)
-            kind = solve_free(qp.data, *self._terms, table, room)
+            kind = solve(self._kept, found)
         else:
-            kind = act(*self._parts, (program, table, dt, room))
-        solution = qp.finish(kind, tasks, room)
+            kind = act(self._kept, found, dt)
+        solution = qp.finish(kind, tasks, found)
         if self.frame.angle == 0.0:
             return solution
         return solution._replace(acceleration=self.frame.leave(solution.acceleration))

@@ -209,32 +209,22 @@ def fired_edge(tick: Any) -> int:
 
 
 @compiled
-def advance(
-    tick: Any,
-    robot: tuple[Any, ...],
-    references: Any,
-    qp: Any,
-    curve: tuple[Array, Array, Array],
-    lateral: tuple[Any, ...] | None,
-    rest: tuple[Any, ...],
-) -> None:
+def advance(kept: Any, dt: float) -> None:
     """Move the references on, write the tasks' rows and the stance.
 
     Args:
-        tick, references, qp: see the module.
-        robot: its ``data`` and its ``arrays``.
-        curve: of the path.
-        lateral: the arrays that :func:`.lateral_foothold` reads; None: in the plane.
-        rest: ``program`` and ``table`` of the phase's tasks, and the control period [s].
+        kept: :class:`.Kept`: ``tick``, ``data``, ``references`` and ``qp``, see the module, and the
+            robot's ``arrays``; curve of the path, and the arrays that :func:`.lateral_foothold`
+            reads, or None in the plane; ``program`` and ``table`` of the phase's tasks; ``room`` of
+            :func:`.solve_free`.
+        dt: control period [s].
     """
-    t, want, (data, arrays), (program, table, dt) = tick[0], references[0], robot, rest
-    r, mode, s = data[0], t.mode, t.sensed
+    (tick, data, references, qp, arrays), (curve, lateral), (program, table), _ = kept.value
+    t, r, want = tick[0], data[0], references[0]
+    mode, s = t.mode, t.sensed
     move_clock(t.path, curve, s, mode, want, (r.com_velocity[0], dt))
     move_swings(t, r, want, dt)
-    if lateral is not None:
-        _swing_sideways(t, r, want, lateral, dt)
-        _turn(t, want, dt)
-        _place_contacts(t, r, want)
+    _move_in_space(t, r, want, lateral, dt)
     for k in range(4):
         want.com_now[k] = s.state[k]
     want.com_now[0] -= s.toes[0]
@@ -254,22 +244,20 @@ def advance(
 
 
 @compiled
-def act(
-    tick: Any,
-    robot: tuple[Any, ...],
-    references: Any,
-    qp: Any,
-    curve: tuple[Array, Array, Array],
-    lateral: tuple[Any, ...] | None,
-    rest: tuple[Any, ...],
-) -> int:
-    """As :func:`advance`; then solve the QP, as :func:`.solve_free` returns it.
+def solve(kept: Any, found: tuple[Array, Array, Array]) -> int:
+    """Solve the QP of the rows as they are, as :func:`.solve_free` returns it.
 
-    ``rest`` ends in ``room`` of :func:`.solve_free`.
+    ``kept`` is as for :func:`advance`, ``found`` as for :func:`.solve_free`.
     """
-    program, table, dt, room = rest
-    advance(tick, robot, references, qp, curve, lateral, (program, table, dt))
-    return solve_free(qp, robot[0], robot[1], table, room)
+    (_, data, _, qp, arrays), _, (_, table), room = kept.value
+    return solve_free(qp, data, arrays, table, room, found)
+
+
+@compiled
+def act(kept: Any, found: tuple[Array, Array, Array], dt: float) -> int:
+    """As :func:`advance`, then as :func:`solve`."""
+    advance(kept, dt)
+    return solve(kept, found)
 
 
 @compiled
@@ -303,6 +291,18 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
             swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), dt)
         hip = (r.hips[0] + r.toe_ahead, r.hips[UP] - r.ankle_height)
         want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], r.leg_length)
+
+
+@compiled
+def _move_in_space(t: Any, r: Any, want: Any, lateral: tuple[Any, ...] | None, dt: float) -> None:
+    """Move on what only a floating-base robot has; of a planar one, whose ``lateral`` is None, not.
+
+    The None is an argument of its own, so that Numba leaves out what is not called.
+    """
+    if lateral is not None:
+        _swing_sideways(t, r, want, lateral, dt)
+        _turn(t, want, dt)
+        _place_contacts(t, r, want)
 
 
 @compiled

@@ -42,7 +42,7 @@ from template_control.robot.urdf_edits import (
     spheres,
     take_points,
 )
-from template_control.structured import Number
+from template_control.structured import Number, keep
 
 Array = NDArray[np.float64]
 
@@ -163,10 +163,10 @@ class FloatingBaseBiped(Biped):
         self._hips = [data.oMi[hip] for hip, *_ in self._hinges]
         self._in_leg = np.zeros((len(self._hips), 3))
         places, axes = zip(*((hip.translation, hip.rotation) for hip in self._hips), strict=True)
-        self._trunk = tuple(Trunk(self.rotation, places, axes, self._in_leg))
+        base = self.heading_frame, tuple(Trunk(self.rotation, places, axes, self._in_leg))
+        self._kept = keep((self._sources, self.data, self.arrays[1:], base))
         self.space = SpaceTerms.of(self.data, self.jacobians)
         self.axes = np.eye(3)
-        self._base, self._out = (self.heading_frame, self._trunk), self.arrays[1:]
         self.origin = self.heading_frame[:2]
         self.heading = 0.0
         self.update(self._neutral, np.zeros(self.nv))
@@ -301,8 +301,8 @@ class FloatingBaseBiped(Biped):
         square = x * x + y * y + z * z + w * w
         if abs(square - 1.0) > _UNIT:  # NaN and infinity are reported below
             q = self._with_unit(q, sqrt(square))
-        drift, out = self._compute(q, v), (self.data, self._out)
-        if not gather_floating(self._sources, q, v, drift, *out, self._base):
+        drift = self._compute(q, v)
+        if not gather_floating(self._kept, q, v, drift):
             raise self._diverged(q, v)
 
     def _with_unit(self, q: Array, length: float) -> Array:

@@ -28,6 +28,7 @@ from template_control.robot.requirements import (
 from template_control.robot.terms import PLANAR_DOF, gather_planar
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import complete, drop_world
+from template_control.structured import keep
 
 Array = NDArray[np.float64]
 
@@ -70,7 +71,8 @@ class PlanarBiped(Biped):
         for row, leg in zip(self.foot_turning, self.legs, strict=False):
             row[[PLANAR_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
         effects, com, momentum, contact, _, joints = self.arrays[1:]
-        self._out = effects, com, momentum, contact, joints
+        out = effects, com, momentum, contact, joints
+        self._kept = keep((self._sources, self.data, out))
 
     @classmethod
     @checked
@@ -143,7 +145,7 @@ class PlanarBiped(Biped):
             DivergedError: if a value is NaN or infinite.
         """
         drift = self._compute(q, v)
-        if not gather_planar(self._sources, q, v, drift, self.data, self._out):
+        if not gather_planar(self._kept, q, v, drift):
             raise self._diverged(q, v)
 
     def turn_gravity(self, angle: float) -> None:

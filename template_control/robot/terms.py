@@ -186,23 +186,21 @@ def onward(facing: float) -> float:
 
 
 @compiled
-def gather_planar(
-    views: Sources, q: Array, v: Array, drift: tuple[Array, ...], data: Any, out: tuple[Any, ...]
-) -> bool:
+def gather_planar(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> bool:
     """Write the planar terms at the state that Pinocchio has last computed; True if it is finite.
 
     They are of the frame whose x points where the robot goes, as ``facing`` of the data says:
     the world's, or that turned by half a turn about the vertical.
 
     Args:
-        views: from :func:`sources`.
+        kept: :class:`Kept`: views from :func:`sources`; ``data`` (1,) of ``ROBOT_DATA``; and of
+            :class:`Jacobians` ``nonlinear_effects``, ``com``, ``momentum``, ``contact`` and
+            ``joints``, all of them overwritten.
         q, v: (nv,) the state.
         drift: of each contact's frame the (6,) classical acceleration dJ/dt v, linear then angular,
             in the world's axes [m/s^2, rad/s^2].
-        data: (1,) of ``ROBOT_DATA``, overwritten.
-        out: of :class:`Jacobians`, as a plain tuple: ``nonlinear_effects``, ``com``, ``momentum``,
-            ``contact`` and ``joints``, overwritten.
     """
+    views, data, out = kept.value
     centre, speed, pull, momentum, weight, places, _ = views[:7]
     com_jacobian, centroidal, jacobian, carries, limits = views[7:]
     effects, jcom, jspin, contact, joints = out
@@ -279,21 +277,14 @@ class Trunk(NamedTuple):
 
 
 @compiled
-def gather_floating(
-    views: Sources,
-    q: Array,
-    v: Array,
-    drift: tuple[Array, ...],
-    data: Any,
-    out: tuple[Any, ...],
-    base: tuple[Any, ...],
-) -> bool:
+def gather_floating(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> bool:
     """Write the terms at the state that Pinocchio has last computed, in the heading frame.
 
-    As :func:`gather_planar`, with q (nq,), v (nv,), and ``turning`` before the last of ``out``.
-    ``base`` (5,) is :class:`Trunk` as a plain tuple, of the heading frame: x and y of its origin in
-    the world [m], cosine and sine of the heading, y of the trunk's hips from its origin [m].
+    As :func:`gather_planar`, with q (nq,), v (nv,); ``kept`` has ``turning`` before ``joints``, and
+    last (5,) of the heading frame, x and y of its origin in the world [m], cosine and sine of the
+    heading, y of the trunk's hips from its origin [m], and :class:`Trunk` as a plain tuple.
     """
+    views, data, out, base = kept.value
     centre, speed, _, momentum, weight, places, turns = views[:7]
     jcom_world, centroidal, jacobian, carries, limits = views[7:]
     effects, jcom, jspin, contact, jturning, joints = out

@@ -445,14 +445,14 @@ def _affine(matrix: Array, tau: Array, out: Array) -> None:
 
 
 @compiled
-def answer(p: Any, work: Array, found: tuple[Array, ...]) -> None:
+def answer(p: Any, work: Array, model: Array, found: tuple[Array, Array, Array]) -> None:
     """Write the answer of a tick from the joint torques of the model.
 
-    ``p`` is of ``QP_DATA``, ``work`` of :func:`matrices`, filled by :func:`assemble`. ``found`` has
-    the model's torques (nu,), and is overwritten: (nu,) the robot's torques [N m], (d c,) the force
+    ``p`` is of ``QP_DATA``, ``work`` of :func:`matrices`, filled by :func:`assemble`, ``model`` are
+    its torques (nu,). ``found`` is overwritten: (nu,) the robot's torques [N m], (d c,) the force
     at each contact [N], (nv,) generalised accelerations [m/s^2, rad/s^2].
     """
-    model, torque, force, acceleration = found
+    torque, force, acceleration = found
     out = matrices(work, acceleration.shape[0], torque.shape[0], force.shape[0], 0)
     follow(out[0], out[1], model, acceleration, force)
     for i in range(torque.shape[0]):
@@ -472,23 +472,29 @@ def bounds_needed(p: Any, r: Any) -> bool:
 
 @compiled
 def solve_free(
-    qp: Any, data: Any, arrays: tuple[Any, ...], tasks: Array, room: tuple[Any, ...]
+    qp: Any,
+    data: Any,
+    arrays: tuple[Any, ...],
+    tasks: Array,
+    room: tuple[Array, Array, Array, Array],
+    found: tuple[Array, Array, Array],
 ) -> int:
     """Solve a tick in which no limit acts.
 
     ``qp``, ``data`` (1,) are of ``QP_DATA`` and of ``ROBOT_DATA``; ``room`` is ``torque_limit``,
-    ``bounds`` and ``work`` as for :func:`assemble`, and ``found`` as for :func:`answer`,
-    overwritten where the tick is solved. Returns ``FREE`` where it is; else what :func:`assemble`
-    finds, or ``BRAKED`` where accelerations are to be bounded and nothing has been assembled yet.
+    ``bounds`` and ``work`` as for :func:`assemble`, and the model's torques as for :func:`answer`,
+    as is ``found``; both are overwritten where the tick is solved. Returns ``FREE`` where it is;
+    else what :func:`assemble` finds, or ``BRAKED`` where accelerations are to be bounded and
+    nothing has been assembled yet.
     """
     p, r = qp[0], data[0]
     if bounds_needed(p, r):
         return BRAKED
-    torque_limit, bounds, work, found = room
+    torque_limit, bounds, work, model = room
     kind = assemble(p, r, arrays, tasks, torque_limit, bounds, work)
     if kind == FREE:
         nv, nu, forces, rows = sizes(p, arrays, bounds)
         out = matrices(work, nv, nu, forces, rows)
-        torques(out[2], out[7], torque_limit, found[0])
-        answer(p, work, found)
+        torques(out[2], out[7], torque_limit, model)
+        answer(p, work, model, found)
     return kind

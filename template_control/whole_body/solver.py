@@ -323,38 +323,40 @@ class WholeBodyQp:
         now["contacts"], now["contact"][:count] = count, stance.contacts
         now["cap"][:count], directions = stance.cap, self.robot.contact_rows
         now["force"][:count, :directions] = stance.force.reshape(count, directions)
-        robot, room = self.robot, self.room(load)
-        kind = solve_free(self.data, robot.data, robot.arrays, tasks.table, room)
-        return self.finish(kind, tasks, room)
+        robot, room, found = self.robot, self.room(load), self.unknowns()
+        kind = solve_free(self.data, robot.data, robot.arrays, tasks.table, room, found)
+        return self.finish(kind, tasks, found)
 
-    def room(self, load: float) -> tuple[Any, ...]:
-        """Arrays for :func:`.problem.solve_free` of the stance in ``data``; the answer's are new.
+    def room(self, load: float) -> tuple[Array, Array, Array, Array]:
+        """Arrays for :func:`.problem.solve_free` of the stance in ``data``, the same for the same.
 
         ``load`` is as for :meth:`solve`.
         """
-        contacts, (nu, nv, rows), empty = int(self._contacts[0]), self._sizes, np.empty
-        w, found = self.workspaces[contacts], (empty(nu), empty(rows * contacts), empty(nv))
         if load != self._load:
             self._take_load(load)
-        return self._limit, w.bounds, w.work, (self._torque, *found)
+        return self._rooms[self._contacts[0]]
 
-    def finish(self, kind: int, tasks: TaskStack, room: tuple[Any, ...]) -> Solution:
+    def unknowns(self) -> tuple[Array, Array, Array]:
+        """New arrays for the answer of :func:`.problem.solve_free`, of the stance in ``data``."""
+        (nu, nv, rows), empty = self._sizes, np.empty
+        return empty(nu), empty(rows * int(self._contacts[0])), empty(nv)
+
+    def finish(self, kind: int, tasks: TaskStack, found: tuple[Array, Array, Array]) -> Solution:
         """The answer of a tick, by ProxQP where limits act.
 
         Args:
             kind: what :func:`.problem.solve_free` has found.
             tasks: rows, desired accelerations and weights.
-            room: from :meth:`room`; that function has filled it where ``kind`` is ``FREE``.
+            found: that function has filled it where ``kind`` is ``FREE``.
 
         Raises:
             ParameterError: naming a task that wrote a number which is not finite.
         """
-        seconds, solved, limit, found = 0.0, kind == FREE, room[0], room[-1]
+        seconds, solved = 0.0, kind == FREE
         if not solved:
-            seconds, solved = self._solve_limited(kind, tasks, limit, found)
+            seconds, solved = self._solve_limited(kind, tasks, found)
         self._failing = not solved
-        _, torque, force, acceleration = found
-        return Solution(torque, force, acceleration, solved, seconds)
+        return Solution(*found, solved, seconds)
 
     def _take_load(self, load: float) -> None:
         """Scale the model's limits of torque, which times ``load`` are within the robot's."""
@@ -364,12 +366,13 @@ class WholeBodyQp:
         self._limit = np.where(beyond, np.nextafter(limit, 0.0), limit)
         self._load = load
         self.data["load"] = load
+        self._rooms = [(self._limit, w.bounds, w.work, self._torque) for w in self.workspaces]
 
     def _solve_limited(
-        self, kind: int, tasks: TaskStack, limit: Array, found: tuple[Array, ...]
+        self, kind: int, tasks: TaskStack, found: tuple[Array, Array, Array]
     ) -> tuple[float, bool]:
         """Fill ``found`` where limits act; seconds in ProxQP, and whether it is solved."""
-        now, robot = self.data[0], self.robot
+        now, robot, limit = self.data[0], self.robot, self._limit
         contacts = int(now["contacts"])
         # With bounds, with bounds that let a joint which is too fast stay so, and without.
         slacks = (-np.inf, 0.0, None) if kind == BRAKED else (None,)
@@ -388,7 +391,7 @@ class WholeBodyQp:
         else:
             self._tell(found_kind != SINGULAR, contacts)
             np.clip(self._torque, -limit, limit, out=self._torque)
-        answer(now, w.work, found)
+        answer(now, w.work, self._torque, found)
         return seconds, solved
 
     def _attempt(

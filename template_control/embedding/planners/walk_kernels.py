@@ -20,6 +20,7 @@ from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.structured import keep
 from template_control.warm_up import Part
 from template_control.whole_body.solver import WholeBodyQp
 from template_control.whole_body.stack import TaskStack
@@ -59,8 +60,9 @@ def whole_tick() -> None:
     sense(tick, robot.data, *memory, np.zeros(2, dtype=bool), np.zeros((2, 2)), 1e-3)
     stand(tick, robot.data, *memory)
     curve = np.ones((2, 1, ORDER + 1)), np.ones((1, 7)), np.ones(3)
-    rest = tasks.program, tasks.table, 1e-3, qp.room(1.0)
-    act(tick, (robot.data, robot.arrays), *memory, curve, None, rest)
+    rows = tasks.program, tasks.table
+    kept = keep(((tick, robot.data, *memory, robot.arrays), (curve, None), rows, qp.room(1.0)))
+    act(kept, qp.unknowns(), 1e-3)
 
 
 def step_search() -> None:
