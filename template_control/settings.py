@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from enum import Enum
+from functools import cache
 from inspect import getdoc
 from pathlib import Path
 from types import NoneType, UnionType
@@ -270,7 +271,8 @@ class Leaf(NamedTuple):
     about: str
 
 
-def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
+@cache
+def leaves(kind: Any, where: str = "") -> tuple[Leaf, ...]:
     """The keys that a dataclass's file can have, of all kinds of tables; ``where`` is its own."""
     found: dict[str, Leaf] = {}
     hints, abouts = get_type_hints(kind), described(kind)
@@ -280,7 +282,7 @@ def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
         place = f"{where}.{f.name}" if where else f.name
         hint = hints[f.name]
         union = [h for h in get_args(hint) if h is not NoneType] if _is_union(hint) else [hint]
-        tables = [h for h in union if is_dataclass(h) and _said(h)]
+        tables: list[Any] = [h for h in union if is_dataclass(h) and _said(h)]
         if tables:
             if kinds := _kinds(tables):
                 usual = _usual_kind(f) or next(iter(kinds))
@@ -293,7 +295,7 @@ def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
             default = f.default if f.default_factory is MISSING else f.default_factory()
             default, about = None if default is MISSING else default, abouts.get(f.name, "")
             found.setdefault(place, Leaf(place, hint, default, about))
-    return iter(found.values())
+    return tuple(found.values())
 
 
 def described(kind: type) -> dict[str, str]:
