@@ -105,6 +105,12 @@ def imports(tree, module, is_package, known, name="template_control"):
                 yield (inner if inner in known else parts[1:]), node.lineno
 
 
+@cache
+def parsed(path):
+    return ast.parse(path.read_text())
+
+
+@cache
 def graph(library=LIBRARY, name="template_control"):
     """By module, the (module, line)s it imports; a package's are those its stub exports."""
     stubs = sources(library, ".pyi")
@@ -112,9 +118,7 @@ def graph(library=LIBRARY, name="template_control"):
     return {
         module: [
             found
-            for found in imports(
-                ast.parse(path.read_text()), module, path.stem == "__init__", files, name
-            )
+            for found in imports(parsed(path), module, path.stem == "__init__", files, name)
             if found[0] != module
         ]
         for module, path in files.items()
@@ -331,7 +335,7 @@ def exported_names():
     return {
         alias.asname
         for path in sources(suffix=".pyi").values()
-        for node in ast.parse(path.read_text()).body
+        for node in parsed(path).body
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
@@ -363,7 +367,7 @@ def documented_names():
     return {
         node.name
         for path in sources().values()
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(parsed(path))
         if isinstance(node, Function | ast.ClassDef) and ast.get_docstring(node)
     }
 
@@ -399,7 +403,7 @@ def faults(rule, folder):
     return [
         f"{path.relative_to(ROOT)}:{fault}"
         for path in sorted(folder.rglob("*.py"))
-        for fault in rule(ast.parse(path.read_text()))
+        for fault in rule(parsed(path))
     ]
 
 
