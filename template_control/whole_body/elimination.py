@@ -102,16 +102,16 @@ def eliminate(
     factor = mass_matrix.copy()
     if not cholesky(factor, nv):
         return False
-    # Right-hand sides: columns of S, then -h, then J^T.
-    columns = np.zeros((nv, nu + 1 + m))
+    # Two arrays, each in a row in memory: M^-1 of the columns of S and of -h, and M^-1 J^T.
+    uncontacted, jt = np.zeros((nv, nu + 1)), np.empty((nv, m))
     for j in range(nu):
-        columns[base_dof + j, j] = 1.0
+        uncontacted[base_dof + j, j] = 1.0
     for i in range(nv):
-        columns[i, nu] = -nonlinear_effects[i]
+        uncontacted[i, nu] = -nonlinear_effects[i]
         for j in range(m):
-            columns[i, nu + 1 + j] = jacobian[j, i]
-    solve_cholesky(factor, nv, columns)
-    uncontacted, jt = columns[:, : nu + 1], columns[:, nu + 1 : nu + 1 + m]  # the latter M^-1 J^T
+            jt[i, j] = jacobian[j, i]
+    solve_cholesky(factor, nv, uncontacted)
+    solve_cholesky(factor, nv, jt)
     delassus = np.zeros((m, m))
     multiply_add(jacobian, jt, delassus)
     f_map[:] = 0.0
