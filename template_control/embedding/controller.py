@@ -80,7 +80,8 @@ class EmbeddingController:
         automaton: of the route's strides.
 
     Raises:
-        ParameterError: if there are several planners and no route.
+        ParameterError: if there are several planners and no route, or if the options are those of a
+            robot with another base.
 
     Attributes:
         mode: where on the automaton the robot is, and what that asks for.
@@ -120,6 +121,13 @@ class EmbeddingController:
             raise ParameterError("several planners and no route: say which stride comes next")
         scale = Scale.of(route.parameters)
         given = options or default_options(robot)
+        floats = isinstance(robot, FloatingBaseBiped)
+        if floats is not isinstance(given, FreeOptions):
+            base = "has a floating base" if floats else "is held in its plane"
+            raise ParameterError(
+                f"{robot.name} {base}, and its embedding has {type(given).__name__}: give"
+                f" {'Free' if floats else 'Embedding'}Options"
+            )
         o = scaled(replace(given, phases=given.phase_table(), tasks={}), scale)
         self.robot, self.options, self.parameters = robot, o, route.parameters
         self._tick = tick = np.zeros(1, TICK)
@@ -154,12 +162,7 @@ class EmbeddingController:
         self.course: Callable[[float], Course] = lambda time: Course()
         self.courses: list[Course] = []
         self.lateral: LateralMotion | None = None
-        if isinstance(robot, FloatingBaseBiped):
-            if not isinstance(given, FreeOptions):
-                raise ParameterError(
-                    f"{robot.name} walks free, and its embedding has EmbeddingOptions: give"
-                    " FreeOptions"
-                )
+        if isinstance(robot, FloatingBaseBiped) and isinstance(given, FreeOptions):
             keeps = self.feet, self.references, tick["lateral"]
             self.lateral = LateralMotion.of(robot, self.parameters, given, *keeps)
         self._memory = self._tick, robot.data, self.references.data, self.qp.data

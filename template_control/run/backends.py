@@ -14,9 +14,8 @@ from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.lateral import SIDES, LateralPlanner
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.ground import LEVEL, STEEPEST
-from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import phase_control
-from template_control.embedding.planners.planner import Planner, Planners
+from template_control.embedding.planners.planner import Planner
 from template_control.embedding.robot_template import startable_slopes
 from template_control.embedding.standing.curves import standing_pose
 from template_control.embedding.standing.passes import CLOSING
@@ -44,10 +43,9 @@ from template_control.run.sensing import (
     SensorOptions,
     Sensors,
 )
-from template_control.slip.automaton.hybrid import Automaton, Node
+from template_control.slip.automaton.hybrid import Node
 from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.maps.section import APEX, REST, VLO
-from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
@@ -55,16 +53,6 @@ Array = NDArray[np.float64]
 
 class RobotBackend(ABC):
     """Backend of one kind of robot; a robot comes with it."""
-
-    @abstractmethod
-    def controller(
-        self,
-        planners: Planners | Planner,
-        options: EmbeddingOptions,
-        route: Route,
-        automaton: Automaton,
-    ) -> EmbeddingController:
-        """The robot's controller, with planners for each kind of stride of the route."""
 
     @abstractmethod
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
@@ -91,21 +79,6 @@ class PlanarBackend(RobotBackend):
 
     def __init__(self, robot: PlanarBiped) -> None:
         self.robot = robot
-
-    def controller(
-        self,
-        planners: Planners | Planner,
-        options: EmbeddingOptions,
-        route: Route,
-        automaton: Automaton,
-    ) -> EmbeddingController:
-        """See :meth:`RobotBackend.controller`; a ParameterError for options of a free robot."""
-        if isinstance(options, FreeOptions):
-            raise ParameterError(
-                f"{self.robot.name} is held in its plane, and its embedding has FreeOptions: give"
-                " EmbeddingOptions"
-            )
-        return EmbeddingController(self.robot, planners, options, route, automaton)
 
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns."""
@@ -196,21 +169,6 @@ class FloatingBackend(RobotBackend):
 
     def __init__(self, robot: FloatingBaseBiped) -> None:
         self.robot = robot
-
-    def controller(
-        self,
-        planners: Planners | Planner,
-        options: EmbeddingOptions,
-        route: Route,
-        automaton: Automaton,
-    ) -> EmbeddingController:
-        """See :meth:`RobotBackend.controller`; a ParameterError for options of a planar robot."""
-        if not isinstance(options, FreeOptions):
-            raise ParameterError(
-                f"{self.robot.name} walks free, and its embedding has EmbeddingOptions: give"
-                " FreeOptions"
-            )
-        return EmbeddingController(self.robot, planners, options, route, automaton)
 
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`: at VLO or an apex, in the sideways motion of the gait.
@@ -317,16 +275,16 @@ class FloatingBackend(RobotBackend):
         if isinstance(world, PlantOptions):
             return FloatingBaseBulletPlant(robot_in(world, self.robot), world)
         raise ParameterError(
-            f"{self.robot.name} walks free in PyBullet and MuJoCo, and the plant is"
-            f" {plant_name(world)}: give PlantOptions or MujocoOptions"
+            f"{self.robot.name} has a floating base, and the plant is {plant_name(world)}: give"
+            " PlantOptions or MujocoOptions"
         )
 
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
         """See :meth:`RobotBackend.senses`: noise is filtered; estimating the state is refused."""
         if not isinstance(o.sensors, SensorOptions):
             raise ParameterError(
-                f"{self.robot.name} walks free, and the estimate is that of a planar robot: give"
-                " SensorOptions"
+                f"{self.robot.name} has a floating base, and the estimate is that of a planar"
+                " robot: give SensorOptions"
             )
         sensors = Sensors(o.sensors, self.robot, controller.parameters)
         options = controller.options

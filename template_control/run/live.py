@@ -146,7 +146,7 @@ class LiveRun:
         self._given = experiment
         self._o = o = experiment.prepare()
         self._backend = _backend(o.robot)
-        self.controller = _controller(self._backend, o)
+        self.controller = _controller(o)
         supervisor = self.controller.supervisor
         self.endless = o.steps is None and supervisor.route.endless
         self._last = most if self.endless else o.steps or inf
@@ -327,16 +327,16 @@ def _backend(robot: Biped) -> RobotBackend:
     raise ParameterError(f"{robot!r} is of no kind that can be run: give a planar or a free biped")
 
 
-def _controller(backend: RobotBackend, o: PreparedExperiment) -> EmbeddingController:
+def _controller(o: PreparedExperiment) -> EmbeddingController:
     """Follows a route or keeps a planner's gait."""
     options, automaton, planner, motion = o.tuning, o.automaton, o.planner, o.motion
     if isinstance(planner, Mapping):
         assert isinstance(motion, Route)
-        return backend.controller(planner, options, motion, automaton)
+        return EmbeddingController(o.robot, planner, options, motion, automaton)
     steady = SteadyRoute.of(planner.gait, automaton)
     if options.catches and automaton is AUTOMATON and steady.section is VLO:
-        return backend.controller(default_planners(steady, planner), options, steady, automaton)
-    return backend.controller(planner, options, steady, automaton)
+        planner = default_planners(steady, planner)
+    return EmbeddingController(o.robot, planner, options, steady, automaton)
 
 
 def _log_section(report: SectionReport, number: int) -> None:

@@ -58,9 +58,7 @@ def floating():
     backend = FloatingBackend(robot)
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 0.6), FREE_PLANNER)
     options = Experiment(robot, planner=planner).prepare()
-    controller = backend.controller(
-        planner, options.tuning, tc.slip.SteadyRoute.of(planner.gait), tc.slip.AUTOMATON
-    )
+    controller = tc.EmbeddingController(robot, planner, options.tuning)
     q, v = backend.start(controller, options)
     with FloatingBaseBulletPlant(robot, PlantOptions()) as plant:
         return looped(controller, plant, q, v)

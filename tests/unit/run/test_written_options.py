@@ -125,7 +125,7 @@ def test_a_free_trial_is_written_with_the_planner_that_it_has(tmp_path):
 @pytest.mark.parametrize("free", [False, True])
 def test_tuning_of_the_other_kind_of_robot_is_refused(free):
     tuning = EmbeddingOptions() if free else FreeOptions()
-    name, had = type(tuning).__name__, "walks free" if free else "is held in its plane"
+    name, had = type(tuning).__name__, "has a floating base" if free else "is held in its plane"
     experiment = Experiment(RobotSpec("bolt", free=free), controller=tuning)
     with pytest.raises(ParameterError, match=f"{had}, and its embedding has {name}: give"):
         simulate(experiment)
