@@ -7,7 +7,7 @@ base, ``go2`` that robot's trot, and ``g1`` its walk with arms and waist held.
 
 All in PyBullet. Ticks and physics steps take turns in one process, and the gaits take turns
 every few ticks, so that a machine which is slow for a while is so to all of them: only ratios of
-medians are told. For each gait:
+medians are printed. For each gait:
 
 tick_over_step: a whole control tick over the engine's own step for this robot.
 tick_over_first: over the tick of the first gait that is asked for, by default ``walk``.

@@ -4,7 +4,7 @@
     python benchmarks/start_up.py --first-walk --repeats 2 [--against CHECKOUT] [--json]
 
 Times ``template-control --help``, ``template-control walk --help`` and ``import
-template_control``, and beside them Python that does nothing and ``import numpy``. The lines take
+template_control``, and for comparison Python that does nothing and ``import numpy``. The lines take
 turns, so that a busy machine slows all of them alike; every line runs once before the clock
 starts, so that files are read and byte code is there. Prints the shortest and the median wall
 time and the ratio of the shortest to that of Python that does nothing. ``--against`` times another

@@ -84,17 +84,17 @@ def follow(
     else:
         motion = profile
     record = tc.simulate(tc.Experiment(model, motion, record_every=10))
-    told, speed = summarise(record, None), record.section_state[:, 0]
-    ended = f"FELL: {told['fall_reason']}" if record.fell else "no fall"
-    accepted, torques = told["accepted_speed"], told["joint_torque"].values()
+    summary, speed = summarise(record, None), record.section_state[:, 0]
+    ended = f"FELL: {summary['fall_reason']}" if record.fell else "no fall"
+    accepted, torques = summary["accepted_speed"], summary["joint_torque"].values()
     print(
-        f"{name}: {ended}, {record.steps} steps in {told['duration']:.1f} s,"
+        f"{name}: {ended}, {record.steps} steps in {summary['duration']:.1f} s,"
         f" {speed.min():.2f} to {speed.max():.2f} m/s at VLO,"
         f" off the accepted {accepted['error_rms']:.3f} m/s RMS,"
         f" reduced {accepted['strides']} times by up to {accepted['most']:.2f} m/s,"
         f" |dy/dt| up to {np.abs(record.section_state[:, 2]).max():.2f} m/s,"
         f" torque up to {max(joint['peak'] for joint in torques):.0f} N m, at the limit in"
-        f" {100 * told['saturated_share']:.2f} % of the ticks",
+        f" {100 * summary['saturated_share']:.2f} % of the ticks",
         flush=True,
     )
     return record
@@ -104,7 +104,7 @@ def keep(name: str, count: int, starts: int) -> tc.Record:
     """Keep ``count`` speeds of a robot's own range, and print a row of a table for each run."""
     robot = tc.load_robot(name)
     slowest, fastest = tc.walking_speeds(robot)
-    print(f"{robot.name} is told to walk at {slowest:.2f} to {fastest:.2f} m/s")
+    print(f"{robot.name} walks at {slowest:.2f} to {fastest:.2f} m/s")
     print("| [m/s] | start | steps | dx/dt [m/s] | y [mm] | dy/dt [m/s] | torque | at the limit |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for speed in np.linspace(slowest, fastest, count).round(4):
@@ -128,15 +128,15 @@ def row(record: tc.Record, gait: WalkingGait, speed: float, seed: int | None) ->
         f"{unit * off:.{3 if unit == 1.0 else 1}f} ± {unit * spread:.{3 if unit == 1.0 else 1}f}"
         for unit, off, spread in zip(units, error.mean(axis=0), error.std(axis=0), strict=True)
     ]
-    told = summarise(record, None)
-    torque = max(joint["peak"] / joint["limit"] for joint in told["joint_torque"].values())
+    summary = summarise(record, None)
+    torque = max(joint["peak"] / joint["limit"] for joint in summary["joint_torque"].values())
     cells = [
         f"{speed:.3f}",
         "gait" if seed is None else f"seed {seed}",
         f"{record.steps}{', FELL' if record.fell else ''}",
         *settled,
         f"{100 * torque:.0f} %",
-        f"{100 * told['saturated_share']:.2f} %",
+        f"{100 * summary['saturated_share']:.2f} %",
     ]
     return f"| {' | '.join(cells)} |"
 

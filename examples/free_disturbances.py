@@ -6,7 +6,7 @@
 Levels are those of the reference template (80 kg, 1 m), scaled to the robot: 10 N s in eight
 directions at some phases of a step, friction 0.5, masses 10 % off, 1 mrad of noise, 2 ms of delay,
 both of them, steps of the ground of 1 % of l0 at random places, and grounds all of such steps. The
-controller is told of none of them. A trial ends 16 steps after its push or step of the ground. It
+controller knows of none of them. A trial ends 16 steps after its push or step of the ground. It
 is back on its gait if its last five steps are within 2 % of it in speed and height.
 """
 

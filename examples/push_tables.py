@@ -165,7 +165,7 @@ def back(speed: Any, step: int) -> int | None:
     return strides if strides < len(speed) - step - 1 else None
 
 
-def told(name: str, results: list[Any]) -> str:
+def markdown_row(name: str, results: list[Any]) -> str:
     """A row of the table, as Markdown."""
     stood = [r for r in results if r is not None and not r["fell"]]
     late = [r["back"] for r in stood if r["back"] is not None]
@@ -215,7 +215,7 @@ def main() -> None:
             ):
                 if error is not None or result["fell"]:
                     print(f"{name}, trial {i}, {d}: {error or result['why']}", flush=True)
-            lines.append(told(name, list(found.results)))
+            lines.append(markdown_row(name, list(found.results)))
             print(lines[-1], flush=True)
     print(
         "\n| | go on | strides until back | off at the end | fastest | torque | at limit | runs |"

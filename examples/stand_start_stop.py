@@ -91,7 +91,7 @@ def pushes(robot: PlanarBiped) -> Iterator[tuple[str, tc.Record]]:
             yield f"{spacing} m apart, {side * size:+g} N s", record
 
 
-def told(record: tc.Record) -> tuple[bool, str]:
+def outcome(record: tc.Record) -> tuple[bool, str]:
     """True if a run ended in a stand, and a line about the run."""
     kinds = record.kinds_of_stride
     way = " ".join(kind for kind, _ in groupby(kinds))
@@ -120,7 +120,7 @@ def main() -> None:
     for name in chosen.what:
         results = []
         for case, record in groups[name](robot):
-            stood, about = told(record)
+            stood, about = outcome(record)
             results.append(stood)
             print(f"{case}: {about}", flush=True)
         print(f"{name}: {sum(results)} of {len(results)} stand in the end", flush=True)

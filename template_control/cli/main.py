@@ -203,12 +203,12 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
     except KeyboardInterrupt as error:
         if output is not None:
             on_signals(end_quietly)
-        return _told(str(error) or _NOTHING_KEPT, INTERRUPTED)
+        return _with_notice(str(error) or _NOTHING_KEPT, INTERRUPTED)
     except TemplateControlError as error:
-        return _told(str(error), _USER_ERROR)
+        return _with_notice(str(error), _USER_ERROR)
     except (Exception, SystemExit):
         if stopped():  # an import that Ctrl-C ends may end with any error
-            return _told(_NOTHING_KEPT, INTERRUPTED)
+            return _with_notice(_NOTHING_KEPT, INTERRUPTED)
         if output is None:
             raise
         with suppress(OSError):
@@ -217,10 +217,12 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
             raise
         if isinstance(output.failure, BrokenPipeError):
             return _PIPE_CLOSED
-        return _told(f"cannot write to standard output: {output.failure.strerror}", _USER_ERROR)
+        return _with_notice(
+            f"cannot write to standard output: {output.failure.strerror}", _USER_ERROR
+        )
 
 
-def _told(line: str, status: int) -> int:
+def _with_notice(line: str, status: int) -> int:
     """The status, once the line is on stderr."""
     notice(line)
     return status

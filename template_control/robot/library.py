@@ -30,9 +30,9 @@ class _Entry:
         about: one line.
         distribution: the Python package that brings the URDF; "" for ours.
         feet, sagittal_joints, foot_radius, walk: see :meth:`PlanarBiped.from_urdf`.
-        planar: whether it is held in its sagittal plane, unless it is to be free.
-        free: whether it can walk free.
-        limits: of a robot that walks free, in place of the URDF's; None to keep those.
+        planar: whether it is held in its sagittal plane, unless it is to have a floating base.
+        free: whether it has a model with a floating base.
+        limits: of a robot with a floating base, in place of the URDF's; None to keep those.
         flat: whether it has flat feet.
     """
 
@@ -250,8 +250,8 @@ def load_floating_robot(name: str | Path) -> FloatingBaseBiped:
     path, entry = robot_path(text), _ENTRIES[text]
     if not entry.free:
         raise RobotError(
-            f"robot {text!r} is planar and cannot walk free: give one of {list(FLOATING_ROBOTS)} or"
-            " a URDF file"
+            f"robot {text!r} has no model with a floating base: give one of"
+            f" {list(FLOATING_ROBOTS)} or a URDF file"
         )
     return _named(
         text,

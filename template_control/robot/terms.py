@@ -393,12 +393,12 @@ def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any
     rotation, places, axes, points = trunk
     c, s = frame[2], frame[3]
     ahead = c * rotation[0, 2] + s * rotation[1, 2]
-    aside = c * rotation[1, 2] - s * rotation[0, 2]
-    state.attitude[0] = np.arctan2(-aside, rotation[2, 2])
+    left = c * rotation[1, 2] - s * rotation[0, 2]
+    state.attitude[0] = np.arctan2(-left, rotation[2, 2])
     state.attitude[1] = np.arctan2(ahead, rotation[2, 2])
-    ahead, aside = c * rotation[0, 0] + s * rotation[1, 0], c * rotation[1, 0] - s * rotation[0, 0]
+    ahead, left = c * rotation[0, 0] + s * rotation[1, 0], c * rotation[1, 0] - s * rotation[0, 0]
     c2, s2 = np.cos(state.facing), np.sin(state.facing)
-    state.attitude[2] = np.arctan2(c2 * aside - s2 * ahead, c2 * ahead + s2 * aside)
+    state.attitude[2] = np.arctan2(c2 * left - s2 * ahead, c2 * ahead + s2 * left)
     middle = np.zeros(3)
     for i in range(len(places)):
         place, point = places[i], np.dot(axes[i], points[i])

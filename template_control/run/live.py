@@ -309,12 +309,12 @@ def _check_template(robot: Biped, given: SlipParameters) -> None:
     for name in ("mass", "gravity", "rest_length"):
         if abs(getattr(given, name) / getattr(own, name) - 1.0) > _OTHER_TEMPLATE:
             raise ParameterError(
-                f"the gait or route is for a template of {_told(given)}, and that of {robot.name}"
-                f" has {_told(own)}: give one for template_for(robot)"
+                f"the gait or route is for a template of {_text(given)}, and that of {robot.name}"
+                f" has {_text(own)}: give one for template_for(robot)"
             )
 
 
-def _told(p: SlipParameters) -> str:
+def _text(p: SlipParameters) -> str:
     return f"{p.mass:.4g} kg, l0 = {p.rest_length:.4g} m and g = {p.gravity:.4g} m/s^2"
 
 
@@ -391,7 +391,7 @@ class QpFailures:
     def __init__(self, name: str) -> None:
         self._name = name
         self._ticks = self._failed = 0
-        self._told = False
+        self._warned = False
 
     def tick(self, solved: bool, now: float) -> None:
         """Count one tick at the time ``now`` [s]."""
@@ -399,8 +399,8 @@ class QpFailures:
             self._ticks = self._failed = 0
         self._ticks += 1
         self._failed += not solved
-        if self._failed > _MANY_FAILURES * _FAILURES_BLOCK and not self._told:
-            self._told = True
+        if self._failed > _MANY_FAILURES * _FAILURES_BLOCK and not self._warned:
+            self._warned = True
             QP_FAILURES.warning(
                 "%s at %.3f s: the QP had no solution in %d of the last %d ticks, which keep the"
                 " torques of the last one that had; what follows is no controlled motion",

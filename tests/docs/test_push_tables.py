@@ -40,5 +40,5 @@ def test_a_pushed_run_is_told(script):
     result = script.trial("five-link", "run", {"impulse": -20.0, "phase": 0.3})
     assert not result["fell"]
     assert result["back"] <= 10
-    line = script.told("run, five-link", [result, None])
+    line = script.markdown_row("run, five-link", [result, None])
     assert line.startswith("| run, five-link | 1 of 2 | 3 to 3 |")

@@ -207,7 +207,7 @@ MISTAKES = {
     "hang on the same leg: name one of each": lambda _: FloatingBaseBiped.from_urdf(
         robot_path("five-link")
     ),
-    "is planar and cannot walk free": lambda _: load_floating_robot("human"),
+    "has no model with a floating base": lambda _: load_floating_robot("human"),
     "the legs do not reach a CoM height of …": lambda _: start(
         load_floating_robot("five-link-3d"), 1.4
     ),

@@ -176,7 +176,9 @@ class StrideSimulator:
         self._plain = tuple(self._scratch)
         self._names = tuple(node.name for node in automaton.nodes)
         # By numbers: to hash a member of an enumeration takes long.
-        self._edges = [{int(e.event): _told(n.name, e) for e in n.edges} for n in automaton.nodes]
+        self._edges = [
+            {int(e.event): _described(n.name, e) for e in n.edges} for n in automaton.nodes
+        ]
         self._kernels = {
             name: plain(Kernel(automaton.tables, *self._model, node=index))
             for name, index in automaton.index.items()
@@ -231,7 +233,7 @@ class StrideSimulator:
         return tuple(fired)
 
 
-def _told(source: str, edge: Edge) -> tuple[Event, str, str, Reset]:
+def _described(source: str, edge: Edge) -> tuple[Event, str, str, Reset]:
     """Fields of a :class:`FiredEvent` that come from an edge."""
     entered = edge.target if isinstance(edge.target, str) else ""
     return edge.event, source, entered, edge.reset
