@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from enum import Enum
 from functools import cache
@@ -26,6 +26,8 @@ import tomli_w
 from template_control.checks.checked import is_default
 from template_control.checks.fitting import unaliased
 from template_control.errors import ParameterError, TemplateControlError, meant
+
+_hints: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 
 T = TypeVar("T")
 
@@ -75,7 +77,7 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
     if not isinstance(table, dict):
         raise ParameterError(f"{where} is {table!r}: give a table")
     known = {f.name: f for f in fields(kind) if f.init}  # type: ignore[arg-type]
-    hints = get_type_hints(kind)
+    hints = _hints(kind)
     old_keys: Mapping[str, str] = getattr(kind, "old_keys", {})
     values: dict[str, Any] = {}
     for key, value in table.items():
@@ -133,7 +135,7 @@ _Entries = list[tuple[tuple[str, ...], Any]]
 def _changed(options: T, entries: _Entries, where: str) -> T:
     kind = type(options)
     known = {f.name for f in fields(kind) if f.init}  # type: ignore[arg-type]
-    hints = get_type_hints(kind)
+    hints = _hints(kind)
     values: dict[str, Any] = {}
     for (name, *path), value in sorted(entries, key=lambda entry: len(entry[0])):
         if name == _KIND and hasattr(kind, _KIND):
@@ -179,7 +181,7 @@ def _deeper(hint: Any, current: Any, entries: _Entries, where: str) -> Any:
     made = kinds[wanted]
     own = {f.name for f in fields(current) if not is_default(f, getattr(current, f.name))}
     shared = own & {f.name for f in fields(made)}
-    hints = get_type_hints(made)
+    hints = _hints(made)
     values = {name: getattr(current, name) for name in shared} | {
         path[0]: _value(hints[path[0]], value, f"{where}.{path[0]}")
         for path, value in entries
@@ -271,18 +273,17 @@ class Leaf(NamedTuple):
     about: str
 
 
-@cache
-def leaves(kind: Any, where: str = "") -> tuple[Leaf, ...]:
+def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
     """The keys that a dataclass's file can have, of all kinds of tables; ``where`` is its own."""
     found: dict[str, Leaf] = {}
-    hints, abouts = get_type_hints(kind), described(kind)
+    hints, abouts = _hints(kind), described(kind)
     for f in fields(kind):
         if f.metadata.keys() >= PYTHON_ONLY.keys():
             continue
         place = f"{where}.{f.name}" if where else f.name
         hint = hints[f.name]
         union = [h for h in get_args(hint) if h is not NoneType] if _is_union(hint) else [hint]
-        tables: list[Any] = [h for h in union if is_dataclass(h) and _said(h)]
+        tables = [h for h in union if is_dataclass(h) and _said(h)]
         if tables:
             if kinds := _kinds(tables):
                 usual = _usual_kind(f) or next(iter(kinds))
@@ -295,9 +296,10 @@ def leaves(kind: Any, where: str = "") -> tuple[Leaf, ...]:
             default = f.default if f.default_factory is MISSING else f.default_factory()
             default, about = None if default is MISSING else default, abouts.get(f.name, "")
             found.setdefault(place, Leaf(place, hint, default, about))
-    return tuple(found.values())
+    return iter(found.values())
 
 
+@cache
 def described(kind: type) -> dict[str, str]:
     """What the docstrings of a class and its bases say of its attributes, by their names."""
     found: dict[str, str] = {}
@@ -325,7 +327,7 @@ def _said(hint: Any) -> bool:
         return arguments[0] is str and _said(arguments[1])
     if is_dataclass(hint):
         required = [f for f in fields(hint) if f.default is MISSING is f.default_factory]
-        hints = get_type_hints(hint)
+        hints = _hints(hint)
         return all(_said(hints[f.name]) for f in required)
     known = hint in _SCALARS or origin in (Literal, np.ndarray)
     return known or (isinstance(hint, type) and issubclass(hint, Enum))
@@ -338,7 +340,7 @@ def to_table(options: Any, where: str = "") -> dict[str, Any]:
     Python only.
     """
     table: dict[str, Any] = {_KIND: options.kind} if hasattr(options, _KIND) else {}
-    hints = get_type_hints(type(options))
+    hints = _hints(type(options))
     for f in fields(options):
         value = getattr(options, f.name)
         place = f"{where}.{f.name}" if where else f.name
