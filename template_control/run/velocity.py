@@ -239,7 +239,7 @@ def check_direction(
         return
     if not _faces(robot):
         raise ParameterError(
-            f"{robot.name} goes forward only, as neither a quadruped nor a planar robot does:"
+            f"{robot.name} does not go backward, which planar robots and those on four feet do:"
             " command it a speed of 0 or more"
         )
     if "stand" not in gaits:
