@@ -320,7 +320,7 @@ def _bounds(
         lower[0] = min(max(lower[0], aim.angles[0]), upper[0])
         upper[0] = max(min(upper[0], aim.angles[1]), lower[0])
     top = np.arcsin(min(plan.states[i, 1] / p.kernel.rest_length, 1.0)) - TOP_MARGIN
-    upper[first] = min(upper[first], top)
+    upper[first] = min(upper[first], max(top, TOP_MARGIN))
     lower[first] = min(lower[first], upper[first])
 
 

@@ -120,11 +120,12 @@ def bounded(law: Law, z: Array, u: Array) -> None:
     for i in range(u.shape[0]):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
     length, t = law.kernel.rest_length, law.earliest
-    u[0] = min(u[0], np.arcsin(min(z[1] / length, 1.0)) - TOP_MARGIN)
+    top = np.arcsin(min(z[1] / length, 1.0)) - TOP_MARGIN
     if t > 0.0:
         lift = u[1] * law.stiffness / law.kernel.mass * (length - z[1]) - law.kernel.gravity
         later = z[1] + t * (z[2] + 0.5 * t * lift)
-        u[0] = min(u[0], np.arcsin(min(max(later / length, 0.0), 1.0)))
+        top = min(top, np.arcsin(min(max(later / length, 0.0), 1.0)))
+    u[0] = min(u[0], max(top, TOP_MARGIN))
 
 
 @compiled
