@@ -57,7 +57,7 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Leg, Reset
-from template_control.slip.maps.section import REST, Section, section_of
+from template_control.slip.maps.section import REST, VLO, Section, section_of
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
 from template_control.structured import keep
@@ -433,21 +433,23 @@ class EmbeddingController:
 
     def _decide(self, section: Section) -> None:
         s, learners, lateral = self.observer.now, self.learners, self.lateral
-        supervisor = self.supervisor
+        supervisor, reached = self.supervisor, None
         if supervisor.deciding:
-            nominal = supervisor.decision.nominal
+            nominal, ended = supervisor.decision.nominal, section.of(s.state)
             if self._turn(section, nominal):
                 self.robot.update(*self.frame.enter(*self.ground.raw_state))
                 self._read()
                 if section is REST:
                     self._face_ahead()
+                reached = ended if section is VLO else None
             learners.end_stride(section, s.state, nominal)
-        self._enter(supervisor.decide(section, s, self.time, learners.state).name)
+        now = section, s, self.time, learners.state
+        self._enter(supervisor.decide(*now, reached).name)
         learners.begin_stride(supervisor, self.mode.trimmed)
         if lateral is not None:
-            now = self.node, s, self.lateral_state(), self.time
-            course = self.course(self.time)
-            self._enter(lateral.begin_stride(section, supervisor, course, *now).name)
+            course, state = self.course(self.time), self.lateral_state()
+            stride = section, supervisor, course, self.node, s, state, self.time
+            self._enter(lateral.begin_stride(*stride).name)
         taken = Course() if lateral is None else lateral.taken
         self.courses.append(taken._replace(facing=self.robot.facing))
         self.path_clock.restart()

@@ -156,17 +156,18 @@ class RoutePlanners:
         now: float,
         estimators: EstimatorState,
         last: SectionReport | None,
+        reached: Array | None = None,
     ) -> tuple[SectionReport, Array, bool]:
         """Learn from the stride that ended, ask the route for the next one, and plan it.
 
         ``z`` (n,) is the state at the section that was reached, at the time ``now`` [s];
         ``estimators`` are for the report, ``last`` is that of the stride that ended, None at the
-        start. Returns what was decided, the section state from which its path starts, and whether
-        the route goes on.
+        start, and ``reached`` (n,) the state in that stride's axes, None: ``z``. Returns what was
+        decided, the section state from which its path starts, and whether the route goes on.
         """
         begin = time.perf_counter()
         if last is not None:
-            asked(self.of(last.goal).observe, last.decision, z)
+            asked(self.of(last.goal).observe, last.decision, z if reached is None else reached)
         wanted = self.next(section, z, now)
         # Strides go on until the loop that drives the robot ends the run.
         goal = wanted or (self.first_goal() if last is None else self.beyond(last.goal, section))
@@ -319,6 +320,27 @@ class TemplateRollout:
             return end.of(stride.state), stride.outcome
 
         return ahead
+
+    def at_section(self, section: Section, sensed: TemplateState, last: SectionReport) -> Array:
+        """(n,) section state that the template passes through, a little before or after it.
+
+        Axes that turn about the foot move a CoM that is next to it along them. The legs are those
+        of the ``last`` stride; where they do not lead to the section, it is the state as it is.
+        """
+        here = section.of(sensed.state)
+        nodes = self.automaton.stride(self.automaton.starts[last.goal.stride])
+        node = next(node for node in nodes if node.edge(section.event) is not None)
+        x, y, dx, dy = sensed.state.tolist()
+        ahead = x - float(sensed.toes[0])
+        if not node.stance:
+            return here
+        past = ahead > 0.0
+        simulator, dy = (self._mirrored, -dy) if past else (self._simulator, dy)
+        stride = simulator.run(node.name, [-abs(ahead), y, dx, dy], last.decision.controls)
+        if not stride.completed:
+            return here
+        there = section.of(stride.state)
+        return section.mirror(there) if past else there
 
     def backward_to_section(
         self, node: Node, controls: Array, sensed: TemplateState

@@ -154,16 +154,24 @@ class StrideSupervisor:
         return self.goal.stride in self._curved_kinds
 
     def decide(
-        self, section: Section, sensed: TemplateState, now: float, estimators: EstimatorState
+        self,
+        section: Section,
+        sensed: TemplateState,
+        now: float,
+        estimators: EstimatorState,
+        reached: Array | None = None,
     ) -> Node:
         """At a section: learn from the stride that ended, choose the next one's controls.
 
-        ``estimators`` are for the report. Returns the node that the stride begins in.
+        ``estimators`` are for the report. Where the axes have turned at the section, ``reached``
+        (n,) is the state before, from which is learnt. Returns the node that the stride begins in.
         """
         z = section.of(sensed.state)
         ended = self.reports
         last = ended[-1] if ended else None
-        report, start, goes_on = self._planners.decide(section, z, now, estimators, last)
+        if last is not None and reached is not None:
+            z = self._rollout.at_section(section, sensed, last)
+        report, start, goes_on = self._planners.decide(section, z, now, estimators, last, reached)
         self.log = ended
         self._begun, self.goal, self.decision = report, report.goal, report.decision
         self.arrived = self.arrived or not goes_on

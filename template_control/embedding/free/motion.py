@@ -213,7 +213,7 @@ class LateralMotion:
         planner.wish = replace(planner.wish, left=left, turn=turn - self._turns)
         planner.walk(gait)
         planner.aim(SIDES[self._feet.landed], turned=True)
-        z, target = section.of(sensed.state), supervisor.goal.target
+        z, target = supervisor.reports[-1].state, supervisor.goal.target
 
         def decide(least: float) -> Decision:
             return decided(supervisor.planner.decide, Context(z, target, (least, inf)))

@@ -170,6 +170,23 @@ def planned(gait, options=None):
     )
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0], ids=["before", "after"])
+def test_after_a_turn_a_stride_is_decided_where_the_template_passes_its_section(gait, side):
+    passed = gait.vlo + [0.0, 0.0, 0.05 * side]
+    stride = simulate_stride(
+        P, STRIDE_START["w"], VLO.state(gait.vlo + [0, 0, 0.05]), gait.controls
+    )
+    x, y, dx, dy = stride.sample([0.012])[0, :4]
+    planning = planned(gait)
+    planning.begin(VLO)
+    planning.decide(VLO, TemplateState(state=VLO.state(gait.vlo)), 0.0, NOTHING)
+    sensed = TemplateState(state=np.array([side * x, y, dx, side * dy]))
+    planning.decide(VLO, sensed, 0.6, NOTHING, gait.vlo)
+    np.testing.assert_allclose(planning.reports[-1].state, passed, atol=1e-6)
+    assert abs(sensed.state[3] - passed[2]) > 0.02, "and not where the robot is"
+    np.testing.assert_allclose(planning.planner.offset, 0.0, atol=1e-3)
+
+
 @pytest.mark.parametrize(("before", "speed_kept"), [("w", True), ("rw", False)])
 def test_a_walk_after_a_run_forgets_what_its_steps_added_to_the_speed(gait, before, speed_kept):
     planner = LqrPlanner(gait)
