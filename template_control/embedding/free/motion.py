@@ -229,12 +229,10 @@ class LateralMotion:
             feet = self._stood[list(supervisor.feet), _SIDE]
             return planner.forecast(supervisor.path, com, feet)
 
+        self._turn_trunk(gait.step_duration, time, 0.0 if node.stance else float(z[0]))
         if not node.stance:
             planner.expect(inf)
-            self._turn_in_run(sensed, gait.step_duration, time)
             return node
-        for name in ("turn", "bank", "spin"):
-            planner.data[name] = 0.0  # a walk's feet turn it
         node = follow(early_touchdown(supervisor.decision, decide, look, self._reach))
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node
@@ -256,17 +254,21 @@ class LateralMotion:
         self._now[:], self._turns = 0.0, 0.0
         planner.wish = replace(planner.wish, left=0.0, turn=0.0)
         planner.walk(supervisor.planner.next_gait())
+        self._turn_trunk(1.0, 0.0)
         planner.aim(SIDES[self._feet.landed])
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node
 
-    def _turn_in_run(self, sensed: TemplateState, duration: float, time: float) -> None:
-        """Turn and bank in the stride of a run that begins."""
+    def _turn_trunk(self, duration: float, time: float, speed: float = 0.0) -> None:
+        """Turn the trunk in the stride that begins, as much as the axes turn at its end.
+
+        It banks and spins as it runs with a ``speed`` [m/s]; a walk's feet turn it.
+        """
         data, turn = self.planner.data, self.planner.wish.turn
-        data["bank"] = -atan2(sensed.state[2] * turn / duration, self.robot.gravity)
-        turn += self._turns
+        data["bank"] = -atan2(speed * turn / duration, self.robot.gravity)
+        turn = turn + self._turns if speed or self.robot.paired else 0.0
         data["turn"], data["begun"], data["duration"] = turn, time, duration
-        data["spin"] = self.robot.yaw_inertia() * turn / duration
+        data["spin"] = self.robot.yaw_inertia() * turn / duration if speed else 0.0
 
     def touch_down(self, foot: int, lasted: float) -> None:
         """A foot has landed, ``lasted`` [s] after the section."""
