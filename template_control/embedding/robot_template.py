@@ -28,6 +28,7 @@ from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import REFERENCE, Scale
+from template_control.whole_body.solver import SOLE_SHARE
 
 _TOUCHDOWN = float(np.radians(66.0))
 _WALK = (_TOUCHDOWN, 1.1 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length)))
@@ -39,6 +40,7 @@ _STRETCH = 0.903514524055713
 # Of legs that end in an ankle: more bent, the rear one comes to the ankle's stop late in double
 # stance, as its sole is level.
 _SOLE_STRETCH = 0.95
+_APART = 0.22  # lateral distance of two feet that stand, over l0
 _SHIFT = 0.8  # time in which a CoM at rest moves over one of two soles [s], for l0 = 1 m
 _KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in all robots that ran
 _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
@@ -279,8 +281,12 @@ def standing_options(robot: Biped) -> StandingOptions:
     """
     if not robot.half_length:
         return StandingOptions()
-    half = robot.half_length / Scale.of(template_for(robot)).length
-    return StandingOptions(half_length=half, shift=_SHIFT if robot.patches else 0.0)
+    length = Scale.of(template_for(robot)).length
+    half = robot.half_length / length
+    if not robot.patches:
+        return StandingOptions(half_length=half)
+    slant = SOLE_SHARE * robot.half_width / (_APART * length)
+    return StandingOptions(half_length=half, slant=slant, shift=_SHIFT)
 
 
 def can_run(robot: Biped) -> bool:

@@ -325,9 +325,9 @@ def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: floa
     foothold = lateral_foothold(lateral, arrays, path.time, com, feet)
     if lateral.step != 0.0 and path.event_times[_REST] < path.event_times[_VLO]:
         # The next touchdown leads to a stand, in which the soles hold the CoM.
-        foot = f.roles[_REAR]
+        foot, lasts = f.roles[_REAR], path.event_times[_TOUCHDOWN] - path.time
         here, other = r.foot_position[foot, _SIDE], r.foot_position[1 - foot, _SIDE]
-        foothold = closing_foothold(lateral, here, other)
+        foothold = closing_foothold(t, r, here, other, lasts)
     for i in range(mode.swings):
         foot = f.roles[mode.swing_leg[i]]
         due, side = path.landing_time[foot] - path.time, want.side[foot]

@@ -10,6 +10,7 @@ import template_control as tc
 from template_control.plant.bullet import PlantOptions
 from template_control.run.record import SoleRecord
 from template_control.run.specs import GaitSpec
+from template_control.run.velocity import VelocityProfile
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.view.replay.film import Stage
 from template_control.view.replay.playback import playback
@@ -87,6 +88,21 @@ def test_another_mass_walks_and_is_learnt(scale):
     record = walk("g1", 7, world=PlantOptions(mass_scale=scale))
     assert not record.fell
     assert record.section_load[-1] == pytest.approx(scale, abs=0.04)
+
+
+@pytest.mark.slow(8)
+@pytest.mark.parametrize(("impulse", "steps"), [(10.0, []), (-15.0, ["sb"])])
+def test_a_pushed_stand_is_held_or_caught_by_a_step(impulse, steps):
+    """One foot is ahead: what the soles bear midway between them reaches beyond both toes."""
+    motion = VelocityProfile(((0.0, 0.0, 0.0, 0.0),), 5.0, gaits=("stand", "walk"))
+    push = tc.Push(impulse, time=1.5, duration=0.08)
+    spec = tc.robot.RobotSpec("g1", free=True)
+    record = tc.simulate(tc.Experiment(spec, motion=motion, pushes=(push,)))
+    assert record.fall_reason == ""
+    assert record.solved.all()
+    assert [kind for kind in record.kinds_of_stride if kind != "s"] == steps
+    still = record.time > record.time[-1] - 0.5
+    assert np.ptp(record.space_com[still], axis=0).max() < 5e-3
 
 
 @pytest.mark.slow(3)

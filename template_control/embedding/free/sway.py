@@ -16,6 +16,7 @@ from template_control.compiled import compiled
 from template_control.embedding.standing.pressure import ARRIVE, SMOOTH, Pieces, pressure
 from template_control.embedding.standing.supports import UNLOADING
 from template_control.slip.automaton.vocabulary import Event
+from template_control.whole_body.solver import SOLE_SHARE
 
 Array = NDArray[np.float64]
 
@@ -27,8 +28,8 @@ _REAR_LIFTOFF, _FRONT_LIFTOFF = int(Event.REAR_LIFTOFF), int(Event.FRONT_LIFTOFF
 _REAR, _FRONT = 0, 1
 _STAGES = 3  # both feet stand, one does, both do
 _PIECES = 8  # of each
-_SOLE = 0.8  # share of a foot's width that a plan uses, as the cones do
 _LOWEST = 0.3  # of the legs' length: the least height of the CoM that is planned with
+_WIDEST = 0.5  # of the legs' length: the furthest foothold to the side that catches the CoM
 # For the reference template.
 _AGAIN = 0.01  # a plan is made anew after this time [s]
 _FAR = 1.6  # an event that is further away, or never comes, is planned for here [s]
@@ -64,7 +65,7 @@ def sway(t: Any, r: Any, want: Any) -> None:
         want.sway += forces[leg, 1] * away / (r.mass * height)
     if mode.stances != 1:
         return
-    lateral, foot, rate = t.lateral, t.feet.roles[0], np.sqrt(r.sway * r.gravity / height)
+    lateral, foot, rate = t.lateral, t.feet.roles[0], _rate(t, r)
     since = t.time - lateral.section_began
     if mode.next_touchdown_leg < 0:
         since = t.path.time - t.path.event_times[_VLO]
@@ -93,13 +94,27 @@ def _pressure(t: Any, r: Any) -> float:
 
 
 @compiled
-def closing_foothold(lateral: Any, stance: float, foot: float) -> float:
-    """y of the foothold of a stride that ends at rest [m]: as far away as the gait's.
+def closing_foothold(t: Any, r: Any, stance: float, foot: float, lasts: float) -> float:
+    """y of the foothold of a stride that ends at rest [m].
 
-    ``lateral`` is of ``LATERAL``; ``stance`` and ``foot`` are y of the foot that stands and of the
-    other one [m].
+    It is as far away as the gait's, or where the capture point will be, if that is further: from
+    then on the other foot has to hold it. ``t`` and ``r`` are of ``TICK`` and ``ROBOT_DATA``;
+    ``stance`` and ``foot`` are y of the foot that stands and of the other one [m], ``lasts`` is
+    how long one foot stands from now on [s].
     """
-    return stance + np.copysign(lateral.step, foot - stance)
+    lateral, side, rate = t.lateral, np.copysign(1.0, foot - stance), _rate(t, r)
+    apart, edge = abs(lateral.step), SOLE_SHARE * lateral.half_width
+    away = side * (r.com[_SIDE] + side_speed(t, r) / rate - stance)
+    falls = edge + (away - edge) * np.exp(rate * min(lasts, _FAR * lateral.unit))
+    if 0.0 < apart < falls:
+        apart = min(falls, max(_WIDEST * r.leg_length, apart))
+    return stance + side * apart
+
+
+@compiled
+def _rate(t: Any, r: Any) -> float:
+    """w = sqrt(a g / h), at which the capture point leaves the centre of pressure [1/s]."""
+    return np.sqrt(r.sway * r.gravity / _height(t, r))
 
 
 @compiled
@@ -116,19 +131,19 @@ def _planned(t: Any, r: Any) -> float:
     stays = t.feet.roles[_REAR]
     if mode.stances > 1 and due[_REAR_LIFTOFF] <= due[_FRONT_LIFTOFF]:
         stays = t.feet.roles[_FRONT]
-    here, half = r.foot_position[stays, _SIDE], _SOLE * lateral.half_width
-    other = r.foot_position[1 - stays, _SIDE]
+    here, half = r.foot_position[stays, _SIDE], SOLE_SHARE * lateral.half_width
+    now = other = r.foot_position[1 - stays, _SIDE]
     steps = mode.stances == 1 or lifts < ends
     lands = due[_TOUCHDOWN] if steps else 0.0
     rests = due[_REST] <= due[_VLO]
-    if steps and rests:
-        other = closing_foothold(lateral, here, other)
-    middle = 0.5 * (here + other)
     lasts = np.zeros(_STAGES)
     if mode.stances > 1 and steps:
         lasts[0] = lifts
     if steps:
         lasts[1] = max(min(lands, ends) - lasts[0], 0.0)
+    if steps and rests:
+        other = closing_foothold(t, r, here, now, lasts[1])
+    middle = 0.5 * (here + other)
     if rests:
         lasts[2] = max(ends - lasts[0] - lasts[1], _REST_IN * lateral.unit)
     n = 0
@@ -136,7 +151,7 @@ def _planned(t: Any, r: Any) -> float:
         n += _PIECES if lasts[stage] > 0.0 else 0
     found = np.empty(n)
     pieces = Pieces(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
-    rate, at = np.sqrt(r.sway * r.gravity / _height(t, r)), 0
+    rate, at = _rate(t, r), 0
     for stage in range(_STAGES):
         if lasts[stage] <= 0.0:
             continue
@@ -147,7 +162,7 @@ def _planned(t: Any, r: Any) -> float:
             if stage == 0:
                 left = (_PIECES - k - 1) * lasts[0] / _PIECES
                 load = min(left / (UNLOADING * lateral.unit), 1.0)
-            away = load * (other - here)
+            away = load * ((now if stage == 0 else other) - here)
             pieces.low[at] = here + min(away, 0.0) - half
             pieces.high[at] = here + max(away, 0.0) + half
             pieces.wish[at] = middle if stage == 2 else here

@@ -44,6 +44,9 @@ class StandingOptions(Checked):
         reach: longest way from a foot on the ground to the CoM, over l0.
         half_length: by how far ahead of its middle, and behind, a foot bears the centre of pressure
             [m]; 0: it is a point.
+        slant: of soles that stand next to each other, by how much of their spacing the ground that
+            they enclose reaches further than that, on the line midway between them: their half
+            width over the distance between them to the side. A stand uses it, a start does not.
         shift: shortest time from rest to a liftoff [s]: until then the CoM of a robot on two soles
             has to be over the one that stays.
     """
@@ -52,6 +55,7 @@ class StandingOptions(Checked):
     slack: NotNegative = tuned(0.005, LENGTH)
     reach: Positive = tuned(1.025)
     half_length: NotNegative = tuned(0.0, LENGTH)
+    slant: NotNegative = tuned(0.0)
     shift: NotNegative = tuned(0.0, TIME)
 
 

@@ -358,6 +358,7 @@ class LandingTable:
         angles = np.arcsin(np.minimum(path[:, 1] / length, 1.0))
         feet = path[:, 0] + length * np.cos(angles)
         sinks = (path[:, 3] < 0.0) & (np.maximum.accumulate(angles[::-1])[::-1] <= angles)
+        sinks &= angles > 0.0  # of a robot that falls: the CoM is below the foot
         return [
             StepLanding(float(angles[i]), float(times[i]), foot, self._priced(row, toe, foot))
             for i, (row, foot) in enumerate(

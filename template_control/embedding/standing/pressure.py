@@ -32,6 +32,9 @@ ARRIVE = 2000.0
 """R, what an error at the end costs [s, of the reference template]."""
 _ROUNDS = 30  # of the active set
 _HELD = 1e-9  # [m]: a bound that is nearer holds
+# Largest w times the duration that is planned with, about twice that of a CoM that stays up. One
+# that falls diverges so fast that of the program nothing would be left but rounding.
+_GROWTH = 10.0
 
 
 class Pieces(NamedTuple):
@@ -124,9 +127,13 @@ def pressure(
 
     ``start`` and ``end`` (2,) are x and x' [m, m/s]; ``first`` is p before the first piece [m], NaN
     where it may jump; ``prices`` are T and R [s]. The miss is |x_N - x*| + |x'_N - x'*| / w_N.
+    Rates that are too large to plan with are made smaller.
     """
     n = p.shape[0]
     smooth, arrive = prices
+    most = _GROWTH / pieces.duration.sum()
+    for k in range(n):
+        pieces.rate[k] = min(pieces.rate[k], most)
     # x_N = free + sum gain_k p_k, the same of x'_N / w_N.
     gain, free = np.empty((2, n)), np.empty(2)
     last = pieces.rate[n - 1]
@@ -195,9 +202,6 @@ class Ground(NamedTuple):
 
 
 _LIGHTEST = 0.05  # of the weight: legs do not pull
-# Least height over the reach that is planned with: a CoM that falls diverges so fast below it that
-# nothing of the program is left but rounding.
-_LOWEST = 0.3
 _TERMS = 6
 
 
@@ -229,7 +233,7 @@ def best_pressure(
                 lasts[k] = t / n
                 y, _, lift = _at(rise, (k + 0.5) * t / n)
                 lift = max(ground.gravity + lift, _LIGHTEST * ground.gravity)
-                rate[k] = np.sqrt(lift / max(y, _LOWEST * ground.reach))
+                rate[k] = np.sqrt(lift / max(y, _LIGHTEST * ground.reach))
                 wish[k], left = goal, 1.0
                 if ground.unloading > 0.0:
                     left = min((n - k - 1) * t / n / ground.unloading, 1.0)

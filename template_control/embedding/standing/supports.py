@@ -69,6 +69,8 @@ class OverFeet(BetweenFeet):
         """
         unit, rules = Scale.of(self.parameters).time, self._rules
         middle, half = self.place(PLACE), _SHARE * self.options.half_length
+        if not unloading:
+            half += self.options.slant * abs(self.spacing)
         ground = Ground(
             rear=float(self.toes[0]),
             front=float(self.toes[1]),

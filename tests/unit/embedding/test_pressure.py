@@ -108,6 +108,15 @@ def test_a_fast_walk_comes_to_rest_between_its_feet():
     assert not feet.fits(fast), "its capture point is beyond the feet"
 
 
+def test_soles_side_by_side_bear_more_midway_than_their_toes():
+    pushed = np.array([[0.15, 0.85, 0.0], [OPTIONS.height, 0.0, 0.0]])
+    for slant, holds in ((0.0, False), (0.2, True)):
+        feet = OverFeet((0.0, 0.3), P, replace(OPTIONS, half_length=0.3, slant=slant))
+        found = feet.to_rest(pushed)
+        assert feet.fits(found) == holds
+        assert samples(found)[3].max() <= 0.15 + 0.8 * 0.3 + slant * 0.3 + 0.005
+
+
 @pytest.mark.parametrize("height", [-0.5, 0.0, 0.05])
 def test_a_com_that_falls_cannot_be_held(height):
     """Below its feet it would diverge so fast that nothing of the plan is left but rounding."""
