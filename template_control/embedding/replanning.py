@@ -18,17 +18,16 @@ from template_control.embedding.planners.planner import (
     Cause,
     Context,
     Decision,
-    EndOfStride,
     RestContext,
     decided,
     rest_decided,
 )
-from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
 from template_control.embedding.recovery import TO_REST, Recovery, entry, ways_to_rest
 from template_control.embedding.rollout import TemplateRollout
 from template_control.embedding.state import TemplateState
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
+from template_control.slip.control.stride_solver import EndOfStride, FromHere, Prior, solve_stride
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import REST, section_of

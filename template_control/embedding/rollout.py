@@ -17,7 +17,6 @@ from template_control.embedding.planners.planner import (
     Cause,
     Context,
     Decision,
-    EndOfStride,
     Planner,
     Planners,
     curved,
@@ -28,6 +27,7 @@ from template_control.embedding.state import EstimatorState, SectionReport, Temp
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.control.stride_solver import EndOfStride
 from template_control.slip.dynamics.stride import Stride, StrideSimulator
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters

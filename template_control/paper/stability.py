@@ -18,7 +18,12 @@ from template_control.slip.automaton.vocabulary import (
     Slot,
     StrideKind,
 )
-from template_control.slip.control.step_solver import StepProblem, Unknowns
+from template_control.slip.control.stride_solver import (
+    TARGET_ONLY,
+    FromSection,
+    Prior,
+    solve_stride,
+)
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.basin import steps_to_fall, velocity_angle, vlo_state
 from template_control.slip.gaits.branch import BranchPoint, Kind, Special
@@ -34,6 +39,7 @@ from template_control.view.stability_figures import basin_figure, deadbeat_figur
 Array = NDArray[np.float64]
 
 _RETURNS = 1e-7  # how exactly a step of the set must lead onto the equilibrium
+_ROUNDS = 100  # of the search for controls, at most
 
 
 @dataclass(frozen=True)
@@ -90,16 +96,17 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
 
     The search for controls begins at the exact step's; they aim at the equilibrium ``gait``.
     """
-    p = gait.parameters
-    slots = (Slot.TOUCHDOWN_ANGLE, Slot.K_SD)
-    k0 = p.leg_stiffness
-    unknowns = Unknowns(
-        slots, np.array([0.0, 0.5 * k0]), np.array([0.5 * np.pi, 1.5 * k0]), np.array([1.0, k0])
-    )
-    problem = StepProblem(ReturnMap(p, StrideKind.WALK, kind), unknowns, evaluations=100)
+    p, k0 = gait.parameters, gait.parameters.leg_stiffness
+    slots, step = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SD)], ReturnMap(p, StrideKind.WALK, kind)
+    others = np.array([[1.0, k0], [0.0, 0.5 * k0], [0.5 * np.pi, 1.5 * k0]])
+
+    def solved(z: Array, u: Array) -> Array:
+        prior = Prior(u, slots, np.vstack((u[slots], others)), _ROUNDS, TARGET_ONLY)
+        return solve_stride(FromSection(step, z, slots), gait.vlo, prior, np.ones(3))[0]
+
     pairs = zip(found.state, found.controls, strict=True)
     shown = counted(pairs, len(found.state), f"controls by the {kind.name.lower()} map")
-    controls = np.array([problem.solve(z, gait.vlo, [u]).controls for z, u in shown])
+    controls = np.array([solved(z, u) for z, u in shown])
     return ReturnMap(p)(found.state, controls).state
 
 

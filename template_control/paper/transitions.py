@@ -11,8 +11,7 @@ from template_control.paper.map_errors import stride_figure
 from template_control.paper.reproduction import Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
-from template_control.slip.control.controllers import RunToWalk, WalkToRun
-from template_control.slip.control.step_solver import StepSolution
+from template_control.slip.control.controllers import RunToWalk, StepSolution, WalkToRun
 from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO

@@ -22,10 +22,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.cholesky import cholesky, solve_cholesky
 from template_control.compiled import compiled
 from template_control.plant.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.whole_body.elimination import cholesky, solve_cholesky
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from .control.controllers import ActiveRunning as ActiveRunning
 from .control.controllers import ActiveWalking as ActiveWalking
 from .control.controllers import ModifiedWalking as ModifiedWalking
 from .control.controllers import RunToWalk as RunToWalk
+from .control.controllers import StepSolution as StepSolution
 from .control.controllers import WalkToRun as WalkToRun
 from .control.controllers import section_target as section_target
 from .control.controllers import targeted as targeted
-from .control.step_solver import StepSolution as StepSolution
 from .dynamics.stride import Stride as Stride
 from .dynamics.stride import controls as controls
 from .dynamics.stride import simulate_stride as simulate_stride

@@ -28,9 +28,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.cholesky import cholesky
 from template_control.compiled import compiled
 from template_control.robot.terms import MOST_CONTACTS, PATCH, UP
-from template_control.whole_body.elimination import cholesky, eliminate
+from template_control.whole_body.elimination import eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
 Array = NDArray[np.float64]

@@ -38,6 +38,7 @@ SLIP_STAGES = (
 )
 SHARED = (
     "checks",
+    "cholesky",
     "compiled",
     "deprecated",
     "errors",

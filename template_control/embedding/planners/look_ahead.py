@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.cholesky import cholesky
 from template_control.compiled import compiled
 from template_control.embedding.planners.gait_table import (
     CONTROL,
@@ -32,8 +33,8 @@ from template_control.embedding.planners.gait_table import (
 )
 from template_control.embedding.planners.lqr import ANGLE_RANGE, STIFFNESS_RANGE
 from template_control.embedding.planners.step_search import TOP_MARGIN
-from template_control.embedding.planners.stride_solver import bounded_step
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
+from template_control.slip.control.stride_solver import bounded_step
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
     REAR_BOTTOM,
@@ -43,7 +44,6 @@ from template_control.slip.maps.return_map import (
     one_stride,
     section_jacobian,
 )
-from template_control.whole_body.elimination import cholesky
 
 Array = NDArray[np.float64]
 

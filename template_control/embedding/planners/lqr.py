@@ -32,10 +32,10 @@ from template_control.embedding.planners.step_search import (
     Law,
     choose,
 )
-from template_control.embedding.planners.stride_solver import FromHere, Prior, solve_stride
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import GaitError
 from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.control.stride_solver import FromHere, Prior, solve_stride
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WalkingGait, control_units, vlo_jacobians

@@ -16,7 +16,8 @@ from template_control.checks.checked import Checked
 from template_control.checks.fitting import answered, answered_or_none, name_of
 from template_control.checks.ranges import Shape
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
+from template_control.slip.control.stride_solver import EndOfStride
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
@@ -90,13 +91,6 @@ class Context(NamedTuple):
     target: Array | None = None
     angles: tuple[float, float] = ANY_ANGLE
     cause: Cause = Cause.SECTION
-
-
-class EndOfStride(Protocol):
-    """Map from the controls of a stride that has begun to its end."""
-
-    def __call__(self, u: Array) -> tuple[Array, Outcome]:
-        """(m,) state at the section where it ends, and how, with (NUM_SLOTS,) controls ``u``."""
 
 
 class RestContext(NamedTuple):

@@ -17,13 +17,13 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.embedding.planners.planner import Context, Decision, Planner
-from template_control.embedding.planners.stride_solver import (
+from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.control.stride_solver import (
     FromSection,
     NearbyStrides,
     Prior,
     solve_within_reach,
 )
-from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED

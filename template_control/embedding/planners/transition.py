@@ -23,14 +23,14 @@ from template_control.embedding.planners.planner import (
     RestContext,
     decided,
 )
-from template_control.embedding.planners.stride_solver import (
+from template_control.errors import ParameterError
+from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.control.stride_solver import (
     FromHere,
     FromSection,
     Prior,
     solve_stride,
 )
-from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.similarity import Scale, scaled, tuned

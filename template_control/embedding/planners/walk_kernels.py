@@ -10,10 +10,10 @@ import numpy as np
 
 from template_control.embedding.planners.running import leg_bounds
 from template_control.embedding.planners.step_search import KneeLoadPenalty, Law, choose
-from template_control.embedding.planners.stride_solver import improve
 from template_control.robot.library import load_robot
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, StrideKind
+from template_control.slip.control.stride_solver import improve
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import ORDER, stride_kernel
 from template_control.slip.dynamics.stride import controls, simulate_stride
@@ -92,7 +92,7 @@ def step_search() -> None:
 def catch() -> None:
     """The planner of the run that a walk breaks into."""
     one, square, prior = np.ones(1), np.ones((1, 1)), np.ones((4, 1))
-    improve((one, one, one, square, square), one, one, one, prior, 0.0)
+    improve((one, one, one, square, square), one, one, one, prior, 1.0, 0.0)
     leg_bounds(np.ones(2), np.ones(3), (0.0, 1.0), 1.0, (1.0, 1.0, 1.0), (0.0, 1.0))
 
 

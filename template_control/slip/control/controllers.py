@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -11,11 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
-from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
+from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot, StrideKind
 from template_control.slip.control.modified_walking import ModifiedMap
-from template_control.slip.control.step_solver import Step, StepProblem, StepSolution, Unknowns
+from template_control.slip.control.stride_solver import (
+    TARGET_ONLY,
+    FromSection,
+    Prior,
+    Step,
+    solve_stride,
+)
 from template_control.slip.dynamics.stride import controls, finite
-from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
 from template_control.slip.maps.section import APEX, VLO, Section
 from template_control.slip.parameters import SlipParameters
 
@@ -26,6 +32,28 @@ _ANGLE, _K_SC, _K_SD = Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD
 # for 8 ms [rad].
 _TOP_MARGIN = 0.001
 _LANDING = (_ANGLE, _K_SC, _K_SD)
+_REACHED = 1e-3  # residual that counts as reached
+_ACCEPTABLE = 0.05  # residual below which no further start is tried
+_ROUNDS = 20  # of the search from each start
+
+
+@dataclass(frozen=True)
+class StepSolution:
+    """Controls of one stride, and what they are predicted to do.
+
+    Attributes:
+        controls: (NUM_SLOTS,) u by Slot.
+        predicted: (m,) state at the next section, on the map the controls were found on.
+        residual: root of the weighted sum of squared errors in (36).
+        outcome: how the predicted stride ends.
+        reached: whether it ends at the target (and, running, at the wanted compression).
+    """
+
+    controls: Array
+    predicted: Array
+    residual: float
+    outcome: Outcome
+    reached: bool
 
 
 @dataclass(frozen=True)
@@ -55,17 +83,14 @@ class Design:
     stiffnesses: tuple[float, float] = (0.05, 20.0)
     seeds: int = 3
 
-    def unknowns(self, parameters: SlipParameters) -> Unknowns:
-        """The free controls and their bounds."""
+    def table(self, parameters: SlipParameters) -> Array:
+        """(4, f) of a :class:`~.stride_solver.Prior`, whose base each start of the search is."""
         k0 = parameters.leg_stiffness
         angle = [slot is _ANGLE for slot in self.free]
         (flattest, steepest), (softest, stiffest) = np.radians(self.angles), self.stiffnesses
-        return Unknowns(
-            self.free,
-            np.where(angle, flattest, softest * k0),
-            np.where(angle, steepest, stiffest * k0),
-            np.where(angle, 1.0, k0),
-        )
+        unit = np.where(angle, 1.0, k0)
+        lower = np.where(angle, flattest, softest * k0)
+        return np.array([lower, unit, lower, np.where(angle, steepest, stiffest * k0)])
 
     def grid(self, parameters: SlipParameters) -> Array:
         """Controls (n, NUM_SLOTS) over the product of the axes."""
@@ -143,11 +168,17 @@ class Controller:
     def _search_on(
         self, step: Step, weights: Sequence[float] | None, compression: float | None = None
     ) -> None:
-        """Make the problem; ``compression`` is the leg's wanted length at the bottom [m]."""
-        unknowns = self.design.unknowns(step.parameters)
-        self._problem = StepProblem(step, unknowns, weights, compression)
+        """Search on a map; ``compression`` is the leg's wanted length at the bottom [m]."""
+        self._step = step
+        self._compression = [] if compression is None else [compression]
+        self._also = (REAR_BOTTOM,) * len(self._compression)
+        rows = step.dimensions[1] + len(self._also)
+        self._tolerance = 1.0 / np.sqrt(np.ones(rows) if weights is None else np.asarray(weights))
+        self._slots = [int(slot) for slot in self.design.free]
+        self._table = self.design.table(step.parameters)
         self._grid = self.design.grid(step.parameters)
-        self._upper = unknowns.upper
+        # A steeper leg would be in the ground at an apex.
+        self._margin = _TOP_MARGIN if step.dimensions[0] == APEX.dimension else None
 
     def solve(
         self,
@@ -165,32 +196,55 @@ class Controller:
         Raises:
             ParameterError: if a state is not finite, or the target is beyond any stride.
         """
-        problem, design = self._problem, self.design
-        n, m = problem.step.dimensions
+        design, (n, m) = self.design, self._step.dimensions
         start, aim = finite("section state", z, n), finite("target", target, m)
         self._check(aim)
-        if n == APEX.dimension:
-            # A steeper leg would be in the ground.
-            height = min(start[1] / problem.step.parameters.rest_length, 1.0)
-            steepest = np.arcsin(height) - _TOP_MARGIN
-            highest = [steepest if slot is _ANGLE else np.inf for slot in design.free]
-            upper = np.minimum(highest, self._upper)
-            problem.unknowns = replace(problem.unknowns, upper=upper)
-        near = None if guess is None else problem.solve(start, aim, [guess])
-        content = problem.tolerance if design.dense else problem.acceptable
-        if near is not None and near.residual <= content:
+        aim = np.append(aim, self._compression)
+        table = self._table.copy()
+        if self._margin is not None:
+            top = np.arcsin(min(start[1] / self._step.parameters.rest_length, 1.0)) - self._margin
+            turns = self._slots.index(_ANGLE)
+            table[2:, turns] = np.minimum(table[2:, turns], top)
+        near = None if guess is None else self._descend(start, aim, table, guess)
+        if near is not None and near.residual <= (_REACHED if design.dense else _ACCEPTABLE):
             return near
-        costs = problem.costs(start, aim, self._grid)
-        # Where the grid is dense, a seed worse than what is found leads nowhere better.
-        limit = near.residual**2 if near is not None and design.dense else np.inf
-        seeds = [self._grid[i] for i in np.argsort(costs)[: design.seeds] if costs[i] <= limit]
-        if near is not None and not seeds:
-            return near
-        far = problem.solve(start, aim, seeds or [self._grid[0]])
-        return far if near is None or far.residual < near.residual else near
+        costs = self._costs(start, aim)
+        seeds = np.argsort(costs)[: design.seeds]
+        if near is not None and design.dense:
+            # A seed worse than what is found leads nowhere better.
+            seeds = seeds[costs[seeds] <= near.residual**2]
+        for seed in seeds:
+            far = self._descend(start, aim, table, self._grid[seed])
+            if near is None or far.residual < near.residual:
+                near = far
+            if near.residual <= _ACCEPTABLE:
+                break
+        assert near is not None
+        return near
+
+    def _descend(self, z: Array, aim: Array, table: Array, start: Array) -> StepSolution:
+        """The best controls that are found from some; ``aim`` has the compression too."""
+        table[0] = np.clip(start[self._slots], *table[2:])
+        prior = Prior(start, self._slots, table, _ROUNDS, TARGET_ONLY)
+        stride = FromSection(self._step, z, self._slots, self._also)
+        u, _ = solve_stride(stride, aim, prior, self._tolerance)
+        end, outcome = stride.at(u)
+        residual = np.inf
+        if outcome is Outcome.SECTION:
+            residual = float(np.linalg.norm((aim - end) / self._tolerance))
+        predicted = end[: self._step.dimensions[1]].copy()
+        return StepSolution(u, predicted, residual, outcome, residual <= _REACHED)
+
+    def _costs(self, z: Array, aim: Array) -> Array:
+        """(n,) weighted squared errors, as in (36), of the grid; inf where a stride fails."""
+        results, outcomes = self._step.evaluate_many(z, self._grid)
+        ends = results[:, [*range(self._step.dimensions[1]), *self._also]]
+        costs = np.sum(((aim - ends) / self._tolerance) ** 2, axis=1)
+        costs[outcomes != Outcome.SECTION] = np.inf
+        return costs
 
     def _check(self, target: Array) -> None:
-        p = self._problem.step.parameters
+        p = self._step.parameters
         lowest = p.rest_length * np.sin(np.radians(self.design.angles[0]))
         if not target[0] > 0.0:
             raise ParameterError(f"target speed is {target[0]:g} m/s: give a positive one")
@@ -267,8 +321,7 @@ class ModifiedWalking(Controller):
         if kappa_1 is not None:
             self._grid[:, Slot.K_SC] = kappa_1
         self._modified = step
-        self._steepest = self._problem.unknowns.upper
-        self._top_margin = top_margin
+        self._margin = top_margin
 
     def solve(
         self,
@@ -278,11 +331,6 @@ class ModifiedWalking(Controller):
     ) -> StepSolution:
         """See :meth:`Controller.solve`; one control seldom reaches all of the target."""
         self._modified.target = finite("target", target, 3)
-        p = self._modified.parameters
-        top = np.arcsin(min(float(z[1]) / p.rest_length, 1.0)) - self._top_margin
-        self._problem.unknowns = replace(
-            self._problem.unknowns, upper=np.minimum(top, self._steepest)
-        )
         return super().solve(z, target, guess)
 
 

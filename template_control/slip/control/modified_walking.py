@@ -185,7 +185,7 @@ def search_angle(
 
 
 class ModifiedMap:
-    """The VLO return map with kappa_2 by (38), for :class:`~.step_solver.StepProblem`.
+    """The VLO return map with kappa_2 by (38), as a :class:`~.stride_solver.Step`.
 
     The methods overwrite kappa_2 [N/m], kept in ``stiffness_range``, in the controls they are
     given; it aims at the energy of ``target``, a (3,) VLO state.
@@ -207,20 +207,20 @@ class ModifiedMap:
         return Aim(self.target, self._range)
 
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
-        """See :meth:`~.step_solver.Step.evaluate`."""
+        """See :meth:`~.stride_solver.Step.evaluate`."""
         result = np.empty(RESULTS)
         outcome = modified_step(*self._kernel, z, self._aim, u, self._work.scratch, result)
         return result, Outcome(outcome)
 
     def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
-        """See :meth:`~.step_solver.Step.evaluate_many`."""
+        """See :meth:`~.stride_solver.Step.evaluate_many`."""
         found: tuple[Array, IntArray] = modified_many(
             *self._kernel, z, self._aim, u, self._work.scratch
         )
         return found
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
-        """See :meth:`~.step_solver.Step.derivatives`; kappa_2 of (38) varies along with u.
+        """See :meth:`~.stride_solver.Step.derivatives`; kappa_2 of (38) varies along with u.
 
         dkappa_2 = ((kappa_1 - kappa_2) dmu_3 + (mu_3 - mu_2) dkappa_1) / (mu_3 - mu_1).
         """

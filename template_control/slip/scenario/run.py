@@ -22,9 +22,9 @@ from template_control.slip.control.controllers import (
     Controller,
     ModifiedWalking,
     RunToWalk,
+    StepSolution,
     WalkToRun,
 )
-from template_control.slip.control.step_solver import StepSolution
 from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
 from template_control.slip.maps.section import APEX, PADDED, VLO, section_of
 from template_control.slip.scenario.route import StrideGoal

@@ -15,8 +15,8 @@ from template_control.embedding.planners.running import (
     RunningOptions,
     RunningPlanner,
 )
-from template_control.embedding.planners.stride_solver import solve_within_reach
 from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.control.stride_solver import solve_within_reach
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from template_control.embedding.planners import stride_solver
 from template_control.embedding.planners.planner import ANY_ANGLE, Context
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.planners.stride_solver import (
+from template_control.slip.control.stride_solver import (
     FromSection,
     NearbyStrides,
     Prior,
@@ -49,16 +48,15 @@ def prior_of(gait, z, angles=ANY_ANGLE):
     return Prior(gait.controls, [0, 1, 2], table, planner.options.rounds)
 
 
-def exactly(stride, aim, prior, monkeypatch):
+def exactly(stride, aim, prior):
     """The solution to rounding."""
-    with monkeypatch.context() as patch:
-        patch.setattr(stride_solver, "_CLOSE", 1e-7)
-        return solve_stride(stride, aim, replace(prior, rounds=30), TOLERANCE)[0]
+    search = prior.search._replace(close=1e-7)
+    return solve_stride(stride, aim, replace(prior, rounds=30, search=search), TOLERANCE)[0]
 
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_near_stride_needs_no_derivatives(gait, step, monkeypatch, held, sign):
+def test_a_near_stride_needs_no_derivatives(gait, step, held, sign):
     nearby, aim = NearbyStrides(TOLERANCE, 0.5), gait.apex + [0.018, -0.001]
     angle = float(gait.controls[0]) + 0.002
     taken = []
@@ -68,7 +66,7 @@ def test_a_near_stride_needs_no_derivatives(gait, step, monkeypatch, held, sign)
         u, end = nearby.solve(FromSection(step, z, prior.slots), aim, prior)
         taken.append(step.taken - before)
         np.testing.assert_allclose(end, step.step(z, u)[0], rtol=0.0, atol=1e-4)
-        best = exactly(FromSection(step, z, prior.slots), aim, prior, monkeypatch)
+        best = exactly(FromSection(step, z, prior.slots), aim, prior)
         off = abs(u - best)[prior.slots] / prior.change
         assert off.max() < 0.02
     assert taken[0] > 1, "the first stride is solved on its own"

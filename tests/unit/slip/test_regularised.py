@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.planners.stride_solver import (
+from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.control.stride_solver import (
     FromHere,
     FromSection,
     Prior,
     bounded_step,
     solve_stride,
 )
-from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters

@@ -1,4 +1,8 @@
-"""One stride ahead: bounded least squares on a return map, against changes of the controls."""
+"""Controls of one stride: bounded least squares on a return map, the optimisation problem (36).
+
+The paper's controllers look for a target and nothing else; planners weigh it against changes of the
+controls.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +17,14 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.cholesky import cholesky, solve_cholesky
 from template_control.compiled import compiled
-from template_control.embedding.planners.planner import EndOfStride
 from template_control.slip.automaton.vocabulary import Outcome
-from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
-from template_control.whole_body.elimination import cholesky, solve_cholesky
+from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 _NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
 
@@ -99,9 +103,10 @@ def improve(
     aim: Array,
     tolerance: Array,
     prior: Array,
+    pull: float,
     damping: float,
 ) -> tuple[float, float, Array, Array]:
-    """One step towards the least |(end - aim) / tolerance|^2 + |(x - base) / change|^2.
+    """One step towards the least |(end - aim) / tolerance|^2 + |pull (x - base) / change|^2.
 
     ``linear`` is a :class:`Linear`, a plain tuple for compiled code; the stride begins in ``z``
     (n,), near its own; ``prior`` (4, f) is base, change, lower and upper bounds; ``damping`` as for
@@ -121,8 +126,8 @@ def improve(
         for j in range(size):
             rows[i, j] = by_controls[i, j] / tolerance[i]
     for j in range(size):
-        residual[m + j] = (x[j] - prior[0, j]) / prior[1, j]
-        rows[m + j, j] = 1.0 / prior[1, j]
+        residual[m + j] = pull * ((x[j] - prior[0, j]) / prior[1, j])
+        rows[m + j, j] = pull / prior[1, j]
     for i in range(m + size):
         cost += residual[i] * residual[i]
     better = bounded_step(rows, residual, x, prior[2], prior[3], damping)
@@ -135,9 +140,33 @@ def improve(
 
 
 _DIFFERENCE = 1e-6  # of a control
-_GRID = 5  # points of each control, where the base's stride fails
 _LESS = 0.1  # of the damping, after a step that lowers the cost; after another one as much more
-_CLOSE = 0.03  # a step this short, in units of change, is the last: what it leaves is its square
+
+
+class Search(NamedTuple):
+    """What is sought, and how far.
+
+    Attributes:
+        pull: weight of the changes of the controls.
+        close: a step this short, in units of change, is the last: what it leaves is its square.
+        grid: points of each control that are tried where the base's stride fails; 0: none.
+        save: share of the cost that a step has to save for another one.
+        patience: steps in a row that may raise the cost, before they are taken back. Where targets
+            are met by a curved valley of controls, Newton's method leaves it and finds its end;
+            with a cost that always falls it creeps along.
+    """
+
+    pull: float
+    close: float
+    grid: int
+    save: float
+    patience: int
+
+
+NEAR_BASE = Search(pull=1.0, close=0.03, grid=5, save=0.0, patience=0)
+"""A compromise of the target and the base, as good as a plan needs it."""
+TARGET_ONLY = Search(pull=1e-6, close=1e-9, grid=0, save=1e-10, patience=5)
+"""The target, to rounding; the pull leaves a control alone that changes nothing."""
 
 
 @dataclass(frozen=True)
@@ -149,12 +178,14 @@ class Prior:
         slots: the f free ones.
         table: (4, f) of these: their values, changes that count as 1, lower and upper bounds.
         rounds: Gauss-Newton steps; as many more may be tried again, shorter.
+        search: whether the base counts.
     """
 
     controls: Array
     slots: list[int]
     table: Array
     rounds: int
+    search: Search = NEAR_BASE
 
     @property
     def base(self) -> Array:
@@ -182,6 +213,44 @@ class Prior:
         return np.array(list(product(*axes)))
 
 
+class Step(Protocol):
+    """Return map as this solver needs it; ``ReturnMap`` is one.
+
+    ``evaluate`` and ``derivatives`` may complete the controls they are given in place.
+    ``dimensions`` are the sizes n and m of the states at the sections a stride starts from and ends
+    at.
+    """
+
+    parameters: SlipParameters
+    dimensions: tuple[int, int]
+
+    def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
+        """One stride from z (n,) with controls u (NUM_SLOTS,), by Slot [rad, N/m].
+
+        Returns (RESULTS,) of :func:`~template_control.slip.maps.return_map.section_map`, and its
+        outcome.
+        """
+
+    def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
+        """Strides from one state z (n,) with rows u (count, NUM_SLOTS) of controls.
+
+        Returns (count, RESULTS) as :meth:`evaluate`, and (count,) values of the outcomes.
+        """
+
+    def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
+        """One stride as :meth:`evaluate`, with (RESULTS, c) derivatives before the outcome.
+
+        ``columns`` (c,) are what to differentiate by: 3 + slot for a control.
+        """
+
+
+class EndOfStride(Protocol):
+    """Map from the controls of a stride that has begun to its end."""
+
+    def __call__(self, u: Array) -> tuple[Array, Outcome]:
+        """(m,) state at the section where it ends, and how, with (NUM_SLOTS,) controls ``u``."""
+
+
 class StrideEnd(Protocol):
     """Map from the controls of a stride, or of the rest of one, to its end."""
 
@@ -194,26 +263,35 @@ class StrideEnd(Protocol):
 
 @dataclass(frozen=True)
 class FromSection:
-    """A whole stride from z (n,), by free slots of its controls, with exact derivatives."""
+    """A whole stride from z (n,), by free slots of its controls, with exact derivatives.
 
-    step: ReturnMap
+    Its end has the state at the next section, and ``also`` these of the map's results.
+    """
+
+    step: Step
     z: Array
     slots: Sequence[int]
+    also: tuple[int, ...] = ()
+
+    @cached_property
+    def _ends(self) -> slice | list[int]:
+        m = self.step.dimensions[1]
+        return [*range(m), *self.also] if self.also else slice(m)
 
     def at(self, u: Array) -> tuple[Array, Outcome]:
         """See :class:`StrideEnd`."""
-        return self.step.step(self.z, u)
+        result, outcome = self.step.evaluate(self.z, u)
+        return result[self._ends], outcome
 
     @cached_property
-    def columns(self) -> NDArray[np.int64]:
+    def columns(self) -> IntArray:
         """Places of the free controls among the map's arguments."""
         return np.array(self.slots) + PADDED
 
     def slopes(self, u: Array) -> tuple[Array, Array, Outcome]:
         """See :class:`StrideEnd`."""
-        m, columns = self.step.dimensions[1], self.columns
-        result, jacobian, outcome = self.step.derivatives(self.z, u, columns)
-        return result[:m], jacobian[:m], outcome
+        result, jacobian, outcome = self.step.derivatives(self.z, u, self.columns)
+        return result[self._ends], jacobian[self._ends], outcome
 
 
 @dataclass(frozen=True)
@@ -244,37 +322,41 @@ class FromHere:
 def solve_stride(
     stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array
 ) -> tuple[Array, Array | None]:
-    """min |(P(u) - aim) / tolerance|^2 + |(u - base) / change|^2 over bounded u.
+    """min |(P(u) - aim) / tolerance|^2 + |pull (u - base) / change|^2 over bounded u.
 
     ``aim`` (m,) is where the stride should end. Returns (NUM_SLOTS,) controls, and (m,) where the
     stride ends, None where none of those tried completes it.
     """
-    u = prior.controls.copy()
+    u, search = prior.controls.copy(), prior.search
     wish, errors = np.array([aim, tolerance])
     here, by_state = np.empty(0), np.empty((len(wish), 0))  # the state is what it is
     x, damping, least = prior.base, 0.0, np.inf
     best: tuple[Array, ...] | None = None
-    left = prior.rounds + 1
+    left, patience = prior.rounds + 1, search.patience
     for number in range(2 * prior.rounds + 1):
         u[prior.slots] = x
         end, jacobian, outcome = stride.slopes(u)
         cost, less = np.inf, _LESS * damping if damping > _LESS else 0.0
         if outcome is Outcome.SECTION:
             tried = (here, x, end, by_state, jacobian)
-            cost, longest, x, _ = improve(tried, here, wish, errors, prior.table, less)
+            cost, longest, x, _ = improve(tried, here, wish, errors, prior.table, search.pull, less)
         elif best is None:
             if number:
                 break
             x = _from_grid(stride, aim, prior, tolerance)
             continue
         if cost < least:
+            enough = least - cost < search.save * cost
             best, least, damping, left = tried, cost, less, left - 1
+            patience = search.patience
+            if left == 0 or enough:
+                break
+        elif patience and longest > search.close and cost < np.inf:
+            patience -= 1
         else:
             damping = max(damping / _LESS, 1.0)
-            _, longest, x, _ = improve(best, here, wish, errors, prior.table, damping)
-        if left == 0:
-            break
-        if longest < _CLOSE:
+            _, longest, x, _ = improve(best, here, wish, errors, prior.table, search.pull, damping)
+        if longest < search.close:
             u[prior.slots] = x
             end, outcome = stride.at(u)
             if outcome is Outcome.SECTION:
@@ -288,7 +370,7 @@ def _from_grid(stride: StrideEnd, aim: Array, prior: Prior, tolerance: Array) ->
     """The best of a grid within the bounds; the base where all of it fails."""
     u = prior.controls.copy()
     best, least = prior.base, np.inf
-    for x in prior.grid(_GRID):
+    for x in prior.grid(prior.search.grid):
         u[prior.slots] = x
         end, outcome = stride.at(u)
         if outcome is Outcome.SECTION:
@@ -341,7 +423,7 @@ class NearbyStrides:
         self._known.clear()
 
     def solve(self, stride: FromSection, aim: Array, prior: Prior) -> tuple[Array, Array | None]:
-        """As :func:`~.planners.stride_solver.solve_stride`."""
+        """As :func:`solve_stride`."""
         change = map(abs, (aim - stride.z).tolist())
         if not all(map(lt, change, self._steady)):
             return solve_stride(stride, aim, prior, self.tolerance)
@@ -369,7 +451,8 @@ class NearbyStrides:
         self, linear: Linear, z: Array, aim: Array, prior: Prior
     ) -> tuple[Array, Array] | None:
         """On the derivatives of a solution that is known; None where they do not hold."""
-        _, turn, x, end = improve(tuple(linear), z, aim, self.tolerance, prior.table, 0.0)
+        pull = prior.search.pull
+        _, turn, x, end = improve(tuple(linear), z, aim, self.tolerance, prior.table, pull, 0.0)
         if turn > _TURN:
             return None
         u = prior.controls.copy()
