@@ -27,7 +27,8 @@ from template_control.embedding.rollout import TemplateRollout
 from template_control.embedding.state import TemplateState
 from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
-from template_control.slip.control.stride_solver import EndOfStride, FromHere, Prior, solve_stride
+from template_control.slip.control.least_squares import Search
+from template_control.slip.control.stride_solver import Prior, StrideEnd, solve_stride
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import REST, section_of
@@ -58,7 +59,7 @@ SOONEST_SHARE = 0.08
 # stride slow and sinking. Legs that push longer give back some of the energy that the climb took.
 # One that steps down ends it fast, and a step can brake only from some of the states that it may
 # end in: a planner knows them by their price.
-END_TOLERANCE = (0.1, 0.02, 0.1)
+END_TOLERANCE = np.array((0.1, 0.02, 0.1))
 """Errors of dx/dt, y, dy/dt where such a stride ends that count as 1 [m/s, m, m/s]."""
 _CHANGE = 0.5  # of a stiffness, over the gait's, that counts as 1
 _BOUNDS = (0.5, 2.0)  # of the stiffnesses over the gait's
@@ -110,7 +111,7 @@ def ballistic_touchdown_angle(sensed: TemplateState, parameters: SlipParameters)
 
 
 def choose_legs(
-    ahead: EndOfStride,
+    ahead: StrideEnd,
     decision: Decision,
     target: Array,
     free: Sequence[int],
@@ -130,10 +131,9 @@ def choose_legs(
     lower, upper = (share * base for share in _BOUNDS)
     now = np.clip(decision.controls[stiff], lower, upper)
     table = np.array([now, _CHANGE * base, lower, upper])
-    prior = Prior(decision.controls.copy(), stiff, table, _SOLVER_ROUNDS)
-    speed, length, _ = END_TOLERANCE
-    tolerance = np.array([speed * scale.speed, length * scale.length, speed * scale.speed])
-    u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
+    prior = Prior(decision.controls, stiff, table, Search(_SOLVER_ROUNDS))
+    weights = np.diag(1.0 / (END_TOLERANCE * scale.state))
+    u, end = solve_stride(ahead, target, prior, weights)
     if price is not None:
         u, end = _cheapest(u, end, prior, ahead, price, base)
     if end is None:
@@ -145,7 +145,7 @@ def _cheapest(
     u: Array,
     end: Array | None,
     prior: Prior,
-    ahead: EndOfStride,
+    ahead: StrideEnd,
     price: Callable[[Array], float],
     gait: Array,
 ) -> tuple[Array, Array | None]:

@@ -26,9 +26,9 @@ from template_control.embedding.recovery import Recovery
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Node
-from template_control.slip.automaton.vocabulary import Outcome
-from template_control.slip.control.stride_solver import EndOfStride
+from template_control.slip.control.stride_solver import StrideEnd
 from template_control.slip.dynamics.stride import Stride, StrideSimulator
+from template_control.slip.maps.return_map import new_workspace
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, StrideGoal
@@ -247,6 +247,7 @@ class TemplateRollout:
         self.scale = Scale.of(self._parameters)
         self.height_error = HEIGHT_ERROR * self.scale.length
         self._simulator = self._mirrored = StrideSimulator(self._parameters, automaton)
+        self._work = new_workspace()
 
     def set_ground(self, ground: SlipParameters) -> bool:
         """Run the template on ground of this slope and assist; True if it is other ground."""
@@ -310,16 +311,13 @@ class TemplateRollout:
             more -= 1
         return strides, whole and all(stride.completed for stride in strides)
 
-    def ahead(self, node: Node, sensed: TemplateState) -> EndOfStride:
+    def ahead(self, node: Node, sensed: TemplateState) -> StrideEnd:
         """End of the present stride from here, by its controls."""
-        toes, state = _toes(sensed), sensed.state.copy()
         end = section_of(self.automaton.sections(node.name)[1])
-
-        def ahead(u: Array) -> tuple[Array, Outcome]:
-            stride = self._simulator.run(node.name, state, u, toes)
-            return end.of(stride.state), stride.outcome
-
-        return ahead
+        x, y, dx, dy = sensed.state.tolist()
+        start = np.array([dx, y, dy, x, *_toes(sensed)])
+        kernel = self._simulator.kernel(node.name)
+        return StrideEnd(kernel, None, start, np.arange(end.dimension), self._work)
 
     def at_section(self, section: Section, sensed: TemplateState, last: SectionReport) -> Array:
         """(n,) section state that the template passes through, a little before or after it.

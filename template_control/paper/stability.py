@@ -19,10 +19,11 @@ from template_control.slip.automaton.vocabulary import (
     StrideKind,
 )
 from template_control.slip.control.stride_solver import (
+    LEAST_PULL,
     TARGET_ONLY,
-    FromSection,
     Prior,
     solve_stride,
+    whole,
 )
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.basin import steps_to_fall, velocity_angle, vlo_state
@@ -99,10 +100,11 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
     p, k0 = gait.parameters, gait.parameters.leg_stiffness
     slots, step = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SD)], ReturnMap(p, StrideKind.WALK, kind)
     others = np.array([[1.0, k0], [0.0, 0.5 * k0], [0.5 * np.pi, 1.5 * k0]])
+    search = TARGET_ONLY._replace(rounds=_ROUNDS)
 
     def solved(z: Array, u: Array) -> Array:
-        prior = Prior(u, slots, np.vstack((u[slots], others)), _ROUNDS, TARGET_ONLY)
-        return solve_stride(FromSection(step, z, slots), gait.vlo, prior, np.ones(3))[0]
+        prior = Prior(u, slots, np.vstack((u[slots], others)), search, LEAST_PULL)
+        return solve_stride(whole(step, z), gait.vlo, prior, np.eye(3))[0]
 
     pairs = zip(found.state, found.controls, strict=True)
     shown = counted(pairs, len(found.state), f"controls by the {kind.name.lower()} map")

@@ -34,7 +34,7 @@ from template_control.embedding.planners.gait_table import (
 from template_control.embedding.planners.lqr import ANGLE_RANGE, STIFFNESS_RANGE
 from template_control.embedding.planners.step_search import TOP_MARGIN
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.control.stride_solver import bounded_step
+from template_control.slip.control.least_squares import bounded_step
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
     REAR_BOTTOM,

@@ -35,7 +35,8 @@ from template_control.embedding.planners.step_search import (
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import GaitError
 from template_control.slip.automaton.vocabulary import Outcome, Slot
-from template_control.slip.control.stride_solver import FromHere, Prior, solve_stride
+from template_control.slip.control.least_squares import Search
+from template_control.slip.control.stride_solver import Prior, solve_stride
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import WalkingGait, control_units, vlo_jacobians
@@ -351,15 +352,10 @@ class LqrPlanner(Planner):
         # square of its length times this.
         root: Array = np.linalg.cholesky(law.cost).T.astype(np.float64)
 
-        def weighed(u: Array) -> tuple[Array, Outcome]:
-            end, outcome = ahead(u)
-            return root @ end, outcome
-
-        rest, prior = FromHere(weighed, slots), Prior(controls, slots, table, _REST_ROUNDS)
-        u, there = solve_stride(rest, root @ law.target, prior, np.ones(3))
-        if there is None:
+        prior = Prior(controls, slots, table, Search(_REST_ROUNDS))
+        u, end = solve_stride(ahead, law.target, prior, root)
+        if end is None:
             return replace(decision, feasible=False, nominal=False)
-        end: Array = np.linalg.solve(root, there).astype(np.float64)
         if not completed:
             return Decision(u, end, True, True, False)
         return replace(decision, controls=u, predicted=decision.predicted + (end - before))

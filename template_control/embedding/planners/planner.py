@@ -17,7 +17,7 @@ from template_control.checks.fitting import answered, answered_or_none, name_of
 from template_control.checks.ranges import Shape
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
-from template_control.slip.control.stride_solver import EndOfStride
+from template_control.slip.control.stride_solver import StrideEnd
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
@@ -105,7 +105,7 @@ class RestContext(NamedTuple):
         cause: of the question.
     """
 
-    ahead: EndOfStride
+    ahead: StrideEnd
     decision: Decision
     target: Array
     free: Sequence[int]

@@ -14,15 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Index, Interval, NotNegative, Positive
+from template_control.checks.ranges import Index, Interval, Positive
 from template_control.compiled import compiled
 from template_control.embedding.planners.planner import Context, Decision, Planner
 from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.control.least_squares import Search
 from template_control.slip.control.stride_solver import (
-    FromSection,
-    NearbyStrides,
     Prior,
+    solve_stride,
     solve_within_reach,
+    whole,
 )
 from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap
@@ -89,8 +90,6 @@ class RunningOptions(Checked):
         pace: the speed aimed at is at most this far from the present one.
         brake: below the present one at most this far; None: as ``pace``.
         rounds: Gauss-Newton steps.
-        near: in a steady run, a state that is this many tolerances from that of a stride which is
-            solved already is solved to first order about it; 0: every stride is solved anew.
     """
 
     kind: ClassVar[str] = "deadbeat"
@@ -100,7 +99,6 @@ class RunningOptions(Checked):
     pace: Positive = tuned(0.09, SPEED)
     brake: Positive | None = tuned(None, SPEED)
     rounds: Index = tuned(4)
-    near: NotNegative = tuned(0.5)
 
 
 AGILE = RunningOptions(
@@ -109,7 +107,6 @@ AGILE = RunningOptions(
     pace=0.45,
     brake=0.35,
     rounds=10,
-    near=0.0,
 )
 """For great accelerations: the legs change their stiffness further. Motors are at their limits,
 where the smallest difference counts."""
@@ -146,7 +143,7 @@ class RunningPlanner(Planner):
         self._slower = o.pace if o.brake is None else o.brake
         self._climb = _CLIMB * gait.parameters.rest_length
         self._miss = _MISS * self._scale.speed
-        self._strides = NearbyStrides(_TOLERANCE * self._scale.state[:2], o.near)
+        self._weights = np.diag(1.0 / (_TOLERANCE * self._scale.state[:2]))
         # Compile now what a stride would otherwise wait for.
         self.decide(Context(gait.apex))
 
@@ -154,7 +151,6 @@ class RunningPlanner(Planner):
         """See :class:`~.planner.Planner`: back to the gait it was made for, without an offset."""
         self.offset = np.zeros(PADDED)
         self.gait = self._family.reset()
-        self._strides.forget()
 
     def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a running step from apex to apex."""
@@ -165,11 +161,11 @@ class RunningPlanner(Planner):
         near = self._near(z, wanted)
         goal, at_target = self._aim(z, wanted)
         table = self.bounds(z, near, angles)
-        prior = Prior(near.controls, _SLOTS, table, self.options.rounds)
-        stride = FromSection(self._map, z, _SLOTS)
+        prior = Prior(near.controls, _SLOTS, table, Search(self.options.rounds))
+        stride = whole(self._map, z)
 
         def solve(goal: Array) -> tuple[Array, Array | None]:
-            return self._strides.solve(stride, goal, prior)
+            return solve_stride(stride, goal, prior, self._weights)
 
         u, end = solve_within_reach(solve, z, goal, self._miss)
         completed = end is not None

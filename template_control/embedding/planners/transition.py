@@ -25,12 +25,8 @@ from template_control.embedding.planners.planner import (
 )
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import Slot
-from template_control.slip.control.stride_solver import (
-    FromHere,
-    FromSection,
-    Prior,
-    solve_stride,
-)
+from template_control.slip.control.least_squares import Search
+from template_control.slip.control.stride_solver import Prior, solve_stride, whole
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.similarity import Scale, scaled, tuned
@@ -43,7 +39,7 @@ _LEGS = (Slot.K_SC, Slot.K_SD)  # of a gait, before and after the bottom
 TOLERANCE = np.array([0.05, 0.01, 0.1])
 """Errors of dx/dt, y, dy/dt at the end that count as 1 [m/s, m, m/s], of the reference."""
 _TOP_MARGIN = 0.005  # of alpha below asin(y / l0), at which the foot would touch down at once [rad]
-_ROUNDS = 6  # Gauss-Newton steps
+_SEARCH = Search(rounds=6)
 # When a foot has landed: shares of the stiffnesses chosen before.
 _AGAIN = 0.3  # change that counts as 1
 _AGAIN_BOUNDS = (0.5, 2.0)
@@ -125,7 +121,7 @@ class TransitionPlanner(Planner):
         p = before.gait.parameters
         scale = Scale.of(p)
         self.options = scaled(options, scale)
-        self._tolerance = TOLERANCE * scale.state
+        self._weights = np.diag(1.0 / (TOLERANCE * scale.state))
         self._map = ReturnMap(p, stride)
         self.gait = self._first = after(float(before.gait.state[0]))
 
@@ -141,8 +137,7 @@ class TransitionPlanner(Planner):
         wanted = self.gait.state if target is None else target
         size = self._map.dimensions[1]
         prior = self._prior(z, angles)
-        tolerance = self._tolerance[:size]
-        u, end = solve_stride(FromSection(self._map, z, prior.slots), wanted, prior, tolerance)
+        u, end = solve_stride(whole(self._map, z), wanted, prior, self._weights[:size, :size])
         return self._decision(u, end, wanted)
 
     def decide_rest(self, context: RestContext) -> Decision:
@@ -154,9 +149,9 @@ class TransitionPlanner(Planner):
         base = controls[stiff]
         lower, upper = (share * base for share in _AGAIN_BOUNDS)
         table = np.array([base, _AGAIN * base, lower, upper])
-        prior = Prior(controls.copy(), stiff, table, _ROUNDS)
-        tolerance = self._tolerance[: len(target)]
-        u, end = solve_stride(FromHere(ahead, stiff), target, prior, tolerance)
+        prior = Prior(controls, stiff, table, _SEARCH)
+        size = len(target)
+        u, end = solve_stride(ahead, target, prior, self._weights[:size, :size])
         return self._decision(u, end, target)
 
     def _break_into(self, context: RestContext) -> Decision:
@@ -178,9 +173,9 @@ class TransitionPlanner(Planner):
         change = np.where(turns, _BROKEN_TURN, _AGAIN * base)
         u = controls.copy()
         u[own] = gait.controls[[chosen[slot] for slot in own]]
-        prior = Prior(u, slots, np.array([base, change, lower, upper]), _ROUNDS)
-        tolerance = self._tolerance[: len(target)]
-        u, end = solve_stride(FromHere(context.ahead, slots), target, prior, tolerance)
+        prior = Prior(u, slots, np.array([base, change, lower, upper]), _SEARCH)
+        size = len(target)
+        u, end = solve_stride(context.ahead, target, prior, self._weights[:size, :size])
         return self._decision(u, end, target)
 
     def _decision(self, u: Array, end: Array | None, wanted: Array) -> Decision:
@@ -205,4 +200,4 @@ class TransitionPlanner(Planner):
         lower[turns] = np.minimum(lower[turns], upper[turns])
         change = np.array(o.change) * np.where(turns, 1.0, base)
         table = np.array([np.clip(base, lower, upper), change, lower, upper])
-        return Prior(controls, slots, table, _ROUNDS)
+        return Prior(controls, slots, table, _SEARCH)

@@ -13,7 +13,8 @@ from template_control.embedding.planners.step_search import KneeLoadPenalty, Law
 from template_control.robot.library import load_robot
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, StrideKind
-from template_control.slip.control.stride_solver import improve
+from template_control.slip.control.least_squares import Search
+from template_control.slip.control.stride_solver import Prior, solve_stride, whole
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import ORDER, stride_kernel
 from template_control.slip.dynamics.stride import controls, simulate_stride
@@ -89,22 +90,28 @@ def step_search() -> None:
     choose(law, scratch, _STATE, u, first)
 
 
+def solver() -> None:
+    """The solver of strides."""
+    table = np.array([[_CONTROLS[0]], [1.0], [1.0], [1.2]])
+    prior = Prior(_CONTROLS, [0], table, Search(1))
+    solve_stride(whole(ReturnMap(_TEMPLATE), _STATE), _STATE, prior, np.eye(3))
+
+
 def catch() -> None:
     """The planner of the run that a walk breaks into."""
-    one, square, prior = np.ones(1), np.ones((1, 1)), np.ones((4, 1))
-    improve((one, one, one, square, square), one, one, one, prior, 1.0, 0.0)
     leg_bounds(np.ones(2), np.ones(3), (0.0, 1.0), 1.0, (1.0, 1.0, 1.0), (0.0, 1.0))
 
 
 CONTROL = (
     Part(whole_tick, 9.0),
-    Part(catch, 1.3),
+    Part(catch, 0.5),
 )
 """Compiled functions of a tick of the controller."""
 
 WALK = (
     Part(closed_form_map, 4.2),
     Part(step_search, 6.3),
+    Part(solver, 6.0),
     Part(derivatives, 4.7),
     Part(exact_map, 2.8),
     *CONTROL,

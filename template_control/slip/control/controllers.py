@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot, StrideKind
-from template_control.slip.control.modified_walking import ModifiedMap
+from template_control.slip.control.modified_walking import Aim
 from template_control.slip.control.stride_solver import (
+    LEAST_PULL,
     TARGET_ONLY,
-    FromSection,
     Prior,
-    Step,
+    StrideEnd,
     solve_stride,
+    whole,
 )
 from template_control.slip.dynamics.stride import controls, finite
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
@@ -34,7 +35,6 @@ _TOP_MARGIN = 0.001
 _LANDING = (_ANGLE, _K_SC, _K_SD)
 _REACHED = 1e-3  # residual that counts as reached
 _ACCEPTABLE = 0.05  # residual below which no further start is tried
-_ROUNDS = 20  # of the search from each start
 
 
 @dataclass(frozen=True)
@@ -166,14 +166,15 @@ class Controller:
         self._search_on(ReturnMap(parameters, self.design.stride, kind), weights)
 
     def _search_on(
-        self, step: Step, weights: Sequence[float] | None, compression: float | None = None
+        self, step: ReturnMap, weights: Sequence[float] | None, compression: float | None = None
     ) -> None:
         """Search on a map; ``compression`` is the leg's wanted length at the bottom [m]."""
-        self._step = step
+        self._map = step
+        self._energy: Aim | None = None  # by which kappa_2 is chosen, where it is
         self._compression = [] if compression is None else [compression]
         self._also = (REAR_BOTTOM,) * len(self._compression)
         rows = step.dimensions[1] + len(self._also)
-        self._tolerance = 1.0 / np.sqrt(np.ones(rows) if weights is None else np.asarray(weights))
+        self._weights = np.diag(np.sqrt(np.ones(rows) if weights is None else np.asarray(weights)))
         self._slots = [int(slot) for slot in self.design.free]
         self._table = self.design.table(step.parameters)
         self._grid = self.design.grid(step.parameters)
@@ -196,25 +197,26 @@ class Controller:
         Raises:
             ParameterError: if a state is not finite, or the target is beyond any stride.
         """
-        design, (n, m) = self.design, self._step.dimensions
+        design, (n, m) = self.design, self._map.dimensions
         start, aim = finite("section state", z, n), finite("target", target, m)
         self._check(aim)
         aim = np.append(aim, self._compression)
         table = self._table.copy()
         if self._margin is not None:
-            top = np.arcsin(min(start[1] / self._step.parameters.rest_length, 1.0)) - self._margin
+            top = np.arcsin(min(start[1] / self._map.parameters.rest_length, 1.0)) - self._margin
             turns = self._slots.index(_ANGLE)
             table[2:, turns] = np.minimum(table[2:, turns], top)
-        near = None if guess is None else self._descend(start, aim, table, guess)
+        stride = whole(self._map, start, self._also)._replace(energy=self._energy)
+        near = None if guess is None else self._descend(stride, aim, table, guess)
         if near is not None and near.residual <= (_REACHED if design.dense else _ACCEPTABLE):
             return near
-        costs = self._costs(start, aim)
+        costs = np.array([self._cost(stride, aim, u) for u in self._grid])
         seeds = np.argsort(costs)[: design.seeds]
         if near is not None and design.dense:
             # A seed worse than what is found leads nowhere better.
             seeds = seeds[costs[seeds] <= near.residual**2]
         for seed in seeds:
-            far = self._descend(start, aim, table, self._grid[seed])
+            far = self._descend(stride, aim, table, self._grid[seed])
             if near is None or far.residual < near.residual:
                 near = far
             if near.residual <= _ACCEPTABLE:
@@ -222,29 +224,26 @@ class Controller:
         assert near is not None
         return near
 
-    def _descend(self, z: Array, aim: Array, table: Array, start: Array) -> StepSolution:
+    def _descend(self, stride: StrideEnd, aim: Array, table: Array, start: Array) -> StepSolution:
         """The best controls that are found from some; ``aim`` has the compression too."""
         table[0] = np.clip(start[self._slots], *table[2:])
-        prior = Prior(start, self._slots, table, _ROUNDS, TARGET_ONLY)
-        stride = FromSection(self._step, z, self._slots, self._also)
-        u, _ = solve_stride(stride, aim, prior, self._tolerance)
-        end, outcome = stride.at(u)
+        prior = Prior(start, self._slots, table, TARGET_ONLY, LEAST_PULL)
+        u, _ = solve_stride(stride, aim, prior, self._weights)
+        end, outcome = stride(u)
         residual = np.inf
         if outcome is Outcome.SECTION:
-            residual = float(np.linalg.norm((aim - end) / self._tolerance))
-        predicted = end[: self._step.dimensions[1]].copy()
+            residual = float(np.linalg.norm(self._weights @ (aim - end)))
+        predicted = end[: self._map.dimensions[1]]
         return StepSolution(u, predicted, residual, outcome, residual <= _REACHED)
 
-    def _costs(self, z: Array, aim: Array) -> Array:
-        """(n,) weighted squared errors, as in (36), of the grid; inf where a stride fails."""
-        results, outcomes = self._step.evaluate_many(z, self._grid)
-        ends = results[:, [*range(self._step.dimensions[1]), *self._also]]
-        costs = np.sum(((aim - ends) / self._tolerance) ** 2, axis=1)
-        costs[outcomes != Outcome.SECTION] = np.inf
-        return costs
+    def _cost(self, stride: StrideEnd, aim: Array, u: Array) -> float:
+        """Weighted squared error, as in (36); inf where the stride fails."""
+        end, outcome = stride(u.copy())
+        error = self._weights @ (aim - end)
+        return float(error @ error) if outcome is Outcome.SECTION else np.inf
 
     def _check(self, target: Array) -> None:
-        p = self._step.parameters
+        p = self._map.parameters
         lowest = p.rest_length * np.sin(np.radians(self.design.angles[0]))
         if not target[0] > 0.0:
             raise ParameterError(f"target speed is {target[0]:g} m/s: give a positive one")
@@ -316,11 +315,10 @@ class ModifiedWalking(Controller):
         top_margin: float = 0.05,
     ) -> None:
         k0 = parameters.leg_stiffness
-        step = ModifiedMap(parameters, kind, (stiffness_range[0] * k0, stiffness_range[1] * k0))
-        self._search_on(step, weights)
+        self._search_on(ReturnMap(parameters, self.design.stride, kind), weights)
         if kappa_1 is not None:
             self._grid[:, Slot.K_SC] = kappa_1
-        self._modified = step
+        self._range = k0 * np.array(stiffness_range)
         self._margin = top_margin
 
     def solve(
@@ -330,7 +328,7 @@ class ModifiedWalking(Controller):
         guess: Array | None = None,
     ) -> StepSolution:
         """See :meth:`Controller.solve`; one control seldom reaches all of the target."""
-        self._modified.target = finite("target", target, 3)
+        self._energy = Aim(finite("target", target, 3), self._range)
         return super().solve(z, target, guess)
 
 

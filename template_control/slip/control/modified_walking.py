@@ -12,18 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot, StrideKind
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
 from template_control.slip.dynamics.kernel import Scratch
-from template_control.slip.dynamics.model import Kernel, Model, model_of, stride_kernel
+from template_control.slip.dynamics.model import Kernel, Model, model_of
 from template_control.slip.maps.return_map import (
+    REAR_BOTTOM,
     RESULTS,
     Derivatives,
-    closed_form,
-    new_workspace,
+    MapWorkspace,
     one_stride,
     section_jacobian,
 )
-from template_control.slip.parameters import SlipParameters
+from template_control.slip.maps.section import PADDED
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -122,21 +122,6 @@ def modified_step(
 
 
 @compiled
-def modified_many(
-    kernel: Kernel, kind: int | None, z: Array, aim: Aim, controls: Array, scratch: Scratch
-) -> tuple[Array, IntArray]:
-    """As :func:`modified_step`, from one state with rows of ``controls`` (n, NUM_SLOTS).
-
-    Returns (n, RESULTS) results and (n,) values of the outcomes.
-    """
-    count = controls.shape[0]
-    result, outcome = np.empty((count, RESULTS)), np.empty(count, np.int64)
-    for i in range(count):
-        outcome[i] = modified_step(kernel, kind, z, aim, controls[i], scratch, result[i])
-    return result, outcome
-
-
-@compiled
 def search_angle(
     kernel: Kernel,
     kind: int | None,
@@ -184,60 +169,34 @@ def search_angle(
     return best_outcome, best_alpha, best_kappa, best_residual
 
 
-class ModifiedMap:
-    """The VLO return map with kappa_2 by (38), as a :class:`~.stride_solver.Step`.
+@compiled
+def modified_jacobian(
+    at: tuple[Kernel, int | None, Array, Aim],
+    controls: Array,
+    columns: IntArray,
+    work: MapWorkspace,
+    found: Derivatives,
+) -> int:
+    """As :func:`~template_control.slip.maps.return_map.section_jacobian`, with kappa_2 of (38).
 
-    The methods overwrite kappa_2 [N/m], kept in ``stiffness_range``, in the controls they are
-    given; it aims at the energy of ``target``, a (3,) VLO state.
-    """
-
-    dimensions = (3, 3)
-
-    def __init__(
-        self, parameters: SlipParameters, kind: MapKind, stiffness_range: tuple[float, float]
-    ) -> None:
-        self.parameters = parameters
-        self.target = np.zeros(3)
-        self._range = np.array(stiffness_range)
-        self._kernel = stride_kernel(parameters, StrideKind.WALK), closed_form(kind)
-        self._work = new_workspace()
-
-    @property
-    def _aim(self) -> Aim:
-        return Aim(self.target, self._range)
-
-    def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
-        """See :meth:`~.stride_solver.Step.evaluate`."""
-        result = np.empty(RESULTS)
-        outcome = modified_step(*self._kernel, z, self._aim, u, self._work.scratch, result)
-        return result, Outcome(outcome)
-
-    def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
-        """See :meth:`~.stride_solver.Step.evaluate_many`."""
-        found: tuple[Array, IntArray] = modified_many(
-            *self._kernel, z, self._aim, u, self._work.scratch
-        )
-        return found
-
-    def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
-        """See :meth:`~.stride_solver.Step.derivatives`; kappa_2 of (38) varies along with u.
+    ``at`` is kernel, kind, z and aim of :func:`modified_step`, whose ``controls`` have kappa_2. Its
+    column is the last one; along with the others it varies by
 
         dkappa_2 = ((kappa_1 - kappa_2) dmu_3 + (mu_3 - mu_2) dkappa_1) / (mu_3 - mu_1).
-        """
-        result, outcome = self.evaluate(z, u)
-        if outcome is not Outcome.SECTION:
-            return result, np.full((RESULTS, len(columns)), np.nan), outcome
-        # kappa_2 comes last: how it varies follows from the legs' lengths at the bottom.
-        every = np.append(columns, 3 + _K_SD)
-        found = Derivatives(np.empty(RESULTS), np.empty((RESULTS, len(every))))
-        section_jacobian(*self._kernel, np.array(z), np.array(u), every, self._work, found)
-        jacobian = found.jacobian[:, :-1]
-        low, high = self._range
-        if low < u[_K_SD] < high:
-            compressed = self.parameters.rest_length - result[4:6]
-            released = self.parameters.rest_length - np.array([z[1], self.target[1]])
-            mu_2, mu_1 = np.square(released)
-            mu_3, mu_3_slopes = compressed @ compressed, -2.0 * compressed @ jacobian[4:6]
-            slopes = (u[_K_SC] - u[_K_SD]) * mu_3_slopes + (mu_3 - mu_2) * (columns == 3 + _K_SC)
-            jacobian = jacobian + np.outer(found.jacobian[:, -1], slopes / (mu_3 - mu_1))
-        return result, jacobian, outcome
+    """
+    kernel, kind, z, aim = at
+    outcome = section_jacobian(kernel, kind, z, controls, columns, work, found)
+    result, jacobian, last = found.result, found.jacobian, columns.shape[0] - 1
+    rest, kappa_1, kappa_2 = kernel.rest_length, controls[_K_SC], controls[_K_SD]
+    if not aim.stiffness_range[0] < kappa_2 < aim.stiffness_range[1]:
+        return outcome
+    mu_1, mu_2, mu_3 = (rest - aim.target[1]) ** 2, (rest - z[1]) ** 2, 0.0
+    for leg in range(REAR_BOTTOM, REAR_BOTTOM + 2):
+        mu_3 += (rest - result[leg]) ** 2
+    for c in range(last):
+        slope = mu_3 - mu_2 if columns[c] == PADDED + _K_SC else 0.0
+        for leg in range(REAR_BOTTOM, REAR_BOTTOM + 2):
+            slope -= 2.0 * (kappa_1 - kappa_2) * (rest - result[leg]) * jacobian[leg, c]
+        for i in range(RESULTS):
+            jacobian[i, c] += jacobian[i, last] * slope / (mu_3 - mu_1)
+    return outcome

@@ -179,10 +179,12 @@ class StrideSimulator:
         self._edges = [
             {int(e.event): _described(n.name, e) for e in n.edges} for n in automaton.nodes
         ]
-        self._kernels = {
-            name: plain(Kernel(automaton.tables, *self._model, node=index))
-            for name, index in automaton.index.items()
-        }
+        self._kernels = {name: plain(self.kernel(name)) for name in automaton.index}
+
+    def kernel(self, start: str) -> Kernel:
+        """The compiled stride's input for strides from a node."""
+        index = self.automaton.index[start]
+        return Kernel(self.automaton.tables, *self._model, node=index)
 
     def run(
         self,

@@ -93,10 +93,12 @@ def _branch(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratc
 
 @inner
 def _begin(z: Array, scratch: Scratch) -> None:
-    """Put a stride's start (3,) dx/dt, y, dy/dt over the origin, where both toes are."""
+    """Put a stride's start over the origin, where both toes are, or where it says."""
     state = scratch.state
     state[0], state[1], state[2], state[3] = 0.0, z[1], z[0], z[2]
     scratch.toes[0] = scratch.toes[1] = 0.0
+    if z.shape[0] > PADDED:
+        state[0], scratch.toes[0], scratch.toes[1] = z[3], z[4], z[5]
     scratch.lengths[0] = scratch.lengths[1] = scratch.lengths[2] = np.nan
 
 
@@ -122,7 +124,8 @@ def one_stride(
     Args:
         kernel: automaton, template and the stride's first node.
         kind: from :func:`closed_form`.
-        z: (3,) dx/dt, y, dy/dt at the section [m/s, m, m/s]; dy/dt is 0 at apex.
+        z: (3,) dx/dt, y, dy/dt at the section [m/s, m, m/s]; dy/dt is 0 at apex. Within a stride
+            (6,): also x of CoM, rear and front toe [m].
         controls: (NUM_SLOTS,) u by Slot.
         scratch: overwritten.
         result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance
@@ -318,6 +321,7 @@ class ReturnMap:
     Attributes:
         sections: the sections that a stride starts from and ends at.
         dimensions: sizes n and m of the states at these sections.
+        kernel, work: for compiled code, what a stride is run with and its arrays.
 
     Raises:
         ParameterError: if there is no such stride.
@@ -338,8 +342,8 @@ class ReturnMap:
         begin, end = automaton.sections(start)
         self.sections = section_of(begin), section_of(end)
         self.dimensions = self.sections[0].dimension, self.sections[1].dimension
-        self._kernel = stride_kernel(parameters, stride, automaton), closed_form(self.kind)
-        self._work = new_workspace()
+        self.kernel = stride_kernel(parameters, stride, automaton), closed_form(self.kind)
+        self.work = new_workspace()
 
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:
         """One stride without checks, for inner loops.
@@ -354,7 +358,7 @@ class ReturnMap:
         """
         result = np.empty(RESULTS)
         outcome = section_map(
-            *self._kernel, self.sections[0].padded(z), u, self._work.scratch, result
+            *self.kernel, self.sections[0].padded(z), u, self.work.scratch, result
         )
         return result, Outcome(outcome)
 
@@ -363,13 +367,9 @@ class ReturnMap:
         result, outcome = self.evaluate(z, u)
         return result[: self.dimensions[1]], outcome
 
-    def evaluate_many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
-        """As :meth:`evaluate` for controls ``u`` (n, NUM_SLOTS) from one state ``z``."""
-        return self._many(np.tile(self.sections[0].padded(z), (len(u), 1)), u)
-
     def _many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
         result, outcome = np.empty((len(z), RESULTS)), np.empty(len(z), dtype=np.int64)
-        map_many(*self._kernel, z, u, self._work.scratch, result, outcome)
+        map_many(*self.kernel, z, u, self.work.scratch, result, outcome)
         return result, outcome
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
@@ -386,7 +386,7 @@ class ReturnMap:
         found = Derivatives(np.empty(RESULTS), np.empty((RESULTS, len(columns))))
         # A closed form moves both to and fro.
         padded, controls = np.array(self.sections[0].padded(z)), np.array(u)
-        outcome = section_jacobian(*self._kernel, padded, controls, columns, self._work, found)
+        outcome = section_jacobian(*self.kernel, padded, controls, columns, self.work, found)
         return *found, Outcome(outcome)
 
     def __call__(self, z: ArrayLike, u: ArrayLike) -> Mapped:

@@ -5,16 +5,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.control.least_squares import Search, bounded_step
 from template_control.slip.control.stride_solver import (
-    FromHere,
-    FromSection,
+    LEAST_PULL,
+    TARGET_ONLY,
     Prior,
-    bounded_step,
+    StrideEnd,
     solve_stride,
+    whole,
 )
+from template_control.slip.dynamics.stride import StrideSimulator
+from template_control.slip.gaits.gait import gait_from_energy
 from template_control.slip.gaits.running_gait import running_gait
-from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.return_map import ReturnMap, new_workspace
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -24,6 +30,8 @@ SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]
 BASE = GAIT.controls[SLOTS]
 CHANGE = np.array([0.02, 0.15 * BASE[1], 0.15 * BASE[2]])
 TOLERANCE = np.array([0.02, 0.004])
+WEIGHTS = np.diag(1.0 / TOLERANCE)
+WALK = gait_from_energy(P, 0.98, 820.0)
 
 
 def prior(lower=0.8, upper=1.25, slots=SLOTS, **other):
@@ -32,9 +40,8 @@ def prior(lower=0.8, upper=1.25, slots=SLOTS, **other):
     low, high = np.minimum(lower * base, base), np.maximum(upper * base, base)
     if slots[0] == Slot.TOUCHDOWN_ANGLE:
         low[0], high[0] = base[0] - 0.1, min(base[0] + 0.1, np.arcsin(GAIT.apex[1]) - 0.005)
-    values = {"rounds": 8, **other}
     table = np.array([base, change, low, high])
-    return Prior(GAIT.controls.copy(), list(slots), table, **values)
+    return Prior(GAIT.controls, slots, table, Search(**{"rounds": 8, **other}))
 
 
 def cost(u, aim, its):
@@ -46,7 +53,7 @@ def cost(u, aim, its):
 
 
 def test_the_target_that_the_base_reaches_leaves_it_alone():
-    u, end = solve_stride(FromSection(STEP, GAIT.apex, SLOTS), GAIT.apex, prior(), TOLERANCE)
+    u, end = solve_stride(whole(STEP, GAIT.apex), GAIT.apex, prior(), WEIGHTS)
     np.testing.assert_allclose(u, GAIT.controls, rtol=1e-9)
     np.testing.assert_allclose(end, GAIT.apex, atol=1e-9)
 
@@ -58,7 +65,7 @@ AIMS = {"faster": st.floats(-0.3, 0.3), "higher": st.floats(-0.03, 0.03)}
 @settings(max_examples=40, deadline=None)
 def test_it_lowers_the_cost_within_its_bounds(faster, higher):
     aim, its = GAIT.apex + [faster, higher], prior()
-    u, end = solve_stride(FromSection(STEP, GAIT.apex, SLOTS), aim, its, TOLERANCE)
+    u, end = solve_stride(whole(STEP, GAIT.apex), aim, its, WEIGHTS)
     assert np.all(u[SLOTS] >= its.lower)
     assert np.all(u[SLOTS] <= its.upper)
     np.testing.assert_array_equal(u[3:], GAIT.controls[3:])
@@ -70,7 +77,7 @@ def test_it_lowers_the_cost_within_its_bounds(faster, higher):
 @settings(max_examples=40, deadline=None)
 def test_no_control_near_by_is_cheaper(faster, higher, seed):
     aim, its = GAIT.apex + [faster / 5, higher / 5], prior(rounds=20)
-    u, _ = solve_stride(FromSection(STEP, GAIT.apex, SLOTS), aim, its, TOLERANCE)
+    u, _ = solve_stride(whole(STEP, GAIT.apex), aim, its, WEIGHTS)
     other = u.copy()
     change = its.change * np.random.default_rng(seed).normal(0.0, 0.05, 3)
     other[SLOTS] = np.clip(u[SLOTS] + change, its.lower, its.upper)
@@ -86,64 +93,65 @@ def test_a_brake_is_found_where_whole_steps_fail(speed):
     change = np.array([0.03, 0.3 * base[1], 0.3 * base[2]])
     low, high = base * [0.0, 0.4, 0.4], base * [0.0, 2.5, 2.5]
     low[0], high[0] = base[0] - 0.1, min(base[0] + 0.1, np.arcsin(start[1]) - 0.005)
-    its = Prior(GAIT.controls.copy(), SLOTS, np.array([base, change, low, high]), 10)
-    _, end = solve_stride(FromSection(STEP, start, SLOTS), aim, its, TOLERANCE)
+    its = Prior(GAIT.controls.copy(), SLOTS, np.array([base, change, low, high]), Search(10))
+    _, end = solve_stride(whole(STEP, start), aim, its, WEIGHTS)
     assert np.all(np.abs(end - aim) < [0.06, 0.002])
 
 
-def test_differences_agree_with_exact_derivatives():
-    def ahead(u):
-        return STEP.step(GAIT.apex, u)
-
-    exact = STEP.linearise(GAIT.apex, GAIT.controls)
-    size = GAIT.controls[SLOTS]
-    for stride in (FromSection(STEP, GAIT.apex, SLOTS), FromHere(ahead, SLOTS)):
-        end, jacobian, outcome = stride.slopes(GAIT.controls)
-        assert outcome is Outcome.SECTION
-        np.testing.assert_allclose(end, exact.state, atol=1e-12)
-        np.testing.assert_allclose(
-            jacobian * size, exact.control_jacobian[:, SLOTS] * size, atol=1e-4
-        )
-        np.testing.assert_array_equal(stride.at(GAIT.controls)[0], end)
+def rest_of_a_step(controls, time=0.3):
+    """The rest of a walking step, from ``time`` on, and the simulator that ends it."""
+    simulator, start = StrideSimulator(P), STRIDE_START["w"]
+    stride = simulator.run(start, VLO.state(WALK.vlo), WALK.controls)
+    x, y, dx, dy = stride.sample(time)[0, :4]
+    at = np.searchsorted(stride.meta[:, 0], time, side="right") - 1
+    node, toes = stride.nodes(time)[0], stride.meta[at, 3:5]
+    state = np.array([dx, y, dy, x, *toes])
+    rest = StrideEnd(simulator.kernel(node), None, state, np.arange(3), new_workspace())
+    return rest, simulator.run(node, [x, y, dx, dy], controls, toes)
 
 
-def test_an_end_that_a_difference_spoils_is_told():
-    def brittle(u):
-        return GAIT.apex, Outcome.SECTION if u[1] == GAIT.controls[1] else Outcome.FALL
+@pytest.mark.parametrize("time", [0.05, 0.3, 0.38])
+def test_the_rest_of_a_stride_ends_as_the_simulator_says(time):
+    u = WALK.controls * [1.0, 1.05, 0.9, 1.0, 1.0, 1.0]
+    rest, stride = rest_of_a_step(u, time)
+    end, outcome = rest(u)
+    assert outcome is stride.outcome
+    np.testing.assert_allclose(end, VLO.of(stride.state), rtol=0.0, atol=1e-12)
 
-    _, jacobian, outcome = FromHere(brittle, SLOTS).slopes(GAIT.controls)
-    assert outcome is Outcome.FALL
-    assert not jacobian.any()
+
+@pytest.mark.parametrize("time", [0.05, 0.3])
+def test_the_rest_of_a_stride_is_led_back_to_where_it_ended(time):
+    u = WALK.controls.copy()
+    rest, _ = rest_of_a_step(u, time)
+    aim, _ = rest(u)
+    slot = [int(Slot.K_SD)]
+    base = 0.9 * u[slot]
+    table = np.array([base, 10.0 * base, 0.5 * base, 2.0 * base])
+    found, end = solve_stride(rest, aim, Prior(u, slot, table, TARGET_ONLY, LEAST_PULL), np.eye(3))
+    np.testing.assert_allclose(found, u, rtol=1e-8)
+    np.testing.assert_allclose(end, aim, rtol=0.0, atol=1e-9)
 
 
 def test_a_grid_is_tried_where_the_base_fails_and_none_is_said_where_it_does_too():
-    good = GAIT.controls[SLOTS]
-
-    def ahead(u):
-        near = np.all(np.abs(u[SLOTS] / good - 1.0) < 0.15)
-        return (GAIT.apex, Outcome.SECTION) if near else (np.zeros(2), Outcome.FALL)
-
-    base = good * [1.0, 1.4, 1.4]
-    wide = Prior(GAIT.controls, SLOTS, np.array([base, CHANGE, good * 0.6, good * 1.4]), 3)
-    u, end = solve_stride(FromHere(ahead, SLOTS), GAIT.apex, wide, TOLERANCE)
+    stride, good = whole(STEP, GAIT.apex), GAIT.controls[SLOTS]
+    base = good * [0.6, 1.0, 1.0]  # so flat that the leg slips through
+    assert stride(np.array([*base, *GAIT.controls[3:]]))[1] is not Outcome.SECTION
+    table = np.array([base, CHANGE, good * 0.6, good * [1.0, 1.4, 1.4]])
+    u, end = solve_stride(stride, GAIT.apex, Prior(GAIT.controls, SLOTS, table, Search(3)), WEIGHTS)
     assert end is not None
-    assert ahead(u)[1] is Outcome.SECTION
+    np.testing.assert_allclose(stride(u)[0], end)
     table = np.array([base, CHANGE, base * 0.98, base * 1.02])
-    narrow = Prior(GAIT.controls, SLOTS, table, 3)
-    u, end = solve_stride(FromHere(ahead, SLOTS), GAIT.apex, narrow, TOLERANCE)
+    u, end = solve_stride(stride, GAIT.apex, Prior(GAIT.controls, SLOTS, table, Search(3)), WEIGHTS)
     assert end is None
     np.testing.assert_array_equal(u[SLOTS], base)
 
 
 def test_it_shortens_a_step_that_goes_where_the_stride_fails():
-    def ahead(u):
-        value = u[Slot.K_SC] / GAIT.controls[Slot.K_SC]
-        return np.array([value]), Outcome.SECTION if value < 1.2 else Outcome.FALL
-
-    its = prior(slots=[int(Slot.K_SC)], lower=0.5, upper=2.0, rounds=8)
-    u, end = solve_stride(FromHere(ahead, its.slots), np.array([1.8]), its, np.array([0.01]))
-    assert 1.15 < end[0] < 1.2
-    assert u[Slot.K_SC] == pytest.approx(end[0] * GAIT.controls[Slot.K_SC])
+    # An apex so fast that no single stride gets there: whole steps end in strides that fail.
+    aim, its = GAIT.apex + [3.0, 0.0], prior(lower=0.1, upper=10.0, rounds=20)
+    u, end = solve_stride(whole(STEP, GAIT.apex), aim, its, WEIGHTS)
+    assert end is not None
+    assert cost(u, aim, its) < cost(GAIT.controls, aim, its)
 
 
 @given(seed=st.integers(0, 10_000))
