@@ -26,7 +26,7 @@ from template_control.embedding.recovery import Recovery
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Node
-from template_control.slip.control.stride_solver import StrideEnd
+from template_control.slip.control.stride_solver import StrideEnd, rest
 from template_control.slip.dynamics.stride import Stride, StrideSimulator
 from template_control.slip.maps.return_map import new_workspace
 from template_control.slip.maps.section import Section, section_of
@@ -313,11 +313,7 @@ class TemplateRollout:
 
     def ahead(self, node: Node, sensed: TemplateState) -> StrideEnd:
         """End of the present stride from here, by its controls."""
-        end = section_of(self.automaton.sections(node.name)[1])
-        x, y, dx, dy = sensed.state.tolist()
-        start = np.array([dx, y, dy, x, *_toes(sensed)])
-        kernel = self._simulator.kernel(node.name)
-        return StrideEnd(kernel, None, start, np.arange(end.dimension), self._work)
+        return rest(self._simulator, node.name, sensed.state, _toes(sensed), self._work)
 
     def at_section(self, section: Section, sensed: TemplateState, last: SectionReport) -> Array:
         """(n,) section state that the template passes through, a little before or after it.

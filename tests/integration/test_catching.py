@@ -18,9 +18,11 @@ from template_control.embedding.state import EstimatorState, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON, RUN_ON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
-from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.control.stride_solver import rest
+from template_control.slip.dynamics.stride import StrideSimulator, simulate_stride
 from template_control.slip.gaits.running_gait import running_gait, running_speeds
 from template_control.slip.gaits.walking_by_speed import walking_gait
+from template_control.slip.maps.return_map import new_workspace
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import SteadyRoute
@@ -156,11 +158,7 @@ def test_a_stride_that_is_broken_into_comes_near_its_target(turn):
     planner = default_planners(SteadyRoute.of(WALK))["wr"]
     node, state = AUTOMATON.node("SS_av^wr"), VLO.state([1.9, 0.985, 0.1])
     u, target = WALK.controls, running_gait(P, 1.9).apex
-
-    def ahead(u):
-        stride = simulate_stride(P, node.name, state, u)
-        return APEX.of(stride.state), stride.outcome
-
+    ahead = rest(StrideSimulator(P), node.name, state, (0.0, 0.0), new_workspace())
     free = [int(Slot.TOUCHDOWN_ANGLE), *free_controls(AUTOMATON, node)]
     left = Decision(u, WALK.vlo, True, True, True)
     decision = planner.decide_rest(RestContext(ahead, left, target, free, turn, Cause.RECOVERY))

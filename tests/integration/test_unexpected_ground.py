@@ -16,7 +16,9 @@ from template_control.embedding.replanning import (
 from template_control.embedding.state import TemplateState
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
+from template_control.slip.control.stride_solver import rest
 from template_control.slip.dynamics.stride import StrideSimulator
+from template_control.slip.maps.return_map import new_workspace
 from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import Scale
@@ -49,12 +51,7 @@ def landing(gait, height):
     state[1] -= max(height, 0.0)
     fall = max(-height, 0.0)
     state[2:] *= np.sqrt(1.0 + 2.0 * gait.parameters.gravity * fall / (state[2:] @ state[2:]))
-
-    def ahead(u):
-        rest = simulator.run("DS_sc^w", state, u, toes)
-        return VLO.of(rest.state), rest.outcome
-
-    return ahead
+    return rest(simulator, "DS_sc^w", state, toes, new_workspace())
 
 
 def test_legs_push_longer_after_a_step_up(gait):

@@ -20,6 +20,7 @@ from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
 from template_control.slip.control.modified_walking import Aim, modified_jacobian, modified_step
 from template_control.slip.dynamics.model import Kernel
+from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.return_map import (
     RESULTS,
     Derivatives,
@@ -29,7 +30,7 @@ from template_control.slip.maps.return_map import (
     section_jacobian,
     section_map,
 )
-from template_control.slip.maps.section import PADDED
+from template_control.slip.maps.section import PADDED, section_of
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -73,6 +74,20 @@ def whole(step: ReturnMap, z: Array, also: tuple[int, ...] = ()) -> StrideEnd:
     """A whole stride from z (n,), whose end has ``also`` these of the map's results."""
     ends = np.array([*range(step.dimensions[1]), *also])
     return StrideEnd(*step.kernel, step.sections[0].padded(z), ends, step.work)
+
+
+def rest(
+    simulator: StrideSimulator,
+    node: str,
+    state: Sequence[float] | Array,
+    toes: Sequence[float] | Array,
+    work: MapWorkspace,
+) -> StrideEnd:
+    """The rest of a stride from a node on, where ``state`` (4,) and ``toes`` (2,) are its own."""
+    x, y, dx, dy = state
+    start, end = np.array([dx, y, dy, x, *toes]), simulator.automaton.sections(node)[1]
+    ends = np.arange(section_of(end).dimension)
+    return StrideEnd(simulator.kernel(node), None, start, ends, work)
 
 
 class StrideProblem(NamedTuple):
@@ -266,19 +281,19 @@ def solve_stride(
     chosen = [] if stride.energy is None else [int(Slot.K_SD)]
     columns = np.array([PADDED + slot for slot in (*prior.slots, *chosen)])
     problem = StrideProblem(
-        stride,
-        aim,
-        weights,
-        u,
-        slots,
-        prior.base,
-        prior.change,
-        prior.lower,
-        prior.upper,
-        prior.pull,
-        np.empty(RESULTS),
-        columns,
-        np.empty((RESULTS, len(columns))),
+        stride=stride,
+        aim=aim,
+        weights=weights,
+        controls=u,
+        slots=slots,
+        base=prior.base,
+        change=prior.change,
+        lower=prior.lower,
+        upper=prior.upper,
+        pull=prior.pull,
+        result=np.empty(RESULTS),
+        columns=columns,
+        jacobian=np.empty((RESULTS, len(columns))),
     )
     x = prior.base.copy()
     if _solve(problem, prior.search, x) < np.inf:

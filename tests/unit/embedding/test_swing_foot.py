@@ -143,7 +143,7 @@ def test_a_foot_that_meets_a_wall_late_goes_down_before_it():
 )
 def test_a_foot_that_comes_down_and_is_nearly_there_is_set_down(speed, foothold, rises):
     """One that rises only begins its swing, and a short step ends near its beginning."""
-    swing = SwingFoot(SwingOptions())
+    swing = SwingFoot(SwingOptions(near=0.05))
     swing.start(np.array([0.5, 0.03]), np.array([0.3, speed]))
     for _ in range(20):
         meet(swing, (0.5, 0.02), foothold, 0.07)

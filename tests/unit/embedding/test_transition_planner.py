@@ -29,10 +29,11 @@ from template_control.embedding.state import EstimatorState, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
+from template_control.slip.control.stride_solver import rest
 from template_control.slip.dynamics.stride import StrideSimulator, simulate_stride
 from template_control.slip.gaits.running_gait import running_gait, running_speeds
 from template_control.slip.gaits.walking_by_speed import walking_gait
-from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.return_map import ReturnMap, new_workspace
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal
@@ -160,29 +161,23 @@ def middle(stride, z, section, u, event):
     return node, whole.sample(at)[0, :4], whole.meta[row, 3:5]
 
 
-def ahead_from(node, state, toes, section):
-    simulator = StrideSimulator(P)
-
-    def ahead(u):
-        stride = simulator.run(node, state, u, toes)
-        return section.of(stride.state), stride.outcome
-
-    return ahead
+def ahead_from(node, state, toes):
+    return rest(StrideSimulator(P), node, state, toes, new_workspace())
 
 
 CASES = {
-    "wr": (walk_to_run(), WALK.vlo, VLO, Event.VIRTUAL_BOTTOM, APEX, runs(1.4).apex),
-    "rw": (run_to_walk(), runs(1.3).apex, APEX, Event.TOUCHDOWN, VLO, np.array([1.0, 0.97, 0.0])),
+    "wr": (walk_to_run(), WALK.vlo, VLO, Event.VIRTUAL_BOTTOM, runs(1.4).apex),
+    "rw": (run_to_walk(), runs(1.3).apex, APEX, Event.TOUCHDOWN, np.array([1.0, 0.97, 0.0])),
 }
 
 
 @pytest.mark.parametrize("stride", CASES)
 def test_what_is_chosen_within_a_stride_is_what_the_whole_stride_does(stride):
-    planner, z, begin, event, end, target = CASES[stride]
+    planner, z, begin, event, target = CASES[stride]
     first = planner.decide(Context(z))
     node, state, toes = middle(stride, z, begin, first.controls, event)
     free = free_controls(AUTOMATON, AUTOMATON.node(node))
-    ahead = ahead_from(node, state, toes, end)
+    ahead = ahead_from(node, state, toes)
     again = planner.decide_rest(RestContext(ahead, first, target, free))
     assert again.feasible
     kept = [slot for slot in Slot if slot not in free]
@@ -198,11 +193,11 @@ def test_what_is_chosen_within_a_stride_is_what_the_whole_stride_does(stride):
 
 
 def test_a_leg_that_has_landed_elsewhere_gets_other_stiffnesses():
-    planner, z, begin, event, end, target = CASES["rw"]
+    planner, z, begin, event, target = CASES["rw"]
     first = planner.decide(Context(z, target))
     node, state, toes = middle("rw", z, begin, first.controls, event)
     state[2] += 0.1  # faster than planned
-    ahead = ahead_from(node, state, toes, end)
+    ahead = ahead_from(node, state, toes)
     again = planner.decide_rest(
         RestContext(ahead, first, target, free_controls(AUTOMATON, AUTOMATON.node(node)))
     )
@@ -255,9 +250,8 @@ def test_where_the_rest_cannot_be_done_the_controls_stay():
     planner, z, *_, target = CASES["rw"]
     first = planner.decide(Context(z, target))
 
-    def fails(u):
-        return np.zeros(3), Outcome.FALL
-
+    # With any legs it falls.
+    fails = ahead_from("SS_sc^rw", [0.0, 0.6, 1.0, -8.0], (-0.3, 0.3))
     again = planner.decide_rest(RestContext(fails, first, target, [Slot.K_SC, Slot.K_SD]))
     assert isinstance(again, Decision)
     assert not again.feasible

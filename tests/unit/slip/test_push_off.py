@@ -10,9 +10,10 @@ from template_control.embedding.planners.planner import Cause, Context, RestCont
 from template_control.embedding.replanning import free_controls
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome, Phase, Slot
+from template_control.slip.control.stride_solver import rest
 from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import vlo_jacobians, with_push_off, without_push_off
-from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.return_map import ReturnMap, new_workspace
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
@@ -135,10 +136,7 @@ def test_a_push_in_double_stance_is_answered_at_once(pushing, push):
     state = first.sample(np.array([time]))[0, :4] + [0.0, 0.0, push, 0.0]
     toes = (float(first.meta[-1, 3]) - pushing.step_length, float(first.meta[-1, 3]))
 
-    def ahead(u):
-        rest = simulator.run(node, state, u, toes)
-        return VLO.of(rest.state), rest.outcome
-
+    ahead = rest(simulator, node, state, toes, new_workspace())
     free = free_controls(AUTOMATON, AUTOMATON.node(node))
     again = planner.decide_rest(RestContext(ahead, decision, pushing.vlo, free))
     left, better = (abs(ahead(d.controls)[0][0] - pushing.vlo[0]) for d in (decision, again))
@@ -153,9 +151,8 @@ def test_where_nothing_completes_the_step_that_is_told(pushing):
     planner = LqrPlanner(pushing)
     decision = planner.decide(Context(pushing.vlo))
 
-    def fails(u):
-        return np.full(3, np.nan), Outcome.FALL
-
+    down = [0.0, 0.6, 1.0, -5.0]  # with any legs it falls
+    fails = rest(StrideSimulator(P), "DS_sc^wp", down, (-0.3, 0.3), new_workspace())
     lost = planner.decide_rest(RestContext(fails, decision, pushing.vlo, [int(Slot.K_PUSH)]))
     assert not lost.feasible
     assert not lost.nominal
