@@ -87,7 +87,7 @@ def test_record_survives_the_disk(tmp_path):
 
 def test_a_failed_stride_ends_the_run_and_is_told():
     scenario = Scenario(
-        segments=(Segment("walk", speed=1.1, steps=1), Segment("run", speed=9.0, steps=3))
+        segments=(Segment("walk", speed=1.1, steps=1), Segment("run", speed=15.0, steps=3))
     )
     record = simulate_scenario(scenario)
     assert not record.completed

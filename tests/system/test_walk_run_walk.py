@@ -99,7 +99,7 @@ def test_five_link_holds_pushes_within_both_transitions(pushes):
 
 @pytest.mark.slow(seconds=14)
 def test_five_link_holds_pushes_while_it_accelerates_and_decelerates():
-    pushes = (tc.Push(-20.0, 14, 0.5), tc.Push(20.0, 34, 0.6))
+    pushes = (tc.Push(-21.0, 14, 0.5), tc.Push(21.0, 34, 0.6))
     record = go("walk_run_walk.toml", "five-link", pushes=pushes)
     check(record)
     kinds = strides(record)
