@@ -38,16 +38,20 @@ def run(options: argparse.Namespace) -> int:
 
 
 def scenarios() -> None:
-    """The paper's controllers on all maps: Example I, and a walking step without a guess."""
+    """All maps, and the paper's controllers on them: Example I, and a step without a guess."""
     from template_control.slip.automaton.vocabulary import MapKind
     from template_control.slip.control.controllers import ModifiedWalking
+    from template_control.slip.dynamics.stride import controls
+    from template_control.slip.maps.return_map import ReturnMap
     from template_control.slip.parameters import SlipParameters
     from template_control.slip.scenario.run import simulate_scenario
     from template_control.slip.scenario.scenario import example_one
 
     for kind in MapKind:
         simulate_scenario(example_one(kind))
-        ModifiedWalking(SlipParameters(), kind).solve((1.1, 0.98, 0.0), (1.1, 0.98, 0.0))
+        z, u = (1.1, 0.98, 0.0), controls(1.15, 16e3, 16e3)
+        ModifiedWalking(SlipParameters(), kind).solve(z, z)
+        ReturnMap(SlipParameters(), kind=kind)(z, u)
 
 
 def basins() -> None:
