@@ -10,8 +10,7 @@ contact, f_t each of its tangential ones, of which there is one in the plane and
          low <= a_joint <= high                 only where a joint is near its speed limit
 
 A contact that is a patch, the sole of a flat foot, has six rows: force and moment at its toe. Its
-constraints are those of the wrench that a rectangle can bear (:func:`patch_cone`); its moments have
-a cost of their own.
+constraints are those of a wrench that a rectangle bears (:func:`patch_cone`); its moments cost too.
 
 H is badly conditioned (tasks against regularisers), and a proximal solver is slow along
 its soft directions. So the solver gets the same problem in w = L^T z with H = L L^T, whose
