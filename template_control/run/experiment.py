@@ -21,8 +21,8 @@ from template_control.embedding.free.soles import SoleOptions
 from template_control.embedding.free.trot import TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
+    BIPED_AHEAD,
     FREE_AHEAD,
-    SOLE_AHEAD,
     AheadOptions,
     AheadPlanner,
     check_feasibility,
@@ -301,7 +301,7 @@ class Experiment(Checked):
             push_off = None if isinstance(planner, Mapping) else _pushes_off(planner)
             motion = robot_route(robot, motion, push_off)
         if planner is None and self.free and isinstance(motion, SpeedRoute):
-            planner = SOLE_AHEAD if robot.patches else FREE_AHEAD
+            planner = FREE_AHEAD if robot.paired else BIPED_AHEAD
         if planner is None:
             return motion, default_planners(motion, standing=standing_options(robot))
         if isinstance(planner, Mapping):

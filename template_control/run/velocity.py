@@ -35,6 +35,11 @@ _FASTEST_WALK = 0.38
 """Mean speed over sqrt(g l0) above which a floating base that can run no longer walks: it has the
 room to turn and to step to the left there."""
 
+_SLOWEST_ON_POINTS = 0.27
+"""Mean speed over sqrt(g l0) of the slowest walk of a floating base on two points. A slower step
+lasts longer than 2 sqrt(l0 / g), and what is off to the side grows by nearly tenfold in it. Bolt
+fell on its way down to 0.24 in 3 of 12 trials, at 0.2 as it turned, and at 0.16 straight on."""
+
 _FASTEST_ON_SOLES = 0.31
 """The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of
 0.9 m/s, in whose swings its hips are at the end of their range."""
@@ -183,6 +188,7 @@ class VelocityRange:
             low, high = walking_speeds(robot)
         except GaitError:
             low, high = family_speeds(p)
+        low = max(low, _slowest(robot) * p.speed_unit)
         if robot.patches:
             high = min(high, _FASTEST_ON_SOLES * p.speed_unit)
         speeds = float(np.ceil(100.0 * low)) / 100.0, float(np.floor(100.0 * high)) / 100.0
@@ -221,6 +227,11 @@ def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: B
 def _faces(robot: Biped) -> bool:
     """Whether a robot can face away from its course."""
     return robot.paired or not isinstance(robot, FloatingBaseBiped)
+
+
+def _slowest(robot: Biped) -> float:
+    """Mean speed over sqrt(g l0) of the slowest walk that a robot is commanded, 0 where any is."""
+    return 0.0 if _faces(robot) or robot.patches else _SLOWEST_ON_POINTS
 
 
 def check_direction(
@@ -270,12 +281,14 @@ def velocity_route(
     foreseen = isinstance(motion, VelocityCommand) or motion.foreseen
     velocity = motion if foreseen else VelocityCommand(*motion.at(0.0))
     planar = not isinstance(robot, FloatingBaseBiped)
+    template, changes = template_for(robot), motion.changes
+    slowest = _slowest(robot) * template.speed_unit
 
     def forward(time: float) -> float:
         speed, *others = velocity.at(time)
         check_direction(robot, motion.gaits, speed, *others)
         if not _faces(robot):
-            return speed
+            return max(speed, slowest)
         course = course_at(velocity, time, robot)
         return 0.0 if course.turns_round(robot) else hypot(speed, others[0])
 
@@ -283,7 +296,6 @@ def velocity_route(
         raise ParameterError(
             f"{robot.name} cannot stand on two feet that are points: leave stand out of its gaits"
         )
-    template, changes = template_for(robot), motion.changes
     if "run" in motion.gaits:
         walk = _FASTEST_ON_SOLES if robot.patches else _FASTEST_WALK
         fastest = walking_speeds(robot)[1] if planar else walk * template.speed_unit

@@ -89,11 +89,13 @@ class AheadOptions(Checked):
 
 
 FREE_AHEAD = AheadOptions(ease=0.5, dearest=20.0)
-"""Of a floating base: the sideways motion is that of steps near a gait."""
+"""Of a quadruped: the sideways motion is that of steps near a gait."""
 
-SOLE_AHEAD = replace(FREE_AHEAD, pace=0.09)
-"""Of a robot on soles. Its VLO comes out a little off its plan's: of a gait that is further away
-no plan was cheap in the second step, and the search led G1 to a slow one and to a fall."""
+BIPED_AHEAD = replace(FREE_AHEAD, pace=0.09)
+"""Of a biped with a floating base. Its VLO comes out a little off its plan's: of a gait that is
+further away no plan was cheap in the second step, and the search led G1 to a slow one and to a
+fall, or the foot, on its way down already, was wanted further ahead than Bolt's hips could take it.
+"""
 
 
 class AheadPlanner(Planner):

@@ -7,7 +7,8 @@ import template_control as tc
 from template_control.cli.experiment_options import experiment_from
 from template_control.errors import ParameterError
 from template_control.run.options import HeadingCommand
-from template_control.run.velocity import VelocityRange
+from template_control.run.velocity import VelocityRange, velocity_route
+from template_control.slip.maps.section import VLO
 
 ROWS = ((0.0, 0.5, 0.0, 0.0), (2.0, 0.6, 0.05, 0.2))
 PROFILE = tc.run.VelocityProfile(ROWS, duration=5.0)
@@ -68,6 +69,9 @@ def test_a_robot_is_commanded_what_it_can():
     assert (planar.left, planar.turning) == (0.0, 0.0)
     free = VelocityRange.of(tc.load_floating_robot("bolt"))
     assert (free.left, free.turning) == (0.06, 0.52)
+    slow = tc.run.VelocityProfile(((0.0, 0.3, 0.0, 0.0),), 1.0)
+    route = velocity_route(tc.load_floating_robot("bolt"), slow, HeadingCommand())[1]
+    assert free.speeds[0] == pytest.approx(route.next(VLO, route.start, 0.0).wanted_speed, abs=0.01)
     assert (planar.gaits, planar.run) == (("stand", "walk", "run"), 3.01)
     assert (free.gaits, free.run) == (("walk", "run"), 1.8)
     assert VelocityRange.of(tc.load_robot("rabbit")).gaits == ("stand", "walk")
@@ -75,7 +79,7 @@ def test_a_robot_is_commanded_what_it_can():
 
 @pytest.mark.slow(seconds=12)
 def test_five_link_3d_follows_its_velocities():
-    velocities = ((0.0, 0.8, 0.0, 0.0), (3.0, 1.0, 0.1, 0.2), (10.0, 0.8, -0.1, -0.2))
+    velocities = ((0.0, 0.9, 0.0, 0.0), (3.0, 1.1, 0.1, 0.2), (10.0, 0.9, -0.1, -0.2))
     robot = tc.load_floating_robot("five-link-3d")
     record = tc.simulate(tc.Experiment(robot, motion=tc.run.VelocityProfile(velocities, 20.0)))
     assert not record.fell, record.fall_reason
