@@ -321,7 +321,7 @@ class EmbeddingController:
     def _act(self, dt: float) -> Solution:
         """References, rows and torques."""
         qp, tasks = self.qp, self.mode.tasks
-        room, found = qp.room(self.learners.load.factor), qp.unknowns()
+        room, found = qp.room(self.learners.load.factor), qp.answer_arrays()
         if room is not self._room:
             memory, rows = (*self._memory, self.robot.arrays), (tasks.program, tasks.table)
             self._room, self._kept = room, keep((memory, self._plan, rows, room))

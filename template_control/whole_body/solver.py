@@ -323,7 +323,7 @@ class WholeBodyQp:
         now["contacts"], now["contact"][:count] = count, stance.contacts
         now["cap"][:count], directions = stance.cap, self.robot.contact_rows
         now["force"][:count, :directions] = stance.force.reshape(count, directions)
-        robot, room, found = self.robot, self.room(load), self.unknowns()
+        robot, room, found = self.robot, self.room(load), self.answer_arrays()
         kind = solve_free(self.data, robot.data, robot.arrays, tasks.table, room, found)
         return self.finish(kind, tasks, found)
 
@@ -336,7 +336,7 @@ class WholeBodyQp:
             self._take_load(load)
         return self._rooms[self._contacts[0]]
 
-    def unknowns(self) -> tuple[Array, Array, Array]:
+    def answer_arrays(self) -> tuple[Array, Array, Array]:
         """New arrays for the answer of :func:`.problem.solve_free`, of the stance in ``data``."""
         (nu, nv, rows), empty = self._sizes, np.empty
         return empty(nu), empty(rows * int(self._contacts[0])), empty(nv)

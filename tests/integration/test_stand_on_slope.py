@@ -138,8 +138,15 @@ def test_a_walk_starts_on_the_steepest_ground_of_its_robot(robot, degrees):
 
 
 @pytest.mark.slow(seconds=30)
-@pytest.mark.parametrize("degrees", [-2.0, 3.0])
-@pytest.mark.parametrize("plant", [tc.PlantOptions, tc.MujocoOptions, tc.IdealOptions])
+@pytest.mark.parametrize(
+    ("plant", "degrees"),
+    [
+        (tc.PlantOptions, -2.0),
+        (tc.PlantOptions, 3.0),
+        (tc.MujocoOptions, -2.0),
+        (tc.IdealOptions, 3.0),
+    ],
+)
 def test_a_walk_starts_from_a_stand_on_a_slope(plant, degrees):
     record = walked(plant, degrees)
     assert not record.fell, record.fall_reason

@@ -57,7 +57,7 @@ def test_junk_for_public_functions(tmp_path_factory, data):
 
 @pytest.mark.slow(seconds=100)
 @given(data=st.data())
-@settings(SHARE, max_examples=1000)
+@settings(SHARE, max_examples=500)
 def test_much_junk_for_public_functions(tmp_path_factory, data):
     one_call(data, tmp_path_factory.getbasetemp())
 
@@ -98,6 +98,6 @@ def test_junk_for_commands(place, data):
 
 @pytest.mark.slow(seconds=120)
 @given(data=st.data())
-@settings(SHARE, max_examples=500)
+@settings(SHARE, max_examples=300)
 def test_much_junk_for_commands(place, data):
     one_command(data, *place)

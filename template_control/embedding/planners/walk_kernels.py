@@ -63,7 +63,7 @@ def whole_tick() -> None:
     curve = np.ones((2, 1, ORDER + 1)), np.ones((1, 7)), np.ones(3)
     rows = tasks.program, tasks.table
     kept = keep(((tick, robot.data, *memory, robot.arrays), (curve, None), rows, qp.room(1.0)))
-    act(kept, qp.unknowns(), 1e-3)
+    act(kept, qp.answer_arrays(), 1e-3)
 
 
 def step_search() -> None:
