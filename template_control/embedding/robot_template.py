@@ -9,6 +9,7 @@ import numpy as np
 from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
 from template_control.checks.ranges import Angle, Positive
+from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.standing.curves import StandingOptions
 from template_control.errors import GaitError
 from template_control.robot.biped import Biped
@@ -40,7 +41,6 @@ _STRETCH = 0.903514524055713
 # Of legs that end in an ankle: more bent, the rear one comes to the ankle's stop late in double
 # stance, as its sole is level.
 _SOLE_STRETCH = 0.95
-_APART = 0.22  # lateral distance of two feet that stand, over l0
 _SHIFT = 0.8  # time in which a CoM at rest moves over one of two soles [s], for l0 = 1 m
 _KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in all robots that ran
 _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
@@ -285,7 +285,7 @@ def standing_options(robot: Biped) -> StandingOptions:
     half = robot.half_length / length
     if not robot.patches:
         return StandingOptions(half_length=half)
-    slant = SOLE_SHARE * robot.half_width / (_APART * length)
+    slant = SOLE_SHARE * robot.half_width / (FreeOptions().step_width * length)
     return StandingOptions(half_length=half, slant=slant, shift=_SHIFT)
 
 
