@@ -51,7 +51,7 @@ BOUNDS = np.array(
     [[angle, *[share] * 3] for angle, share in zip(ANGLE_RANGE, STIFFNESS_RANGE, strict=True)]
 )
 """(2, 4) least and greatest alpha relative to the gait's [rad], and stiffnesses over k."""
-_DONE = 0.02  # of the cost: a Gauss-Newton step that lowers or misses it by less is the last
+_DONE = 0.02  # of the cost: a Gauss-Newton step that lowers it by less is the last
 _HALVINGS = 4  # of a Gauss-Newton step that does not lower the cost
 _LESS = 0.5  # of the LQR's feedback, where the template cannot do it
 
@@ -384,12 +384,6 @@ def look_ahead(
             for i in range(size):
                 residual[r] += rows[r, i] * (x[i] - start[i])
         there = bounded_step(rows, residual, x, lower, upper, 0.0)
-        foreseen = 0.0
-        for r in range(residual.shape[0]):
-            left = residual[r]
-            for i in range(size):
-                left += rows[r, i] * (there[i] - x[i])
-            foreseen += left * left
         share, lowered = 1.0, np.inf
         for _ in range(_HALVINGS):
             for i in range(size):
@@ -406,9 +400,8 @@ def look_ahead(
             _roll(p, work, aim, plan)
             residuals(p, plan, target, factor, residual)
             break
-        # A cost that is what the linear residuals had foreseen is one that no other step changes.
-        changes = min(cost - lowered, abs(lowered - foreseen))
+        small = cost - lowered < _DONE * max(lowered, 1.0)
         cost = lowered
-        if changes < _DONE * max(lowered, 1.0):
+        if small:
             break
     return cost, excess(residual)
