@@ -184,13 +184,10 @@ LATEST = 5.0  # [s] after a command has begun that it is stopped
 
 
 def moments(seed):
-    """Ten (command, signal, moment [s]); every command meets every signal."""
-    rng = np.random.default_rng(seed)
-    pairs = [(name, number) for name in COMMANDS for number in SIGNALS]
-    pairs.append(pairs[rng.integers(len(pairs))])
-    return [
-        (*pair, float(at)) for pair, at in zip(pairs, rng.uniform(0.0, LATEST, 10), strict=True)
-    ]
+    """(Command, signal, moment [s]): each command meets two signals, each signal two commands."""
+    pairs = [(n, SIGNALS[(i + k) % 3]) for i, n in enumerate(COMMANDS) for k in range(2)]
+    moments = np.random.default_rng(seed).uniform(0.0, LATEST, len(pairs))
+    return [(*pair, float(at)) for pair, at in zip(pairs, moments, strict=True)]
 
 
 @pytest.mark.slow(seconds=8)

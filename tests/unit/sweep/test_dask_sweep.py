@@ -100,7 +100,9 @@ def test_a_killed_dask_worker_costs_no_result(dask, tmp_path):
     assert sorted(kept(path)) == list(range(COUNT))
 
 
-def test_an_item_that_kills_dask_workers_is_a_failure(dask, tmp_path):
+def test_an_item_that_kills_dask_workers_is_a_failure(dask, tmp_path, monkeypatch):
+    # By default Dask gives up only after the fourth worker.
+    monkeypatch.setattr(dask.cluster.scheduler, "allowed_failures", 0)
     run = partial(quietly, fatal, grid(x=range(4)), tmp_path / "s", dask.get_executor())
     failures = run().failures
     # Dask may blame a call that shared the worker; one at a time, only the culprit is left.
