@@ -121,7 +121,7 @@ class Jacobians(NamedTuple):
 
 
 Sources = tuple[Any, ...]
-"""Views into Pinocchio's data: a plain tuple, with which a call takes half of the time."""
+"""Views into Pinocchio's data, as a plain tuple for :func:`~.structured.keep`."""
 
 
 def sources(
