@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import zipfile
 
 import pytest
 from places import DOCS, ROOT
@@ -158,32 +157,6 @@ def test_the_replay_page_runs_as_printed(tmp_path, run_block, on_path):
         run_block("python", snippet)
     assert (tmp_path / "slow.html").is_file()
     assert (tmp_path / "figures" / "energies.png").is_file()
-
-
-@pytest.mark.slow
-def test_a_wheel_finds_its_robots_elsewhere(tmp_path):
-    pip = [sys.executable, "-m", "pip"]
-    subprocess.run(
-        [*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", str(tmp_path), str(ROOT)],
-        check=True,
-    )
-    (wheel,) = tmp_path.glob("*.whl")
-    names = zipfile.ZipFile(wheel).namelist()
-    assert "template_control/robots/five_link.urdf" in names
-    assert {"template_control/py.typed", "template_control/slip/__init__.pyi"} <= set(names)
-    target = tmp_path / "site"
-    subprocess.run(
-        [*pip, "install", "--quiet", "--no-deps", "--target", str(target), str(wheel)], check=True
-    )
-    code = "import template_control as tc; print(tc.load_robot('five-link').path)"
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(target)},
-    )
-    assert done.stdout.strip() == str(target / "template_control/robots/five_link.urdf")
 
 
 def test_the_readme_is_short():

@@ -63,7 +63,9 @@ def test_no_option_reads_its_value_in_a_way_of_its_own():
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "abc", "", "1e999"])
 def test_a_number_that_is_none_names_its_option(text, refused):
-    for command, flag, count in NUMBERS:
+    # All are read in one way: each text is tried with some of them, and one with all.
+    some = [*NUMBERS[::9], *(number for number in NUMBERS if number[2] > 1)]
+    for command, flag, count in NUMBERS if text == "nan" else some:
         words = [command, *POSITIONALS.get(command, ()), *[f"{flag}={text}"]]
         if count > 1:
             words = [*words[:-1], flag, f" {text}", *["1"] * (count - 1)]
