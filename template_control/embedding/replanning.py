@@ -278,9 +278,10 @@ def _on_unexpected_ground(rollout: TemplateRollout, s: Situation) -> Decision | 
 
 
 def _after_deviation(rollout: TemplateRollout, s: Situation) -> Decision | None:
+    decision = None
     if s.whole:
-        return choose_all_controls(rollout, s, reachable_angles(rollout, s))
-    return choose_stiffnesses(rollout, s)
+        decision = choose_all_controls(rollout, s, reachable_angles(rollout, s))
+    return decision or choose_stiffnesses(rollout, s)
 
 
 class Rule(NamedTuple):

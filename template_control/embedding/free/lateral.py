@@ -34,6 +34,7 @@ from template_control.slip.lateral.placing import (
     LateralAim,
     LateralLearnt,
     Placement,
+    before_turn,
     contact,
     lateral_aim,
     pivot,
@@ -304,7 +305,8 @@ class LateralPlanner:
         """Aim at the next foothold, next to the foot on the side ``stance``, and the one after it.
 
         That foot stands, or stood last; ``turned`` says whether the heading has turned at its
-        section already.
+        section already. A foot that lands shortly after an apex is placed before the turn there;
+        one that lands after a VLO has the time to be placed anew.
         """
         if self._gait is None:
             return
@@ -313,6 +315,8 @@ class LateralPlanner:
             state[1] -= self._lateral.speed * self.wish.turn
         self.data["cycle"] = state
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
+        if self._lateral.ahead and not turned:
+            self._aim = before_turn(self._aim, self._lateral, self.wish.turn)
         self.data["second_step"] = self.cycle.steps[stance.other.row]
         for name, value in self._aim._asdict().items():
             self.data[name] = value

@@ -163,6 +163,8 @@ class LateralMotion:
             turn = -turns
         if section is APEX:
             about[0] = self.robot.space.com[0]
+            if turn:
+                planner.data["placed"] = 0  # in the axes so far
         if turn or turns:
             self._turn(turn, about)
             self.robot.facing += turns

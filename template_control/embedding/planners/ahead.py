@@ -88,13 +88,17 @@ class AheadOptions(Checked):
     dearest: Positive | None = None
 
 
-FREE_AHEAD = AheadOptions(ease=0.5, dearest=20.0)
-"""Of a quadruped: the sideways motion is that of steps near a gait."""
+FREE_AHEAD = AheadOptions(pace=0.15, ease=0.5, dearest=20.0)
+"""Of a quadruped: the sideways motion is that of steps near a gait. Its VLO comes out a little off
+its plan's, most where its speed changes most: at 0.3 m/s a step dy/dt there was 0.07 m/s off, the
+next plan jumped to make up for it, and Go2 fell as it slowed down to its slowest walk. It comes to
+a stand no later.
+"""
 
 BIPED_AHEAD = replace(FREE_AHEAD, pace=0.09)
-"""Of a biped with a floating base. Its VLO comes out a little off its plan's: of a gait that is
-further away no plan was cheap in the second step, and the search led G1 to a slow one and to a
-fall, or the foot, on its way down already, was wanted further ahead than Bolt's hips could take it.
+"""Of a biped with a floating base: of a gait that is further away no plan was cheap in the second
+step, and the search led G1 to a slow one and to a fall, or the foot, on its way down already, was
+wanted further ahead than Bolt's hips could take it.
 """
 
 

@@ -116,6 +116,8 @@ class LateralGait:
         gain: (2,) K of d = d_s - K e.
         speed: dx/dt at the section [m/s].
         width: of its footholds, over the wanted one.
+        length: of its steps [m].
+        ahead: x at an apex, from the foot that stood last [m]; 0 where the section is over it.
     """
 
     a: Array
@@ -124,6 +126,8 @@ class LateralGait:
     gain: Array
     speed: float
     width: float
+    length: float
+    ahead: float
 
     @property
     def open_loop(self) -> ComplexArray:
@@ -169,7 +173,8 @@ def lateral_gait(
     cost = _cost_to_go(a, b, np.array(o.state_cost), o.step_cost)
     gain = (b @ cost @ a) / (o.step_cost + b @ cost @ b)
     width = 1.0 if start.stance else o.running_width
-    return LateralGait(a.copy(), b, cost, gain, float(state[0]), width)
+    ahead = 0.0 if start.stance else float(stride.state[0] - max(stride.toes))
+    return LateralGait(a.copy(), b, cost, gain, float(state[0]), width, gait.step_length, ahead)
 
 
 def _cost_to_go(a: Array, b: Array, state_cost: Array, step_cost: float) -> Array:

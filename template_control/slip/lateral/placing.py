@@ -171,6 +171,24 @@ def lateral_aim(
     )
 
 
+def before_turn(aim: LateralAim, lateral: LateralGait, turn: float) -> LateralAim:
+    """An aim in the axes so far, where they turn before that foot lands.
+
+    To the first order in the angle: what is further ahead is further to the side before.
+
+    Args:
+        aim: in the axes after the turn.
+        lateral: the gait's step map.
+        turn: to the left [rad].
+    """
+    aside = lateral.length * turn
+    return aim._replace(
+        state=aim.state + np.array([lateral.ahead, lateral.speed]) * turn,
+        step=aim.step + aside,
+        steps=aim.steps + aside,
+    )
+
+
 @compiled
 def pivot(contact: Any, com: Any, rolling: Any) -> Any:
     """y of the point about which the CoM falls, of a foot that rolls on the ground [m].

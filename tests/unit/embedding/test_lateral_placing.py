@@ -27,8 +27,8 @@ from template_control.slip import (
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.lateral.path import transition
 from template_control.slip.lateral.placing import LATERAL as KERNELS
-from template_control.slip.lateral.placing import contact, pivot
-from template_control.slip.maps.section import VLO
+from template_control.slip.lateral.placing import before_turn, contact, pivot
+from template_control.slip.maps.section import APEX, VLO
 from template_control.warm_up import ready
 
 P = SlipParameters()
@@ -92,6 +92,27 @@ def test_a_turning_walk_is_periodic_in_its_heading():
     middle = cycle.states.mean(axis=0)
     np.testing.assert_allclose(middle[1], -jump / 2)
     assert middle[0] > 0.0  # it leans into the curve
+
+
+def test_an_aim_before_a_turn_is_the_one_after_it():
+    lateral, turn = lateral_gait(RUN), 1e-4
+    aim = lateral_aim(
+        lateral,
+        lateral_cycle(lateral, LateralWish(0.2, turn=turn)),
+        Side.LEFT,
+        LateralLearnt(),
+        OPTIONS,
+    )
+    before = before_turn(aim, lateral, turn)
+    c, s = np.cos(turn), np.sin(turn)
+    back = np.array([[c, -s], [s, c]])  # from the axes after the turn to those before it
+    np.testing.assert_allclose(before.step, (back @ (RUN.step_length, aim.step))[1], atol=1e-8)
+    np.testing.assert_allclose(before.state[1], (back @ (RUN.state[0], aim.state[1]))[1], atol=1e-8)
+    # The CoM is so far ahead of the foot that it pushed off from at the apex after it.
+    stride = simulate_stride(P, STRIDE_START["r"], APEX.state(RUN.state), RUN.controls)
+    ahead = stride.state[0] - stride.toes[1]
+    assert 0.0 < ahead < RUN.step_length
+    np.testing.assert_allclose(before.state[0], (back @ (ahead, aim.state[0]))[1], atol=1e-8)
 
 
 def test_cost_to_go_solves_the_riccati_equation():
