@@ -92,8 +92,6 @@ def main() -> None:
             print(f"{name}: {record.fall_reason}", flush=True)
             continue
         speed, height = gait_errors(record, gait)
-        if isinstance(gait, RunningGait):  # whose speed is that at its apexes
-            speed = float(record.section_state[-5:, 0].mean() / gait.state[0] - 1.0)
         stood += 1
         back += max(abs(speed), abs(height)) <= SETTLED
         roll, pitch, yaw = np.abs(record.attitude).max(axis=0)

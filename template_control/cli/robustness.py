@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "Raise pushes, unseen steps of the ground, friction, mass and torque errors, sensor"
         " noise and delay level by level, with several trials each, until walk or run breaks."
         f" A trial succeeds if the robot does not fall within {AFTER} more steps and, after"
-        " a push or a step, its mean speed and height at VLO or apex over the last 5 are"
+        " a push or a step, its mean speed, a run's at its apexes, and height over the last 5 are"
         f" within {100 * SETTLED:g} % of its gait's. Ends with a table and a figure. Ctrl-C"
         " and the same command again go on where it was. Exit status: 0, 2 for bad input"
         " or a robot that falls undisturbed, 130 after Ctrl-C."

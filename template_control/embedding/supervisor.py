@@ -182,8 +182,9 @@ class StrideSupervisor:
         if start is not z:
             state[:4] = section.state(start, state[0])
         node = self._follow(node, state, sensed, now)
-        if report.decision.feasible and not self.path.strides[0].completed:
-            # It led on from the section, and does not from the robot, which is next to it.
+        next_to = reached is not None and report.decision.feasible
+        if next_to and not self.path.strides[0].completed:
+            # It leads on from the section, and does not from the robot, which is next to it.
             return self.replan(Cause.NO_FUTURE, node, sensed, now)
         if not report.decision.lasting and not self.arrived:
             return self._recover(self._situation(node, sensed), now) or node

@@ -182,7 +182,7 @@ _STILL = DisturbanceSample()  # nothing disturbs
 
 
 OFF_GAIT = 0.03
-"""Share of the gait's mean speed beyond which a robot is off its gait after the last step."""
+"""Share of the gait's speed beyond which a robot is off its gait after the last step."""
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,7 @@ class Trial(NamedTuple):
         fell: whether the robot fell.
         reason: of the fall, "" without one.
         first: what went wrong first, "" without a fall; see :func:`fall_cause`.
-        speed_error: mean speed of the last 5 steps over the gait's, less one; None after a fall.
+        speed_error: of the last 5 steps, see :func:`.gait_errors`; None after a fall.
         draw: what disturbed.
         severity: of the draw.
     """

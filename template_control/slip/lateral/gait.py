@@ -174,7 +174,9 @@ def lateral_gait(
     gain = (b @ cost @ a) / (o.step_cost + b @ cost @ b)
     width = 1.0 if start.stance else o.running_width
     ahead = 0.0 if start.stance else float(stride.state[0] - max(stride.toes))
-    return LateralGait(a.copy(), b, cost, gain, float(state[0]), width, gait.step_length, ahead)
+    return LateralGait(
+        a.copy(), b, cost, gain, float(state[0]), width, length=gait.step_length, ahead=ahead
+    )
 
 
 def _cost_to_go(a: Array, b: Array, state_cost: Array, step_cost: float) -> Array:
