@@ -229,7 +229,7 @@ def advance(kept: Any, dt: float) -> None:
         want.com_now[k] = s.state[k]
     want.com_now[0] -= s.toes[0]
     want.com_push = t.trim if mode.trim_momentum else 0.0
-    want.lead = t.path.offset
+    want.lead, want.ahead = t.path.offset, np.nan
     if t.lateral.half_width > 0.0:
         sway(t, r, want)
     want.pitch = advance_lean(t.lean, r.attitude[1] - t.frame.angle, dt) + t.frame.angle
@@ -323,11 +323,11 @@ def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: floa
     for k in range(2):
         feet[k] = lateral.stood[lateral.feet[k], _SIDE]
     foothold = lateral_foothold(lateral, arrays, path.time, com, feet)
-    if lateral.step != 0.0 and path.event_times[_REST] < path.event_times[_VLO]:
-        # The next touchdown leads to a stand, in which the soles hold the CoM.
-        foot, lasts = f.roles[_REAR], path.event_times[_TOUCHDOWN] - path.time
-        here, other = r.foot_position[foot, _SIDE], r.foot_position[1 - foot, _SIDE]
-        foothold = closing_foothold(t, r, here, other, lasts)
+    rests = path.event_times[_REST] < path.event_times[_VLO]
+    if lateral.step != 0.0 and mode.stances == 1 and (rests or np.isnan(foothold)):
+        # The next touchdown leads to a stand, on no spring of the template, or nowhere.
+        lasts = path.event_times[_TOUCHDOWN] - path.time
+        foothold = closing_foothold(t, r, f.roles[_REAR], lasts)
     for i in range(mode.swings):
         foot = f.roles[mode.swing_leg[i]]
         due, side = path.landing_time[foot] - path.time, want.side[foot]

@@ -39,6 +39,7 @@ REFERENCES = np.dtype(
         ("offset", _F, (MOST_CONTACTS, 3, 3)),
         ("stands", _I, (MOST_CONTACTS,)),
         ("lead", _F),
+        ("ahead", _F),
         ("sway", _F),
         ("lift", _F),
     ],
@@ -72,6 +73,8 @@ class References:
         stands: (n,) of each contact, whether the QP has it on the ground: a ``FootTask`` or a
             ``SideFootTask`` then asks for nothing.
         lead: how far the point that moves with the momentum is ahead of the CoM [m].
+        ahead: wanted rate of dx/dt as ``com_now`` has it, in place of that of ``com`` [m/s^2]; NaN:
+            none.
         sway: wanted rate of the speed to the left with the momentum, dy/dt - L_x / (m z) [m/s^2].
         lift: the feedback part of the CoM's vertical acceleration; a ``ComTask`` writes it
             [m/s^2].
@@ -90,10 +93,10 @@ class References:
         self.furthest: Array = now["furthest"]
         self.offset: Array = now["offset"]
         self.stands: NDArray[np.int64] = now["stands"]
-        self.feet[1], self.furthest[:], self.pitch = 1, np.inf, pitch
+        self.feet[1], self.furthest[:], self.pitch, self.ahead = 1, np.inf, pitch, np.nan
 
-    com_push, pitch, lift, lead, sway = (
-        Number(name) for name in ("com_push", "pitch", "lift", "lead", "sway")
+    com_push, pitch, lift, lead, ahead, sway = (
+        Number(name) for name in ("com_push", "pitch", "lift", "lead", "ahead", "sway")
     )
 
 

@@ -63,6 +63,8 @@ def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array)
         ahead -= kp * want.lead
     if task.gains[3] > 0.0:
         ahead += task.gains[3] * (ref[5] + r.gravity) / height * (now[0] - ref[0])
+    if not np.isnan(want.ahead):
+        ahead = want.ahead
     want.lift = kp * (ref[1] - now[1]) + kd * (ref[3] - now[3])
     rows[0, nv + DESIRED], rows[1, nv + DESIRED] = ahead, ref[5] + want.lift
 

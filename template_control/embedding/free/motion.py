@@ -206,7 +206,7 @@ class LateralMotion:
         planner, gait = self.planner, supervisor.planner.gait
         planner.data["section_began"] = time
         if not gait.step_length:
-            return self._stand(node, supervisor)
+            return self._stand(section, node, supervisor)
         side_ramp, walk_ramp, run_ramp = self._ramps
         turn_ramp = walk_ramp if node.stance else run_ramp
         most = gait.step_duration * np.array([side_ramp, turn_ramp, turn_ramp])
@@ -247,14 +247,16 @@ class LateralMotion:
         turns = min(max(course.away(self.robot) / constant, -fastest), fastest)
         return np.array([course.left, course.turning, turns])
 
-    def _stand(self, node: Node, supervisor: StrideSupervisor) -> Node:
+    def _stand(self, section: Section, node: Node, supervisor: StrideSupervisor) -> Node:
         """A stride that leads to a stand, or from it to a walk: it goes straight on.
 
-        A foot that lands in it goes to where the last gait's would.
+        A foot that lands in it goes to where the last gait's would; after a walk to the left, whose
+        CoM is on its way already, to where that one's would.
         """
         planner = self.planner
         self._now[:], self._turns = 0.0, 0.0
-        planner.wish = replace(planner.wish, left=0.0, turn=0.0)
+        left = 0.0 if section is REST else planner.wish.left
+        planner.wish = replace(planner.wish, left=left, turn=0.0)
         planner.walk(supervisor.planner.next_gait())
         self._turn_trunk(1.0, 0.0)
         planner.aim(SIDES[self._feet.landed])

@@ -20,6 +20,8 @@ from template_control.whole_body.solver import SOLE_SHARE
 
 Array = NDArray[np.float64]
 
+_HOLDING = 1.5  # by which it moves beyond the capture point's distance from where a robot stands
+_HALVINGS = 30  # of a way between two feet
 _SIDE_GAIN = 2.0  # by which the centre of pressure moves beyond the capture point's error
 _SIDE_SHARE = 0.7  # of half a sole's width, by which it moves at most
 _SIDE = 1
@@ -28,7 +30,10 @@ _REAR_LIFTOFF, _FRONT_LIFTOFF = int(Event.REAR_LIFTOFF), int(Event.FRONT_LIFTOFF
 _REAR, _FRONT = 0, 1
 _STAGES = 3  # both feet stand, one does, both do
 _PIECES = 8  # of each
+_LIGHTEST = 0.05  # of the weight: legs do not pull
 _LOWEST = 0.3  # of the legs' length: the least height of the CoM that is planned with
+_LEAST_SHARE = 0.3  # of a step, at which a capture point is taken to be between the feet
+_SPARE = 0.4  # of half a sole's length, by which it may be off the line between them
 _WIDEST = 0.5  # of the legs' length: the furthest foothold to the side that catches the CoM
 # For the reference template.
 _AGAIN = 0.01  # a plan is made anew after this time [s]
@@ -54,6 +59,9 @@ def sway(t: Any, r: Any, want: Any) -> None:
         e = xi - y_i - (X*_y + X*_v / w) exp(w t), t since the section, or -t until it.
     """
     mode, forces, height = t.mode, t.path.forces, _height(t, r)
+    if mode.follow_curve and mode.stances > 1 and _rests(t):
+        _stand(t, r, want)
+        return
     if mode.follow_curve:
         want.sway = (want.com[5] + r.gravity) / height * (r.com[_SIDE] - _pressure(t, r))
         return
@@ -79,6 +87,68 @@ def sway(t: Any, r: Any, want: Any) -> None:
 
 
 @compiled
+def _rests(t: Any) -> bool:
+    """True if the CoM comes to rest on the path before any foot lifts off."""
+    due = t.path.event_times
+    return bool(due[_REST] < min(due[_REAR_LIFTOFF], due[_FRONT_LIFTOFF], due[_VLO]))
+
+
+@compiled
+def _stand(t: Any, r: Any, want: Any) -> None:
+    """Write how the CoM of a robot that stays on both feet is to move, forward and to the left.
+
+    Its capture point comes to the middle of the feet, where the centre of pressure can lead it:
+
+        p = xi + 1.5 (xi - middle), or the nearest point of the ground that both feet enclose,
+        s' = (z'' + g) / h (x - p), in both directions.
+    """
+    lift = max(want.com[5] + r.gravity, _LIGHTEST * r.gravity) / _height(t, r)
+    rear, uphill = t.feet.roles[_REAR], t.path.body[2]
+    here, way, half = r.foot_position[rear], np.empty(2), np.empty(2)
+    half[0], half[_SIDE] = SOLE_SHARE * t.path.body[5], SOLE_SHARE * t.lateral.half_width
+    com, point = np.empty(2), np.empty(2)
+    com[0], com[_SIDE] = t.sensed.state[0], r.com[_SIDE]
+    # On a slope the CoM rests uphill of the centre of pressure.
+    point[0] = com[0] + t.sensed.state[2] / np.sqrt(lift) - uphill / lift
+    point[_SIDE] = com[_SIDE] + side_speed(t, r) / np.sqrt(r.sway * lift)
+    for axis in range(2):
+        way[axis] = r.foot_position[1 - rear, axis] - here[axis]
+        point[axis] -= here[axis]
+        point[axis] += _HOLDING * (point[axis] - 0.5 * way[axis])
+    _nearest(way, half, point)
+    for axis in range(2):
+        point[axis] += here[axis]
+    t.lateral.pressure, t.lateral.pressure_at = point[_SIDE], -np.inf
+    want.ahead = lift * (com[0] - point[0]) - uphill
+    want.sway = lift * (com[_SIDE] - point[_SIDE])
+
+
+@compiled
+def _nearest(way: Array, half: Array, point: Array) -> None:
+    """Move a ``point`` (2,) to the nearest one that two equal feet enclose.
+
+    That is what a rectangle with half the sides ``half`` (2,), its middle at 0, covers on its way
+    ``way`` (2,) [m].
+    """
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        share, slope = 0.5 * (low + high), 0.0
+        for axis in range(2):
+            off = point[axis] - share * way[axis]
+            beyond = off - min(max(off, -half[axis]), half[axis])
+            slope += beyond * way[axis]
+        if slope > 0.0:
+            low = share
+        elif slope < 0.0:
+            high = share
+        else:
+            break
+    for axis in range(2):
+        middle = share * way[axis]
+        point[axis] = min(max(point[axis], middle - half[axis]), middle + half[axis])
+
+
+@compiled
 def _height(t: Any, r: Any) -> float:
     """Height of the CoM over the ground [m]; of a robot that falls it may be below its feet."""
     return max(t.sensed.state[1], _LOWEST * r.leg_length)
@@ -94,21 +164,64 @@ def _pressure(t: Any, r: Any) -> float:
 
 
 @compiled
-def closing_foothold(t: Any, r: Any, stance: float, foot: float, lasts: float) -> float:
+def closing_foothold(t: Any, r: Any, stands: int, lasts: float) -> float:
     """y of the foothold of a stride that ends at rest [m].
 
-    It is as far away as the gait's, or where the capture point will be, if that is further: from
-    then on the other foot has to hold it. ``t`` and ``r`` are of ``TICK`` and ``ROBOT_DATA``;
-    ``stance`` and ``foot`` are y of the foot that stands and of the other one [m], ``lasts`` is
-    how long one foot stands from now on [s].
+    ``t`` and ``r`` are of ``TICK`` and ``ROBOT_DATA``; the foot ``stands`` bears the CoM for
+    ``lasts`` from now on [s]. Of a robot whose feet land in one line it is y of that foot.
     """
-    lateral, side, rate = t.lateral, np.copysign(1.0, foot - stance), _rate(t, r)
-    apart, edge = abs(lateral.step), SOLE_SHARE * lateral.half_width
-    away = side * (r.com[_SIDE] + side_speed(t, r) / rate - stance)
-    falls = edge + (away - edge) * np.exp(rate * min(lasts, _FAR * lateral.unit))
-    if 0.0 < apart < falls:
-        apart = min(falls, max(_WIDEST * r.leg_length, apart))
-    return stance + side * apart
+    lateral, rate, stance = t.lateral, _rate(t, r), r.foot_position[stands]
+    if lateral.step == 0.0:
+        return float(stance[_SIDE])
+    lasts = min(lasts, _FAR * lateral.unit)
+    side = np.copysign(1.0, r.foot_position[1 - stands, _SIDE] - stance[_SIDE])
+    point = side * (r.com[_SIDE] + side_speed(t, r) / rate - stance[_SIDE])
+    edge, step = SOLE_SHARE * lateral.half_width, abs(lateral.step)
+    narrowest = min(abs(lateral.steps[0]), abs(lateral.steps[1]))
+    shares = _shares_ahead(t, r, stands, lasts)
+    apart = distance_aside(point, np.exp(rate * lasts), edge, shares, (step, narrowest))
+    return float(stance[_SIDE] + side * min(apart, max(_WIDEST * r.leg_length, step)))
+
+
+@compiled
+def distance_aside(
+    point: float,
+    growth: float,
+    edge: float,
+    shares: tuple[float, float],
+    steps: tuple[float, float],
+) -> float:
+    """Distance of a foothold to the side, with the capture point on the line between both feet [m].
+
+    Beside that line there is no ground to hold the CoM on. It is the gait's, the first of
+    ``steps``, or the nearest for which, at touchdown, the capture point is as large a share of the
+    step to the side as ahead,
+
+        xi_near / most <= d <= xi_far / least, xi_near, xi_far = (xi -+ Y) exp(w T) +- Y,
+
+    but no less than the second of ``steps``. ``point`` is xi now, from the foot that stands
+    towards the other one [m], ``growth`` exp(w T), ``edge`` Y, by how far the centre of pressure
+    may be to either side [m]; ``shares`` are the least and the most ahead.
+    """
+    least, most = shares
+    near, far = (point - edge) * growth + edge, (point + edge) * growth - edge
+    return min(max(steps[0], near / most), max(far / least, steps[1]))
+
+
+@compiled
+def _shares_ahead(t: Any, r: Any, stands: int, lasts: float) -> tuple[float, float]:
+    """Least and largest share of the next step's length at which the capture point may be taken.
+
+    It is ahead of the foot ``stands``, as the foot that is in the air lands in ``lasts`` [s].
+    """
+    x, speed, rate = t.sensed.state[0], t.sensed.state[2], np.sqrt(r.gravity / _height(t, r))
+    ahead = t.path.landing_x[1 - stands] - r.foot_position[stands, 0]
+    if not abs(ahead) > 0.0:
+        return _LEAST_SHARE, 1.0
+    point = (x + speed / rate - r.foot_position[stands, 0]) * np.exp(rate * lasts) / ahead
+    spare = _SPARE * t.path.body[5] / abs(ahead)
+    least = min(max(point - spare, _LEAST_SHARE), 1.0)
+    return least, min(max(point + spare, least), 1.0)
 
 
 @compiled
@@ -142,7 +255,7 @@ def _planned(t: Any, r: Any) -> float:
     if steps:
         lasts[1] = max(min(lands, ends) - lasts[0], 0.0)
     if steps and rests:
-        other = closing_foothold(t, r, here, now, lasts[1])
+        other = closing_foothold(t, r, stays, lasts[1])
     middle = 0.5 * (here + other)
     if rests:
         lasts[2] = max(ends - lasts[0] - lasts[1], _REST_IN * lateral.unit)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Positive, Range
+from template_control.checks.ranges import NotNegative, Positive, Range
 from template_control.embedding.planners.gait_table import (
     COLUMNS,
     CONTROLS,
@@ -44,7 +44,7 @@ from template_control.slip.maps.return_map import new_workspace
 from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route
-from template_control.slip.similarity import SPEED, Scale, scaled, tuned
+from template_control.slip.similarity import SPEED, TIME, Scale, scaled, tuned
 from template_control.warm_up import Part, ready
 
 Array = NDArray[np.float64]
@@ -77,6 +77,7 @@ class AheadOptions(Checked):
         cheap: cost of limits and of the last state up to which a plan is taken.
         ease: tolerances of the controls, over the usual ones.
         dearest: cost in all up to which a plan is taken; None: whatever it is.
+        earliest: a foot lands so long after VLO at the soonest [s].
     """
 
     kind: ClassVar[str] = "ahead"
@@ -86,6 +87,7 @@ class AheadOptions(Checked):
     cheap: Positive = tuned(20.0)
     ease: Positive = tuned(1.0)
     dearest: Positive | None = None
+    earliest: NotNegative = tuned(0.0, TIME)
 
 
 FREE_AHEAD = AheadOptions(pace=0.15, ease=0.5, dearest=20.0)
@@ -95,10 +97,10 @@ next plan jumped to make up for it, and Go2 fell as it slowed down to its slowes
 a stand no later.
 """
 
-BIPED_AHEAD = replace(FREE_AHEAD, pace=0.09)
+BIPED_AHEAD = replace(FREE_AHEAD, pace=0.09, earliest=0.12)
 """Of a biped with a floating base: of a gait that is further away no plan was cheap in the second
 step, and the search led G1 to a slow one and to a fall, or the foot, on its way down already, was
-wanted further ahead than Bolt's hips could take it.
+wanted further ahead than Bolt's hips could take it. G1, slow and sinking, landed 0.06 s after VLO.
 """
 
 
@@ -135,7 +137,7 @@ class AheadPlanner(Planner):
         self._spacing = SPACING * scale.speed
         self.parameters = parameters
         self.table: GaitTable = gait_table(parameters)
-        self._problem = plan_problem(parameters, self.table, o.ease)
+        self._problem = plan_problem(parameters, self.table, o.ease, o.earliest)
         self._work = new_workspace()
         self._plan = Plan(
             np.empty((o.steps + 1, PADDED)),
@@ -232,7 +234,9 @@ class AheadPlanner(Planner):
         self.offset = self._lqr.offset
 
 
-def plan_problem(parameters: SlipParameters, table: GaitTable, ease: float = 1.0) -> PlanProblem:
+def plan_problem(
+    parameters: SlipParameters, table: GaitTable, ease: float = 1.0, earliest: float = 0.0
+) -> PlanProblem:
     """Model and costs of the plans on a template, with the table of its gaits."""
     scale = Scale.of(parameters)
     beyond, tolerance = RISE
@@ -244,6 +248,7 @@ def plan_problem(parameters: SlipParameters, table: GaitTable, ease: float = 1.0
         rise=(beyond * scale.speed, tolerance * scale.speed),
         knee_reach=KNEE_STRAIGHT * scale.length,
         knee_moment=KNEE_MOMENT * scale.length * parameters.mass * parameters.gravity,
+        earliest=earliest,
         rounds=_ROUNDS,
         columns=COLUMNS,
     )

@@ -67,6 +67,7 @@ class PlanProblem(NamedTuple):
         rise: |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s].
         knee_reach: length of the leg at which the knee is straight [m].
         knee_moment: moment of the leg force about the knee that costs nothing [N m].
+        earliest: the foot lands so long after VLO at the soonest [s].
         rounds: Gauss-Newton steps at most.
         columns: (7,) of the map's derivatives, states and controls.
     """
@@ -78,6 +79,7 @@ class PlanProblem(NamedTuple):
     rise: tuple[float, float]
     knee_reach: float
     knee_moment: float
+    earliest: float
     rounds: int
     columns: NDArray[np.int64]
 
@@ -319,7 +321,13 @@ def _bounds(
     if i == 0:
         lower[0] = min(max(lower[0], aim.angles[0]), upper[0])
         upper[0] = max(min(upper[0], aim.angles[1]), lower[0])
-    top = np.arcsin(min(plan.states[i, 1] / p.kernel.rest_length, 1.0)) - TOP_MARGIN
+    length, rise = p.kernel.rest_length, plan.states[i, 2]
+    top = np.arcsin(min(plan.states[i, 1] / length, 1.0)) - TOP_MARGIN
+    if p.earliest > 0.0:
+        stiff = plan.row[STIFFNESS] / p.kernel.mass
+        lift = stiff * (length - plan.states[i, 1]) - p.kernel.gravity
+        later = plan.states[i, 1] + p.earliest * (rise + 0.5 * p.earliest * lift)
+        top = min(top, np.arcsin(min(max(later / length, 0.0), 1.0)))
     upper[first] = min(upper[first], max(top, TOP_MARGIN))
     lower[first] = min(lower[first], upper[first])
 

@@ -49,6 +49,8 @@ class StandingOptions(Checked):
             width over the distance between them to the side. A stand uses it, a start does not.
         shift: shortest time from rest to a liftoff [s]: until then the CoM of a robot on two soles
             has to be over the one that stays.
+        single: shortest time on one leg before the VLO to which a start or a change of speed leads
+            [s]: the other foot passes the one that stands.
     """
 
     height: Positive = tuned(STAND_HEIGHT, LENGTH)
@@ -57,6 +59,7 @@ class StandingOptions(Checked):
     half_length: NotNegative = tuned(0.0, LENGTH)
     slant: NotNegative = tuned(0.0)
     shift: NotNegative = tuned(0.0, TIME)
+    single: NotNegative = tuned(0.15, TIME)
 
 
 @checked

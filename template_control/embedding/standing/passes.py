@@ -41,8 +41,7 @@ _NARROW = 0.02  # excess that a metre between the feet, more or less than CLOSIN
 CLOSING = 0.25
 """Distance of the feet after a step from a stand, and where a walk ends, over l0."""
 # For the reference template.
-_SINGLE = (0.15, 0.5)  # shortest and longest way of the CoM in single stance before VLO [s]
-_LIFTED = 0.03  # the shortest one of a pair of feet, which has nothing to pass on its way [s]
+_LONGEST = 0.5  # way of the CoM in single stance before VLO [s]
 _LANDING = (0.16, 0.35)  # bounds of the shortest time from VLO to a touchdown [s]
 _SWIFTNESS = 3.2  # mean speed of the foot to its foothold between them, over the CoM's at VLO
 # Of a step from a stand.
@@ -173,8 +172,7 @@ class PassTable:
         back = replace(self.parameters, slope=-self.parameters.slope)
         simulator = StrideSimulator(back, AUTOMATON)
         past = simulator.run(self._node, [0.0, height, speed, -vertical], u)
-        single = (_LIFTED if self.options.half_length else _SINGLE[0], _SINGLE[1])
-        shortest, longest = (time * self.scale.time for time in single)
+        shortest, longest = self.options.single, _LONGEST * self.scale.time
         # Whatever ends the stride: before it the leg pushes.
         longest = min(longest, 0.98 * past.duration)
         x, y, dx, dy, ddx, ddy = past.sample(np.linspace(shortest, longest, _APPROACHES)).T
@@ -337,7 +335,7 @@ class LandingTable:
         if not landings:
             return None
         stride = self._way(start, over.stiffness, 0.0)
-        longest = min(_SINGLE[1] * self._scale.time, 0.98 * stride.duration)
+        longest = min(_LONGEST * self._scale.time, 0.98 * stride.duration)
         times = np.linspace(-longest, _LATE * self._scale.time, _LIFTOFFS)
         x, y, dx, dy, ddx, ddy = stride.sample(np.abs(times)).T
         sign = np.where(times < 0.0, -1.0, 1.0)

@@ -41,9 +41,12 @@ from template_control.embedding.planners.planner import ANY_ANGLE, Context
 from template_control.embedding.planners.step_search import TOP_MARGIN
 from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
-from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome
+from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap, new_workspace
+from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import SpeedProfile
 from template_control.slip.scenario.speed_route import SpeedRoute
 
@@ -137,6 +140,21 @@ def test_a_plan_stays_within_its_bounds(seed):
     assert np.all(plan.controls <= high + 1e-12)
     top = np.arcsin(np.minimum(plan.states[0, 1], 1.0))
     assert plan.controls[0, 0] <= top - TOP_MARGIN + 1e-12
+
+
+def test_a_foot_does_not_land_at_once():
+    """Slow and sinking at VLO, the CoM would else be at the height of a landing in 0.05 s."""
+    z = row_at(table(), 0.3)[STATE : STATE + 3] + [0.1, 0.0, -0.05]
+    simulator, node = StrideSimulator(P, AUTOMATON), AUTOMATON.start("wp").name
+
+    def lands(**changes):
+        _, plan, _ = plan_from(z, 0.3, **changes)
+        u = np.zeros(NUM_SLOTS)
+        u[SLOTS] = plan.controls[0] * [1.0, *[plan.row[STIFFNESS]] * 3]
+        return simulator.run(node, VLO.state(z), u).time_of(Event.TOUCHDOWN)
+
+    assert lands() < 0.1
+    assert lands(earliest=0.12) > 0.11
 
 
 def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
