@@ -40,6 +40,10 @@ _SLOWEST_ON_POINTS = 0.27
 lasts longer than 2 sqrt(l0 / g), and what is off to the side grows by nearly tenfold in it. Bolt
 fell on its way down to 0.24 in 3 of 12 trials, at 0.2 as it turned, and at 0.16 straight on."""
 
+_SLOWEST_ON_SOLES = 0.15
+"""The same of a robot on flat feet, where the family's slow gaits begin, with other legs and steps
+a quarter shorter. On its way down to them G1 fell, as it turned or went aside."""
+
 _FASTEST_ON_SOLES = 0.31
 """The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of
 0.9 m/s, in whose swings its hips are at the end of their range."""
@@ -231,7 +235,9 @@ def _faces(robot: Biped) -> bool:
 
 def _slowest(robot: Biped) -> float:
     """Mean speed over sqrt(g l0) of the slowest walk that a robot is commanded, 0 where any is."""
-    return 0.0 if _faces(robot) or robot.patches else _SLOWEST_ON_POINTS
+    if _faces(robot):
+        return 0.0
+    return _SLOWEST_ON_SOLES if robot.patches else _SLOWEST_ON_POINTS
 
 
 def check_direction(
@@ -288,7 +294,8 @@ def velocity_route(
         speed, *others = velocity.at(time)
         check_direction(robot, motion.gaits, speed, *others)
         if not _faces(robot):
-            return max(speed, slowest)
+            stands = "stand" in motion.gaits and speed < 0.5 * slowest
+            return 0.0 if stands else max(speed, slowest)
         course = course_at(velocity, time, robot)
         return 0.0 if course.turns_round(robot) else hypot(speed, others[0])
 

@@ -64,7 +64,7 @@ Small: in double stance it chooses between forces that serve the tasks alike.
 TORQUE_COST = 1e-4
 """Of the joint torques, per squared limit. Smaller: it only makes the optimum unique."""
 
-SOLE_SHARE = 0.8
+SOLE_SHARE = 0.9
 """Share of a sole, in length and width, in which its centre of pressure is kept: at its edge the
 foot tilts. With 0.25 and 0.5 G1 walks too."""
 

@@ -90,12 +90,14 @@ def test_another_mass_walks_and_is_learnt(scale):
     assert record.section_load[-1] == pytest.approx(scale, abs=0.04)
 
 
-@pytest.mark.slow(8)
-@pytest.mark.parametrize(("impulse", "steps"), [(10.0, []), (15.0, ["sf"])])
-def test_a_pushed_stand_is_held_or_caught_by_a_step(impulse, steps):
-    """One foot is ahead: what the soles bear midway between them reaches beyond both toes."""
-    motion = VelocityProfile(((0.0, 0.0, 0.0, 0.0),), 5.0, gaits=("stand", "walk"))
-    push = tc.Push(impulse, time=1.5, duration=0.08)
+@pytest.mark.slow(9)
+@pytest.mark.parametrize(
+    ("impulse", "heading", "steps"), [(10.0, 225.0, []), (10.0, 45.0, ["sf"]), (15.0, 0.0, ["sf"])]
+)
+def test_a_pushed_stand_is_held_or_caught_by_a_step(impulse, heading, steps):
+    """One foot is ahead: two corners of the rectangle around both are not between them."""
+    motion = VelocityProfile(((0.0, 0.0, 0.0, 0.0),), 4.0, gaits=("stand", "walk"))
+    push = tc.Push(impulse, time=1.0, duration=0.08, direction=np.radians(heading))
     spec = tc.robot.RobotSpec("g1", free=True)
     record = tc.simulate(tc.Experiment(spec, motion=motion, pushes=(push,)))
     assert record.fall_reason == ""
@@ -103,6 +105,24 @@ def test_a_pushed_stand_is_held_or_caught_by_a_step(impulse, steps):
     assert [kind for kind in record.kinds_of_stride if kind != "s"] == steps
     still = record.time > record.time[-1] - 0.5
     assert np.ptp(record.space_com[still], axis=0).max() < 5e-3
+
+
+@pytest.mark.slow(5)
+def test_g1_stops_from_a_walk_to_the_left():
+    """The foot of the last step goes along, and the CoM comes to rest between both feet."""
+    rows = ((0.0, 0.46, 0.1, -0.1), (4.5, 0.0, 0.0, 0.0))
+    motion = VelocityProfile(rows, 9.0, foreseen=False, gaits=("stand", "walk"))
+    spec = tc.robot.RobotSpec("g1", free=True)
+    record = tc.simulate(tc.Experiment(spec, motion=motion))
+    assert record.fall_reason == ""
+    assert record.solved.all()
+    kinds = record.kinds_of_stride
+    assert kinds[kinds.index("ws") + 1 :] == ["s"] * (len(kinds) - kinds.index("ws") - 1)
+    away = np.diff(record.space_foot[-1, :, :2], axis=0)[0]
+    c, s = np.cos(record.heading[-1]), np.sin(record.heading[-1])
+    assert 0.05 < abs(c * away[1] - s * away[0]) < 0.2
+    middle = record.space_foot[-1].mean(axis=0) - record.space_com[-1]
+    assert np.hypot(*middle[:2]) < 5e-3
 
 
 @pytest.mark.slow(3)

@@ -45,8 +45,8 @@ _SINGLE = PhaseControl(
         SwayTask(1.0),
         OrientationTask((1.0, 1.0, 0.1)),
         # Lighter than the rest: a fast swing asks for more than the hips have, and the trunk would
-        # nod with it.
-        FootTask(weight=(0.1, 0.1)),
+        # nod with it. But it rises: dragged along the ground it bears the robot.
+        FootTask(weight=(0.1, 1.0)),
         SideFootTask(weight=0.1),
         SoleTask(),
     ),

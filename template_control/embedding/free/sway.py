@@ -97,10 +97,10 @@ def _rests(t: Any) -> bool:
 def _stand(t: Any, r: Any, want: Any) -> None:
     """Write how the CoM of a robot that stays on both feet is to move, forward and to the left.
 
-    Its capture point comes to the middle of the feet, where the centre of pressure can lead it:
+    Its capture point comes to the middle of the feet, straight: the centre of pressure is beyond
+    it, within the ground that both feet enclose, or where that is nearest to a point outside:
 
-        p = xi + 1.5 (xi - middle), or the nearest point of the ground that both feet enclose,
-        s' = (z'' + g) / h (x - p), in both directions.
+        p = xi + k (xi - middle), k up to 1.5; s' = (z'' + g) / h (x - p), in both directions.
     """
     lift = max(want.com[5] + r.gravity, _LIGHTEST * r.gravity) / _height(t, r)
     rear, uphill = t.feet.roles[_REAR], t.path.body[2]
@@ -114,8 +114,7 @@ def _stand(t: Any, r: Any, want: Any) -> None:
     for axis in range(2):
         way[axis] = r.foot_position[1 - rear, axis] - here[axis]
         point[axis] -= here[axis]
-        point[axis] += _HOLDING * (point[axis] - 0.5 * way[axis])
-    _nearest(way, half, point)
+    hold(way, half, point)
     for axis in range(2):
         point[axis] += here[axis]
     t.lateral.pressure, t.lateral.pressure_at = point[_SIDE], -np.inf
@@ -124,19 +123,31 @@ def _stand(t: Any, r: Any, want: Any) -> None:
 
 
 @compiled
-def _nearest(way: Array, half: Array, point: Array) -> None:
-    """Move a ``point`` (2,) to the nearest one that two equal feet enclose.
+def hold(way: Array, half: Array, point: Array) -> None:
+    """Turn a capture point (2,) into the centre of pressure that leads it between two equal feet.
 
-    That is what a rectangle with half the sides ``half`` (2,), its middle at 0, covers on its way
-    ``way`` (2,) [m].
+    They enclose what a rectangle with half the sides ``half`` (2,), its middle at 0, covers on its
+    way ``way`` (2,) to the other one's [m]: a hexagon about the middle.
     """
+    x, y = point[0] - 0.5 * way[0], point[1] - 0.5 * way[1]
+    beyond = 1.0 + _HOLDING
+    for side in range(3):
+        across = 1.0 if side == 0 else 0.0 if side == 1 else -way[1]
+        along = 0.0 if side == 0 else 1.0 if side == 1 else way[0]
+        most = abs(across) * half[0] + abs(along) * half[1]
+        most += 0.5 * abs(across * way[0] + along * way[1])
+        off = abs(across * x + along * y)
+        if most < beyond * off:
+            beyond = most / off
+    if beyond >= 1.0:
+        point[0], point[1] = 0.5 * way[0] + beyond * x, 0.5 * way[1] + beyond * y
+        return
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         share, slope = 0.5 * (low + high), 0.0
         for axis in range(2):
             off = point[axis] - share * way[axis]
-            beyond = off - min(max(off, -half[axis]), half[axis])
-            slope += beyond * way[axis]
+            slope += (off - min(max(off, -half[axis]), half[axis])) * way[axis]
         if slope > 0.0:
             low = share
         elif slope < 0.0:

@@ -343,7 +343,11 @@ class LandingTable:
         up = np.stack((y, sign * dy, ddy), axis=-1)
         states = np.stack((across, up), axis=1)
         best = min(landings, key=lambda one: one.price)
-        return StepPass(over.stiffness, times, states, best)
+        # On a way that rises and sinks more than once the foot would land where it first sinks.
+        low = y <= self.parameters.rest_length * np.sin(best.angle)
+        sooner = np.flatnonzero(~low[:-1] & low[1:] & (times[1:] < best.time))
+        first = int(sooner[-1]) + 1 if len(sooner) else 0
+        return StepPass(over.stiffness, times[first:], states[first:], best)
 
     def _landings(self, state: Array, stiffness: float, toe: float) -> list[StepLanding]:
         """Landings of a step forward, from the CoM's state (4,) over a foot at x = ``toe``."""

@@ -8,19 +8,29 @@ from template_control.embedding.free import sway
 WAY, HALF = np.array([0.17, -0.15]), np.array([0.07, 0.024])
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_the_nearest_point_of_the_ground_under_both_feet(seed):
-    """Against all places of one of them on its way to the other."""
+def enclosed(points):
+    """Whether both feet enclose each of (n, 2) points."""
+    off = points[:, None] - np.linspace(0.0, 1.0, 2001)[:, None] * WAY
+    return (np.abs(off) <= HALF + 1e-9).all(axis=2).any(axis=1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_pressure_leads_the_capture_point_back(seed):
+    """Straight to the middle where both feet enclose it, else from as near as they reach."""
     rng = np.random.default_rng(seed)
-    wanted = rng.uniform(-0.3, 0.4, 2)
-    found = wanted.copy()
-    sway._nearest(WAY, HALF, found)
-    shares = np.linspace(0.0, 1.0, 20001)[:, None]
-    there = np.clip(wanted, shares * WAY - HALF, shares * WAY + HALF)
-    best = np.hypot(*(there - wanted).T).min()
-    assert np.hypot(*(found - wanted)) == pytest.approx(best, abs=1e-6)
-    inside = shares * WAY - HALF <= found + 1e-9, found - 1e-9 <= shares * WAY + HALF
-    assert (inside[0] & inside[1]).all(axis=1).any()
+    point = 0.5 * WAY + rng.uniform(-0.15, 0.15, 2)
+    found = point.copy()
+    sway.hold(WAY, HALF, found)
+    away = point - 0.5 * WAY
+    if enclosed(point[None]).item():
+        beyond = np.linspace(1.0, 2.5, 3001)[:, None] * away + 0.5 * WAY
+        best = beyond[enclosed(beyond)][-1]
+        np.testing.assert_allclose(found, best, atol=2e-4)
+    else:
+        shares = np.linspace(0.0, 1.0, 20001)[:, None] * WAY
+        there = np.clip(point, shares - HALF, shares + HALF)
+        best = there[np.hypot(*(there - point).T).argmin()]
+        np.testing.assert_allclose(found, best, atol=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(4))
