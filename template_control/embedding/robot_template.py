@@ -42,6 +42,7 @@ _STRETCH = 0.903514524055713
 # stance, as its sole is level.
 _SOLE_STRETCH = 0.95
 _LIFTED = 0.03  # shortest time on a pair of feet before VLO; the other has nothing to pass [s]
+_PASSED = 0.08  # the same on a sole: the other one, a step behind, swings past it [s]
 _SHIFT = 0.8  # time in which a CoM at rest moves over one of two soles [s], for l0 = 1 m
 _KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in all robots that ran
 _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
@@ -287,7 +288,7 @@ def standing_options(robot: Biped) -> StandingOptions:
     if not robot.patches:
         return StandingOptions(half_length=half, single=_LIFTED)
     slant = SOLE_SHARE * robot.half_width / (FreeOptions().step_width * length)
-    return StandingOptions(half_length=half, slant=slant, shift=_SHIFT)
+    return StandingOptions(half_length=half, slant=slant, shift=_SHIFT, single=_PASSED)
 
 
 def can_run(robot: Biped) -> bool:
