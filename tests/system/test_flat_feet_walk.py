@@ -120,7 +120,8 @@ def test_g1_stops_from_a_walk_to_the_left():
     assert kinds[kinds.index("ws") + 1 :] == ["s"] * (len(kinds) - kinds.index("ws") - 1)
     away = np.diff(record.space_foot[-1, :, :2], axis=0)[0]
     c, s = np.cos(record.heading[-1]), np.sin(record.heading[-1])
-    assert 0.05 < abs(c * away[1] - s * away[0]) < 0.2
+    # As the gait's, 0.14 m, and as much further as a step goes to the left.
+    assert 0.05 < abs(c * away[1] - s * away[0]) < 0.25
     middle = record.space_foot[-1].mean(axis=0) - record.space_com[-1]
     assert np.hypot(*middle[:2]) < 5e-3
 
