@@ -59,7 +59,7 @@ def sway(t: Any, r: Any, want: Any) -> None:
         e = xi - y_i - (X*_y + X*_v / w) exp(w t), t since the section, or -t until it.
     """
     mode, forces, height = t.mode, t.path.forces, _height(t, r)
-    if mode.follow_curve and mode.stances > 1 and _rests(t):
+    if mode.follow_curve and mode.stances > 1 and _on_soles(t, r) and _rests(t):
         _stand(t, r, want)
         return
     if mode.follow_curve:
@@ -84,6 +84,12 @@ def sway(t: Any, r: Any, want: Any) -> None:
     bound = _SIDE_SHARE * r.sole_half[r.group[foot, 0], _SIDE]
     moved = min(max(_SIDE_GAIN * (point - wanted), -bound), bound)
     want.sway -= (want.com[5] + r.gravity) / height * moved
+
+
+@compiled
+def _on_soles(t: Any, r: Any) -> bool:
+    """True if the feet are soles, not pairs of feet, which enclose other ground."""
+    return bool(r.sole_half[r.group[t.feet.roles[_REAR], 0], 0] > 0.0)
 
 
 @compiled
