@@ -116,7 +116,7 @@ def _prepare(robot: Any, under_way: Iterator[int], folder: Path) -> None:
         next(under_way)
         stance = controller.mode.stance
         if len(stance) == 1:
-            state = controller.ground.raw_state
+            state = controller.frame.raw_state
             q.append(state[0].copy())
             v.append(state[1].copy())
             feet.append(controller.feet.foot_of_leg[stance[0]])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Pair
-from template_control.embedding.swing import SwingFoot, SwingOptions
+from template_control.embedding.swing import FEET, SwingOptions, begin_swing, swing_step
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.start import Pose, state_in
@@ -85,18 +85,20 @@ def apex_pose(
     landing, liftoff = stride.time_of(Event.TOUCHDOWN), stride.time_of(Event.REAR_LIFTOFF)
     # The liftoff's exchange of roles has made the stance toe the front leg's.
     toe, period = float(stride.toes[1]), stride.duration
-    foot = SwingFoot(start.swing)
-    foot.start(np.array([toe, 0.0]), np.zeros(2))
+    swing, reference = np.zeros(1, FEET), np.zeros((2, 3))
+    begin_swing(swing, 0, start.swing, reference, np.array([toe, 0.0]), np.zeros(2))
     feet, velocities = [], []
     now, due = liftoff, 2.0 * period + landing
     for apex in (1, 2):
         ticks = ceil((apex * period - now) / _TICK)
         dt = (apex * period - now) / ticks
         for _ in range(ticks):
-            foot.advance(toe + 2.0 * gait.step_length, due - now, dt, 0.0)
+            foothold = toe + 2.0 * gait.step_length, 0.0, due - now
+            swing_step(swing[0], 0, *reference, foothold, dt)
             now += dt
-        feet.append([foot.x[0] - apex * gait.step_length, foot.y[0]])
-        velocities.append([foot.x[1], foot.y[1]])
+        (x, speed, _), (y, rise, _) = reference.tolist()
+        feet.append([x - apex * gait.step_length, y])
+        velocities.append([speed, rise])
     pose = Pose(
         com=np.array([0.0, z[1]]),
         com_velocity=np.array([z[0], 0.0]),

@@ -22,7 +22,7 @@ from template_control.embedding.free.course import Course
 from template_control.embedding.free.motion import LateralMotion
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.trot import default_options
-from template_control.embedding.ground import SlopingGround
+from template_control.embedding.ground import SlopeEstimate, SlopeFrame
 from template_control.embedding.learners.learners import Learners
 from template_control.embedding.modes import PLACED, PathClock, RobotGuards, check_legs, modes
 from template_control.embedding.options import EmbeddingOptions
@@ -54,6 +54,7 @@ from template_control.embedding.tick import (
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.terms import onward
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Leg, Reset
@@ -91,7 +92,7 @@ class EmbeddingController:
         path_clock: the robot's place on that path, and the template there.
         learners: what is learnt from stride to stride.
         contacts: which feet stand.
-        ground: its slope, by the footholds.
+        slope: the ground's, by the footholds, uphill along the world's x.
         frame: axes that lean with the ground.
         observer: the robot's state in the template's terms.
         references: what the tasks read.
@@ -136,11 +137,11 @@ class EmbeddingController:
         now["settling"] = SETTLING * scale.speed
         now["friction_margin"] = o.friction_margin
         self.learners = Learners(o, self.parameters, robot, tick)
-        self.ground = SlopingGround(robot, self.parameters.rest_length, tick["frame"])
-        self.frame = self.ground.frame
+        self.slope = SlopeEstimate(self.parameters.rest_length)
+        self.frame = SlopeFrame(robot, tick["frame"])
         self.references = References(pitch=o.trunk_pitch)
         self.swings = o.swings(robot, scale)
-        self.feet = Feet(self.swings.other, self.references.foot, tick["feet"])
+        self.feet = Feet(self.references.foot, tick["feet"])
         com = self.references.com
         self.path_clock = PathClock(self.parameters, o.replan, com, tick["path"], robot.half_length)
         weight = robot.mass * robot.gravity
@@ -240,7 +241,7 @@ class EmbeddingController:
             # Of two feet on the ground the front one landed last.
             self.feet.landed = self.feet.foot_of_leg[self.mode.stance[-1]]
         self.observer.begin(bool(node.stance))
-        self.ground.begin(self.feet.landed)
+        self.slope.begin(self.frame.foothold(self.feet.landed))
         if not node.stance:
             # The liftoff before has made the foot that stood the front leg's.
             self.feet.landed = self.feet.foot_of_leg[Leg.FRONT]
@@ -273,7 +274,7 @@ class EmbeddingController:
             DivergedError: if the state is not finite.
             ParameterError: if a planner, the route or a task answers with nonsense.
         """
-        self.robot.update(*self.ground.enter(q, v))
+        self.robot.update(*self.frame.enter(q, v))
         if self._sense(contact, force, dt):
             self._decide_anew()
         solution = self._act(dt)
@@ -339,9 +340,9 @@ class EmbeddingController:
     def _find_first_slope(self) -> None:
         """Both feet stand where a run begins: the line through them is the ground."""
         self._slope_unknown = False
-        other, landed = (self.feet.foot_of_leg[leg] for leg in self.mode.stance)
-        self.ground.stand(other, landed)
-        if self._tilt_axes(self.ground.slope.slope, landed):
+        rear, front = (self.feet.foot_of_leg[leg] for leg in self.mode.stance)
+        self.slope.stand(self.frame.foothold(rear), self.frame.foothold(front))
+        if self._tilt_axes(self.slope.slope, front):
             self.supervisor.follow(self.node, self.observer.now, self.time)
             self.path_clock.restart()
             self._publish()
@@ -358,7 +359,7 @@ class EmbeddingController:
         lifted = stood - self._standing()
         # What the ground does next is not known; the best guess is its slope so far.
         leans = bool(lifted and self.mode.stance) and self._tilt_axes(
-            self.ground.slope.slope, self.feet.foot_of_leg[self.mode.stance[0]]
+            self.slope.slope, self.feet.foot_of_leg[self.mode.stance[0]]
         )
         for foot in lifted:
             self._lift(foot)
@@ -389,8 +390,7 @@ class EmbeddingController:
         """A swing keeps the shape with which it began, whatever the next stride's is."""
         supervisor = self.supervisor
         goal = supervisor.goal if supervisor.deciding else supervisor.first_goal()
-        self.feet.swing[foot].options = self.mode.swing or self.swings.towards(goal)
-        self.feet.lift(foot, self.robot, swung)
+        self.feet.lift(foot, self.robot, self.mode.swing or self.swings.towards(goal), swung)
         if self.lateral is not None:
             self.lateral.lift(foot)
 
@@ -402,10 +402,13 @@ class EmbeddingController:
 
         Where the table says ``use_pre_impact_velocity``, the path goes on with the speed before it.
         """
+        foot = self.feet.foot_of_leg[leg]
         if self.lateral is not None:
-            lasted = self.time - self.supervisor.begun_at
-            self.lateral.touch_down(self.feet.foot_of_leg[leg], lasted)
-        leans = self._update_slope(self.feet.foot_of_leg[leg])
+            self.lateral.touch_down(foot, self.time - self.supervisor.begun_at)
+        off = self.robot.foot_position[foot, 1] - self.observer.ground
+        self.slope.land(self.frame.foothold(foot), self.frame.foothold(1 - foot))
+        # Off the template's ground, the slope is that of the line through both feet.
+        leans = abs(off) > self.supervisor.height_error and self._tilt_axes(self.slope.last, foot)
         higher, s = self.observer.land(leg), self.observer.now
         if leans:
             self.supervisor.choose_assist(self.node, s)
@@ -417,19 +420,18 @@ class EmbeddingController:
         self._enter(replan(cause, self.node, s, self.time, height_error=higher).name)
         self.path_clock.restart()
 
-    def _update_slope(self, foot: int) -> bool:
-        """A foot has landed: learn the slope; if it is off, take the line through both feet."""
-        off = self.robot.foot_position[foot, 1] - self.observer.ground
-        self.ground.land(foot)
-        leans = abs(off) > self.supervisor.height_error
-        return leans and self._tilt_axes(self.ground.slope.last, foot)
-
     def _tilt_axes(self, slope: float, foot: int) -> bool:
         """Turn the axes about a foot, as far as the planner knows slopes; whether they turned."""
-        leans = self.ground.tilt(slope, foot, self.supervisor, self.observer)
-        if leans:
-            self._read()
-        return leans
+        robot, frame, before = self.robot, self.frame, self.observer.pre_impact_velocity
+        known = self.supervisor.on_slope(onward(robot.facing) * slope) if frame.turns else 0.0
+        if known == frame.angle:
+            return False
+        in_world = frame.outward(before)
+        frame.tilt(known, robot.foot_position[foot].copy())
+        before[:] = frame.inward(in_world)
+        robot.update(*frame.enter(*frame.raw_state))
+        self._read()
+        return True
 
     def _decide(self, section: Section) -> None:
         s, learners, lateral = self.observer.now, self.learners, self.lateral
@@ -437,7 +439,7 @@ class EmbeddingController:
         if supervisor.deciding:
             nominal, ended = supervisor.decision.nominal, section.of(s.state)
             if self._turn(section, nominal):
-                self.robot.update(*self.frame.enter(*self.ground.raw_state))
+                self.robot.update(*self.frame.enter(*self.frame.raw_state))
                 self._read()
                 if section is REST:
                     self._face_ahead()
@@ -469,7 +471,8 @@ class EmbeddingController:
             return self.lateral.end_stride(course, self.lateral_state(), nominal, section)
         turns = course.turns_round(self.robot)
         if turns:
-            self.ground.turn_round(self.observer)
+            self.frame.turn_round()
+            self.observer.pre_impact_velocity[0] *= -1.0
             self.learners.lean.turn_round()
         return turns
 

@@ -17,8 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.embedding.state import StateObserver
-from template_control.embedding.supervisor import StrideSupervisor
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import onward
@@ -136,10 +134,13 @@ class SlopeFrame:
     ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``, own memory if not given. The
     axes' x points where a planar robot goes. Of its state only the sagittal terms are turned round
     for that, by its model (``facing``), whose coordinates stay those of a trunk that faces uphill
-    or downhill as it does.
+    or downhill as it does. ``raw_state`` is q and v in the world, as they entered last.
     """
 
+    raw_state: tuple[Array, Array]
+
     def __init__(self, robot: Biped, data: Any = None) -> None:
+        self._robot = robot
         self._planar = robot if isinstance(robot, PlanarBiped) else None
         self.data = np.zeros(1, FRAME) if data is None else data
         self._turn: Array = self.data["turn"][0]
@@ -193,6 +194,7 @@ class SlopeFrame:
 
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
         """q (nq,) and v (nv,) for the model, of the world's; the given arrays stay as they are."""
+        self.raw_state = q, v
         if self._level:
             return q, v
         inside, speed = q.copy(), v.copy()
@@ -203,8 +205,6 @@ class SlopeFrame:
 
     def leave(self, acceleration: Array) -> Array:
         """(nv,) acceleration in the world's coordinates, from the model's."""
-        if self.angle == 0.0:
-            return acceleration
         outside = acceleration.copy()
         outside[:_BASE] = acceleration[:_BASE] @ self._turn
         return outside
@@ -222,73 +222,11 @@ class SlopeFrame:
         place = self._onward(place)
         return place if self._level else (place - self._shift) @ self._turn
 
-    def point(self, x: float, y: float) -> tuple[float, float]:
-        """As :meth:`world`, of one place."""
-        if not self._level or self._on != 1.0:
-            x, y = self.world(np.array([x, y])).tolist()
-        return x, y
-
     def outward(self, vector: Array) -> Array:
         """(..., 2) vectors in the world's axes, from these."""
         return vector if self.of_world else self._onward(vector) @ self._turn
 
-
-class SlopingGround:
-    """Learns how steep the ground is, and turns the axes as far as the planner knows slopes.
-
-    Every tick updates the robot's model in these axes, ``frame``, of the ``data`` given;
-    ``length`` is the template's l0 [m]. ``slope`` is the estimate, uphill along the world's x,
-    ``raw_state`` the robot's q and v in the world, as measured last.
-    """
-
-    raw_state: tuple[Array, Array]
-
-    def __init__(self, robot: Biped, length: float, data: Any = None) -> None:
-        self._robot = robot
-        self.frame = SlopeFrame(robot, data)
-        self.slope = SlopeEstimate(length)
-
-    def begin(self, foot: int) -> None:
-        """Forget an earlier run; ``foot`` stands."""
-        self.slope.begin(self._foothold(foot))
-
-    def stand(self, foot: int, other: int) -> None:
-        """Both feet, rear and front, stand: the ground is as steep as the line through them."""
-        self.slope.stand(self._foothold(foot), self._foothold(other))
-
-    def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """As :meth:`.SlopeFrame.enter`; what was measured is kept."""
-        self.raw_state = q, v
-        return self.frame.enter(q, v)
-
-    def land(self, foot: int) -> None:
-        """A foot has landed: learn the slope."""
-        self.slope.land(self._foothold(foot), self._foothold(1 - foot))
-
-    def tilt(
-        self, slope: float, foot: int, supervisor: StrideSupervisor, observer: StateObserver
-    ) -> bool:
-        """Turn the axes about a foot, and read the robot's model in them; True if they turned.
-
-        ``slope`` is the ground's along the world's x [rad], as far as the supervisor plans for one;
-        ``foot`` keeps its coordinates. The observer's state has to be read again then.
-        """
-        robot, frame = self._robot, self.frame
-        slope = supervisor.on_slope(onward(robot.facing) * slope) if frame.turns else 0.0
-        if slope == frame.angle:
-            return False
-        pre_impact_velocity = frame.outward(observer.pre_impact_velocity)
-        frame.tilt(slope, robot.foot_position[foot].copy())
-        observer.pre_impact_velocity[:] = frame.inward(pre_impact_velocity)
-        robot.update(*frame.enter(*self.raw_state))
-        return True
-
-    def turn_round(self, observer: StateObserver) -> None:
-        """Let the robot go the other way; the observer's state has to be read again then."""
-        self.frame.turn_round()
-        observer.pre_impact_velocity[0] *= -1.0
-
-    def _foothold(self, foot: int) -> tuple[float, float]:
+    def foothold(self, foot: int) -> tuple[float, float]:
         """x and height of a foot in the world [m]."""
-        x, y = self._robot.foot_position[foot].tolist()
-        return self.frame.point(x, y)
+        x, height = self.world(self._robot.foot_position[foot]).tolist()
+        return x, height

@@ -26,7 +26,7 @@ from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 from template_control.robot.terms import MOST_CONTACTS, UP
-from template_control.slip.automaton.vocabulary import Leg, Reset
+from template_control.slip.automaton.vocabulary import Reset
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, Scale, scaled, tuned
 
@@ -99,7 +99,19 @@ def quintic_step(state: Array, target: float, speed: float, time: float, dt: flo
     ``state`` (3,) [m, m/s, m/s^2] is overwritten. ``target`` [m] and ``speed`` [m/s] are those at
     the quintic's end, ``time`` [s] from now; the acceleration there is 0.
     """
-    _advance(state, target, speed, time, dt)
+    p, v, a = state[0], state[1], state[2]
+    # In tau = t / time: c0..c5 with c0 = p, c1 = v T, c2 = a T^2 / 2.
+    c1, c2 = v * time, 0.5 * a * time * time
+    d = target - p - c1 - c2
+    e = speed * time - c1 - 2.0 * c2
+    f = -2.0 * c2
+    c3 = 10.0 * d - 4.0 * e + 0.5 * f
+    c4 = -15.0 * d + 7.0 * e - f
+    c5 = 6.0 * d - 3.0 * e + 0.5 * f
+    s = dt / time
+    state[0] = p + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+    state[1] = (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / time
+    state[2] = (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / time**2
 
 
 @compiled
@@ -121,16 +133,16 @@ def swing_step(
         y[1] = -landing_speed
         y[0] -= landing_speed * dt
         return
-    _advance(x, place, 0.0, max(to_go - f.early[foot], horizon), dt)
+    quintic_step(x, place, 0.0, max(to_go - f.early[foot], horizon), dt)
     top = max(ground + f.clearance[foot], f.over[foot])
     rising = f.rise[foot] * to_go - (1.0 - f.rise[foot]) * elapsed
     if rising > horizon:
-        _advance(y, top, 0.0, rising, dt)
+        quintic_step(y, top, 0.0, rising, dt)
     elif to_go > f.descent[foot]:
         # Up: stay there, and come to rest where the rise was cut short.
-        _advance(y, top, 0.0, max(2.0 * horizon, dt), dt)
+        quintic_step(y, top, 0.0, max(2.0 * horizon, dt), dt)
     else:
-        _advance(y, ground, -landing_speed, to_go, dt)
+        quintic_step(y, ground, -landing_speed, to_go, dt)
 
 
 @compiled
@@ -204,76 +216,27 @@ def spread_contacts(f: Any, foot: int, r: Any, yaw: float, duration: float, offs
             offset[contact, axis, 1], offset[contact, axis, 2] = rate * off, bend * off
 
 
-@compiled
-def _advance(state: Array, target: float, speed: float, time: float, dt: float) -> None:
-    p, v, a = state[0], state[1], state[2]
-    # In tau = t / time: c0..c5 with c0 = p, c1 = v T, c2 = a T^2 / 2.
-    c1, c2 = v * time, 0.5 * a * time * time
-    d = target - p - c1 - c2
-    e = speed * time - c1 - 2.0 * c2
-    f = -2.0 * c2
-    c3 = 10.0 * d - 4.0 * e + 0.5 * f
-    c4 = -15.0 * d + 7.0 * e - f
-    c5 = 6.0 * d - 3.0 * e + 0.5 * f
-    s = dt / time
-    state[0] = p + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
-    state[1] = (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / time
-    state[2] = (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / time**2
+def begin_swing(
+    data: Any,
+    foot: int,
+    options: SwingOptions,
+    reference: Array,
+    position: Array,
+    velocity: Array,
+    elapsed: float = 0.0,
+) -> None:
+    """Begin a swing of a shape, which it keeps, at the foot's position and velocity.
 
-
-class SwingFoot:
-    """Reference of a foot in the air; it persists from liftoff to touchdown.
-
-    ``x``, ``y`` (3,) are position, velocity, acceleration [m, m/s, m/s^2] in the world, kept in
-    ``reference`` (2, 3). ``data`` (1,) are of ``FEET``. Both are own memory if not given.
+    ``data`` (1,), of ``FEET``, and ``reference`` (2, 3), x and y in the world, are overwritten;
+    ``position`` (2,) [m], ``velocity`` (2,) [m/s]; ``elapsed`` is since the foot left the ground
+    [s].
     """
-
-    def __init__(
-        self,
-        options: SwingOptions,
-        reference: Array | None = None,
-        data: Any = None,
-        foot: int = 0,
-    ) -> None:
-        self.data = np.zeros(1, FEET) if data is None else data
-        self._foot = foot
-        self.x, self.y = np.zeros((2, 3)) if reference is None else reference
-        self._place = self.data[0], foot, self.x, self.y
-        self.options = options
-        self._begin(0.0)
-
-    @property
-    def options(self) -> SwingOptions:
-        """Shape of the swing from now on."""
-        return self._options
-
-    @options.setter
-    def options(self, options: SwingOptions) -> None:
-        """Take another shape."""
-        self._options = options
-        for name in _SHAPE:
-            value = getattr(options, name)
-            self.data[name][0, self._foot] = inf if value is None else value
-
-    def _begin(self, elapsed: float) -> None:
-        self.data["elapsed"][0, self._foot] = elapsed
-        self.data["over"][0, self._foot] = -inf
-
-    def start(self, position: Array, velocity: Array, elapsed: float = 0.0) -> None:
-        """Begin a swing at the foot's position (2,) [m] and velocity (2,) [m/s] in the world.
-
-        ``elapsed`` is since the foot left the ground [s].
-        """
-        self.x[:] = position[0], velocity[0], 0.0
-        self.y[:] = position[1], velocity[1], 0.0
-        self._begin(elapsed)
-
-    def advance(self, foothold: float, time_to_go: float, dt: float, ground: float) -> None:
-        """Move the reference by ``dt`` [s] towards x of its foothold in the world [m].
-
-        ``time_to_go`` is until the foot is due there [s]; ``ground`` is the foothold's height [m].
-        """
-        swing_step(*self._place, (foothold, ground, time_to_go), dt)
+    now = data[0]
+    for name in _SHAPE:
+        value = getattr(options, name)
+        now[name][foot] = inf if value is None else value
+    now["elapsed"][foot], now["over"][foot] = elapsed, -inf
+    reference[:, 0], reference[:, 1], reference[:, 2] = position, velocity, 0.0
 
 
 HIGH_SWING = SwingOptions(clearance=0.06, rise=0.3, descent=0.12, early=0.02)
@@ -315,26 +278,22 @@ class Swings(NamedTuple):
 
 
 class Feet:
-    """Roles of the two feet; the automaton's resets change them.
+    """Roles of the two feet, which the automaton's resets change, and their swings.
 
-    ``reference`` (2, 2, 3) keeps the swings' references by foot; ``data`` (1,) are of ``FEET``, own
-    memory if not given. ``foot_of_leg`` are the feet of the rear and the front leg, ``swing`` each
-    foot's reference in the air, ``swing_time`` (2,) is since each foot lifted off [s]. The
-    template's ground is at the foot that ``landed`` last.
+    ``reference`` (2, 2, 3) are the swings' references by foot: x and y in the world, each position,
+    velocity, acceleration [m, m/s, m/s^2]. ``data`` (1,) are of ``FEET``. ``swing_time`` (2,) is
+    since each foot lifted off [s].
     """
 
-    def __init__(self, options: SwingOptions, reference: Array, data: Any = None) -> None:
-        self.data = np.zeros(1, FEET) if data is None else data
-        self.swing = tuple(
-            SwingFoot(options, place, self.data, foot) for foot, place in enumerate(reference)
-        )
-        self.swing_time: Array = self.data["swing_time"][0]
+    def __init__(self, reference: Array, data: Any) -> None:
+        self.reference, self.data = reference, data
+        self.swing_time: Array = data["swing_time"][0]
         self.swing_time[:] = inf
         self.begin(0)
 
     @property
     def landed(self) -> int:
-        """See the class."""
+        """The foot that landed last; the template's ground is there."""
         return int(self.data["landed"][0])
 
     @landed.setter
@@ -344,38 +303,34 @@ class Feet:
 
     @property
     def foot_of_leg(self) -> tuple[int, int]:
-        """See the class."""
-        return self._roles
-
-    @foot_of_leg.setter
-    def foot_of_leg(self, roles: tuple[int, int]) -> None:
-        """Take other roles."""
-        self._roles = roles
-        self.data["roles"] = roles
+        """Feet of the rear and the front leg."""
+        rear, front = self.data["roles"][0].tolist()
+        return rear, front
 
     def begin(self, rear: int) -> None:
         """Make foot ``rear`` the rear leg's, and put the template's ground under it."""
-        self.foot_of_leg = (rear, 1 - rear)
+        self.data["roles"] = rear, 1 - rear
         self.landed = rear
 
-    def lift(self, foot: int, robot: Biped, swung: float = 0.0) -> None:
+    def lift(self, foot: int, robot: Biped, shape: SwingOptions, swung: float = 0.0) -> None:
         """Begin the swing of a foot that leaves the ground, or left it ``swung`` [s] ago.
 
         ``foot`` is its index in the order of the robot's ``feet``; the swing begins at its position
         and velocity in the updated model.
         """
         self.swing_time[foot] = swung
+        now = robot.data[0]
         for contact in robot.groups[foot]:
-            now = robot.data[0]
             away = now["contact_position"][contact] - now["foot_position"][foot]
             self.data["spread"][0, contact] = robot.spread[contact]
             self.data["lifted"][0, contact] = away
-        self.swing[foot].start(robot.foot_position[foot], robot.foot_velocity[foot], swung)
+        motion = robot.foot_position[foot], robot.foot_velocity[foot]
+        begin_swing(self.data, foot, shape, self.reference[foot], *motion, swung)
 
     def apply(self, reset: Reset) -> None:
         """Change the roles as the automaton's reset does."""
         if reset in _EXCHANGES:
-            self.foot_of_leg = (self.foot_of_leg[Leg.FRONT], self.foot_of_leg[Leg.REAR])
+            self.data["roles"] = self.foot_of_leg[::-1]
 
 
 _EXCHANGES = (Reset.SHIFT, Reset.SWAP)

@@ -274,7 +274,7 @@ class Recorder:
             push: disturbance on the trunk; of a free robot its size, negative backward [N].
             seconds: wall-clock time of the controller's tick.
         """
-        c, (seen_q, seen_v) = self.controller, self.controller.ground.raw_state
+        c, (seen_q, seen_v) = self.controller, self.controller.frame.raw_state
         force, torque = np.ascontiguousarray(force, dtype=np.float64), solution.torque
         look(*c.memory, self._seen)
         known = q is seen_q and v is seen_v

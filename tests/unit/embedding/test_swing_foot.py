@@ -4,19 +4,32 @@ import numpy as np
 import pytest
 
 from template_control.embedding.swing import (
+    FEET,
     HIGH_SWING,
-    Feet,
-    SwingFoot,
     SwingOptions,
+    begin_swing,
     drop,
     furthest,
     meet_wall,
     quintic_step,
+    swing_step,
 )
 from template_control.embedding.tick import TICK, move_swings
 from template_control.robot.terms import ROBOT_DATA
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.task import References
+
+
+class Swing:
+    """One foot's swing, from its start on."""
+
+    def __init__(self, options, position, velocity, elapsed=0.0):
+        self.data, self.reference = np.zeros(1, FEET), np.zeros((2, 3))
+        begin_swing(self.data, 0, options, self.reference, position, velocity, elapsed)
+        self.x, self.y = self.reference
+
+    def advance(self, foothold, due):
+        swing_step(self.data[0], 0, self.x, self.y, (foothold, 0.0, due), 1e-3)
 
 
 def meet(swing, at, foothold, due):
@@ -43,10 +56,10 @@ def test_a_swing_steps_along_the_quintics_of_its_parts():
         (0.3, 0.08): (0.0, -options.landing_speed, 0.08),  # and comes down
     }
     for (elapsed, to_go), up in parts.items():
-        swing, (other_x, other_y) = SwingFoot(options), (axis.copy() for axis in here)
-        swing.start(np.zeros(2), np.zeros(2), elapsed)
+        other_x, other_y = (axis.copy() for axis in here)
+        swing = Swing(options, np.zeros(2), np.zeros(2), elapsed)
         swing.x[:], swing.y[:] = here
-        swing.advance(0.7, to_go, 1e-3, 0.0)
+        swing.advance(0.7, to_go)
         quintic_step(other_x, 0.7, 0.0, to_go - options.early, 1e-3)
         quintic_step(other_y, *up, 1e-3)
         np.testing.assert_array_equal((swing.x, swing.y), (other_x, other_y))
@@ -54,11 +67,10 @@ def test_a_swing_steps_along_the_quintics_of_its_parts():
 
 def test_swing_clears_the_ground_and_lands_slowly():
     options = SwingOptions()
-    swing = SwingFoot(options)
-    swing.start(np.array([-0.6, 0.0]), np.zeros(2))
+    swing = Swing(options, np.array([-0.6, 0.0]), np.zeros(2))
     heights, accelerations = [], []
     for i in range(400):
-        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
+        swing.advance(0.6, 0.4 - i * 1e-3)
         heights.append(swing.y[0])
         accelerations.append(max(abs(swing.x[2]), abs(swing.y[2])))
     assert max(heights) == pytest.approx(options.clearance, abs=2e-3)
@@ -72,10 +84,9 @@ def test_swing_clears_the_ground_and_lands_slowly():
 
 
 def test_swing_without_a_foothold_comes_down():
-    swing = SwingFoot(SwingOptions())
-    swing.start(np.array([0.0, 0.05]), np.array([1.0, 0.0]))
+    swing = Swing(SwingOptions(), np.array([0.0, 0.05]), np.array([1.0, 0.0]))
     for _ in range(100):
-        swing.advance(np.nan, 0.3, 1e-3, 0.0)
+        swing.advance(np.nan, 0.3)
     assert swing.y[0] == pytest.approx(0.05 - 0.02)
     assert swing.x[1] == 0.0
 
@@ -88,8 +99,7 @@ def test_swing_stays_within_reach_of_the_hip():
 
 def test_swing_falls_to_ground_that_comes_late():
     options = SwingOptions(drop_acceleration=7.0)
-    swing = SwingFoot(options)
-    swing.start(np.array([0.6, 0.0]), np.array([0.1, -0.2]))
+    swing = Swing(options, np.array([0.6, 0.0]), np.array([0.1, -0.2]))
     for _ in range(50):
         drop(swing.data[0], 0, swing.x, swing.y, 1e-3)
     assert swing.y[0] == pytest.approx(-0.2 * 0.05 - 0.5 * options.drop_acceleration * 0.05**2)
@@ -99,11 +109,10 @@ def test_swing_falls_to_ground_that_comes_late():
 
 def test_a_foot_is_high_while_it_travels():
     options = HIGH_SWING
-    swing = SwingFoot(options)
-    swing.start(np.array([-0.6, 0.0]), np.zeros(2))
+    swing = Swing(options, np.array([-0.6, 0.0]), np.zeros(2))
     places, heights = [], []
     for i in range(400):
-        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
+        swing.advance(0.6, 0.4 - i * 1e-3)
         places.append(swing.x[0])
         heights.append(swing.y[0])
     travels = (np.array(places) > -0.55) & (np.array(places) < 0.58)
@@ -112,10 +121,9 @@ def test_a_foot_is_high_while_it_travels():
 
 def test_a_foot_that_meets_a_wall_goes_up_along_it_and_on_above_it():
     options = SwingOptions(lift_speed=1.5, margin=0.03)
-    swing = SwingFoot(options)
-    swing.start(np.array([-0.6, 0.0]), np.zeros(2))
+    swing = Swing(options, np.array([-0.6, 0.0]), np.zeros(2))
     for i in range(100):
-        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
+        swing.advance(0.6, 0.4 - i * 1e-3)
     wall, below = np.array([-0.5, 0.07]), swing.y[0]
     for _ in range(20):
         meet(swing, wall, 0.6, 0.28)
@@ -124,14 +132,13 @@ def test_a_foot_that_meets_a_wall_goes_up_along_it_and_on_above_it():
     met = swing.y[0]
     assert met == pytest.approx(max(below, 0.07) + 20e-3 * options.lift_speed, abs=2e-3)
     for i in range(60):
-        swing.advance(0.6, 0.28 - i * 1e-3, 1e-3, 0.0)
+        swing.advance(0.6, 0.28 - i * 1e-3)
     assert swing.x[0] > -0.45, "it goes on"
     assert swing.y[0] == pytest.approx(met + options.margin, abs=5e-3)
 
 
 def test_a_foot_that_meets_a_wall_late_goes_down_before_it():
-    swing = SwingFoot(SwingOptions())
-    swing.start(np.array([0.5, 0.03]), np.array([0.3, -0.5]))
+    swing = Swing(SwingOptions(), np.array([0.5, 0.03]), np.array([0.3, -0.5]))
     for _ in range(20):
         meet(swing, (0.5, 0.02), 0.6, 0.02)
     assert swing.x[0] == 0.5
@@ -143,8 +150,7 @@ def test_a_foot_that_meets_a_wall_late_goes_down_before_it():
 )
 def test_a_foot_that_comes_down_and_is_nearly_there_is_set_down(speed, foothold, rises):
     """One that rises only begins its swing, and a short step ends near its beginning."""
-    swing = SwingFoot(SwingOptions(near=0.05))
-    swing.start(np.array([0.5, 0.03]), np.array([0.3, speed]))
+    swing = Swing(SwingOptions(near=0.05), np.array([0.5, 0.03]), np.array([0.3, speed]))
     for _ in range(20):
         meet(swing, (0.5, 0.02), foothold, 0.07)
     assert (swing.y[0] > 0.03) == rises
@@ -154,10 +160,10 @@ def test_a_foot_that_comes_down_and_is_nearly_there_is_set_down(speed, foothold,
 def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(overdue):
     """The path of an overdue foot knows a later touchdown, of lower ground."""
     tick, robot, references = np.zeros(1, TICK), np.zeros(1, ROBOT_DATA), References()
-    swing = Feet(SwingOptions(), references.foot, tick["feet"]).swing[1]
-    swing.start(np.array([0.57, -0.004]), np.array([0.0, -0.2]))
+    reference, start = references.foot[1], (np.array([0.57, -0.004]), np.array([0.0, -0.2]))
+    begin_swing(tick["feet"], 1, SwingOptions(), reference, *start)
     now, (model,) = tick[0], robot
-    now["contacts"]["wall"][1] = 1.0
+    now["feet"]["roles"], now["contacts"]["wall"][1] = (0, 1), 1.0
     now["mode"]["swings"], now["mode"]["swing_leg"][0] = 1, Leg.FRONT
     now["mode"]["next_touchdown_leg"] = Leg.FRONT
     now["path"]["without_touchdown"] = overdue
@@ -166,17 +172,17 @@ def test_an_overdue_foot_that_meets_a_wall_has_no_time_to_go_up(overdue):
     model["leg_length"] = 1.0
     for _ in range(10):
         move_swings(now, model, references.data[0], 1e-3)
-    assert swing.x[0] == 0.57
-    assert (swing.y[0] < -0.006) if overdue else (swing.y[0] > 0.0)
+    x, y = reference[:, 0]
+    assert x == 0.57
+    assert (y < -0.006) if overdue else (y > 0.0)
 
 
 def test_a_foot_that_is_held_comes_down_late():
     options = SwingOptions(clearance=0.15, rise=0.4, descent=0.1, landing_speed=0.6)
-    swing = SwingFoot(options)
-    swing.start(np.array([-0.6, 0.0]), np.zeros(2))
+    swing = Swing(options, np.array([-0.6, 0.0]), np.zeros(2))
     heights = []
     for i in range(400):
-        swing.advance(0.6, 0.4 - i * 1e-3, 1e-3, 0.0)
+        swing.advance(0.6, 0.4 - i * 1e-3)
         heights.append(swing.y[0])
     np.testing.assert_allclose(heights[180:300], 0.15, atol=2e-3)
     assert heights[80] == pytest.approx(0.075, abs=5e-3), "half of the rise"
