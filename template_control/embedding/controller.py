@@ -165,7 +165,7 @@ class EmbeddingController:
         self.lateral: LateralMotion | None = None
         if isinstance(robot, FloatingBaseBiped) and isinstance(given, FreeOptions):
             keeps = self.feet, self.references, tick["lateral"]
-            self.lateral = LateralMotion.of(robot, self.parameters, given, *keeps)
+            self.lateral = LateralMotion(robot, self.parameters, given, *keeps)
         self._memory = self._tick, robot.data, self.references.data, self.qp.data
         self.memory = tick, robot.data, self.references.data
 
@@ -315,7 +315,7 @@ class EmbeddingController:
         self.path_clock.take(self.supervisor)
         stand(*self._memory)
         now["trim"] = self.learners.trim.acceleration
-        sideways = None if self.lateral is None else self.lateral.arrays(self.supervisor)
+        sideways = None if self.lateral is None else self.lateral.plan(self.supervisor)
         self._plan: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
         self._room: tuple[Array, ...] | None = None  # all of ``_kept`` is to be kept anew
 

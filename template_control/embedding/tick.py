@@ -214,7 +214,7 @@ def advance(kept: Any, dt: float) -> None:
 
     Args:
         kept: :class:`.Kept`: ``tick``, ``data``, ``references`` and ``qp``, see the module, and the
-            robot's ``arrays``; curve of the path, and the arrays that :func:`.lateral_foothold`
+            robot's ``arrays``; curve of the path, and the plan that :func:`.lateral_foothold`
             reads, or None in the plane; ``program`` and ``table`` of the phase's tasks; ``room`` of
             :func:`.solve_free`.
         dt: control period [s].
@@ -306,7 +306,7 @@ def _move_in_space(t: Any, r: Any, want: Any, lateral: tuple[Any, ...] | None, d
 
 
 @compiled
-def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: float) -> None:
+def _swing_sideways(t: Any, r: Any, want: Any, plan: tuple[Any, ...], dt: float) -> None:
     """As :func:`move_swings`, to the left and right.
 
     Of two feet in the air the one that is due first goes to the next foothold, the other one to
@@ -322,7 +322,7 @@ def _swing_sideways(t: Any, r: Any, want: Any, arrays: tuple[Any, ...], dt: floa
         first = min(first, path.landing_time[f.roles[mode.swing_leg[i]]])
     for k in range(2):
         feet[k] = lateral.stood[lateral.feet[k], _SIDE]
-    foothold = lateral_foothold(lateral, arrays, path.time, com, feet)
+    foothold = lateral_foothold(lateral, plan, path.time, com, feet)
     rests = path.event_times[_REST] < path.event_times[_VLO]
     if lateral.step != 0.0 and mode.stances == 1 and (rests or np.isnan(foothold)):
         # The next touchdown leads to a stand, on no spring of the template, or nowhere.

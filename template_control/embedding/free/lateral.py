@@ -105,15 +105,8 @@ _F, _I = np.float64, np.int64
 
 LATERAL = np.dtype(
     [
-        # -- the path: see LateralPath --
-        ("gravity", _F),
-        ("longest", _F),
-        ("touchdown", _F),
-        ("section", _F),
-        ("stance", _I),
-        ("ratio", _F),
         ("rolling", _F),  # of the feet, see pivot
-        ("feet", _I, (2,)),  # that were rear and front at its start
+        ("feet", _I, (2,)),  # that were rear and front at the start of the path
         ("stood", _F, (2, 2)),  # x and y where each foot stands, or stood last [m]
         # -- the turn of a run's stride --
         ("turn", _F),  # of the heading in it [rad]
@@ -131,17 +124,9 @@ LATERAL = np.dtype(
         ("pressure", _F),  # y of the centre of pressure [m]; NaN: not planned
         ("pressure_at", _F),  # when it was planned [s]
         ("half_width", _F),  # how far to either side of its middle a foot bears; 0 of a point [m]
-        # -- what the foothold is for: see LateralAim --
-        ("state", _F, (2,)),
-        ("step", _F),
-        ("cost", _F, (2, 2)),
-        ("step_cost", _F),
-        ("offset", _F, (2,)),
-        ("steps", _F, (2,)),
-        ("reach", _F),
-        ("stretch", _F),
-        ("second_step", _F),  # from that foothold to the one after it, to the left [m]
         # -- the foothold: see Placement --
+        ("step", _F),  # to it in the gait, see LateralAim [m]
+        ("second_step", _F),  # from it to the one after it, to the left [m]
         ("hold", _F),  # time before touchdown from which on it is kept [s]
         ("placed", _I),  # whether there is one
         ("y", _F),
@@ -158,35 +143,15 @@ LATERAL = np.dtype(
 
 @compiled
 def lateral_foothold(
-    lateral: Any, arrays: tuple[Any, ...], time: float, com: Array, feet: Array
+    lateral: Any, plan: tuple[LateralPath, LateralAim], time: float, com: Array, feet: Array
 ) -> float:
     """y of the next foothold [m]; NaN where none is known.
 
-    ``lateral``, of ``LATERAL``, is overwritten. ``arrays`` are coefficients, meta and footholds of
-    the :class:`.LateralPath`, on which ``time`` is [s]; ``com`` (2,) is y of the CoM and dy/dt [m,
-    m/s], ``feet`` (2,) y of the feet that were rear and front at the start of the path [m].
+    ``lateral``, of ``LATERAL``, is overwritten. ``plan`` are the path, on which ``time`` is [s],
+    and what the foothold is for; ``com`` (2,) is y of the CoM and dy/dt [m, m/s], ``feet`` (2,) y
+    of the feet that were rear and front at the start of the path [m].
     """
-    path = LateralPath(
-        coefficients=arrays[0],
-        meta=arrays[1],
-        footholds=arrays[2],
-        gravity=lateral.gravity,
-        longest=lateral.longest,
-        touchdown=lateral.touchdown,
-        section=lateral.section,
-        stance=lateral.stance,
-        ratio=lateral.ratio,
-    )
-    aim = LateralAim(
-        state=lateral.state,
-        step=lateral.step,
-        cost=lateral.cost,
-        step_cost=lateral.step_cost,
-        offset=lateral.offset,
-        steps=lateral.steps,
-        reach=lateral.reach,
-        stretch=lateral.stretch,
-    )
+    path, aim = plan
     pivots = np.empty(2)
     for k in range(2):
         pivots[k] = pivot(feet[k], com[0], lateral.rolling)
@@ -202,6 +167,10 @@ def lateral_foothold(
 
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of each foot, in the order of the robot's ``feet``."""
+
+
+_NO_AIM = LateralAim(np.zeros(2), 0.0, np.zeros((2, 2)), 0.0, np.zeros(2), np.zeros(2), 0.0, 1.0)
+"""Of a robot that has walked towards no gait yet: its path comes to no foothold."""
 
 
 class LateralPlanner:
@@ -232,7 +201,7 @@ class LateralPlanner:
         self.cycle: LateralCycle
         self._gait: Gait | None = None
         self._lateral: LateralGait
-        self._aim: LateralAim
+        self._aim = _NO_AIM
         self._planar: TemplatePath | None = None
         self._path: LateralPath
         self._landed: Placement | None = None
@@ -318,8 +287,7 @@ class LateralPlanner:
         if self._lateral.ahead and not turned:
             self._aim = before_turn(self._aim, self._lateral, self.wish.turn)
         self.data["second_step"] = self.cycle.steps[stance.other.row]
-        for name, value in self._aim._asdict().items():
-            self.data[name] = value
+        self.data["step"] = self._aim.step
 
     def forecast(self, path: TemplatePath, com: Array, feet: Array) -> LateralForecast:
         """Forecast of the next foothold, where the planar path of the robot begins.
@@ -331,16 +299,14 @@ class LateralPlanner:
         pivots = pivot(feet, com[0], float(self.data[0]["rolling"]))
         return lateral_forecast(place(self._path, self._aim, 0.0, com, pivots), self._aim)
 
-    def follow(self, path: TemplatePath, feet: tuple[int, int]) -> tuple[Any, ...]:
+    def follow(self, path: TemplatePath, feet: tuple[int, int]) -> tuple[LateralPath, LateralAim]:
         """Take the planar path that the robot is on from now on.
 
-        ``feet`` were rear and front at its start. Returns the arrays of :func:`lateral_foothold`.
+        ``feet`` were rear and front at its start. Returns the plan of :func:`lateral_foothold`.
         """
         self._take(path)
         self.data["feet"] = feet
-        for name in ("gravity", "longest", "touchdown", "section", "stance", "ratio"):
-            self.data[name] = getattr(self._path, name)
-        return self._path.coefficients, self._path.meta, self._path.footholds
+        return self._path, self._aim
 
     def _take(self, path: TemplatePath) -> None:
         if path is not self._planar:

@@ -32,7 +32,8 @@ from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.lateral.gait import LateralWish
-from template_control.slip.lateral.placing import LATERAL
+from template_control.slip.lateral.path import LateralPath
+from template_control.slip.lateral.placing import LATERAL, LateralAim
 from template_control.slip.maps.section import APEX, REST, Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
@@ -55,58 +56,38 @@ FACING_TIME = 1.7
 class LateralMotion:
     """Heading, and footholds to the left and right.
 
-    ``robot`` is the nominal model, which every tick updates; ``side`` of ``references`` is kept
-    here. A foothold that is wanted further than ``reach`` [m] beyond its bounds is out of reach.
-    Courses are followed by ``ramps``: of the speed
-    to the left [m/s^2], and of a walk's and of a run's turning rates [rad/s^2]. A jump would move
-    the periodic motion further than one step reaches. ``facing`` are :data:`FACING_RATE` and
-    :data:`FACING_TIME`, scaled.
+    ``robot`` is the nominal model, which every tick updates; ``options`` are not scaled; ``side``
+    of ``references`` is kept here, and ``data`` (1,), of :data:`~.lateral.LATERAL`, is what ticks
+    read and write. Courses are followed by ramps: a jump would move the periodic motion further
+    than one step reaches.
     """
 
     def __init__(
         self,
-        robot: FloatingBaseBiped,
-        planner: LateralPlanner,
-        feet: Feet,
-        references: References,
-        reach: float,
-        ramps: tuple[float, float, float],
-        facing: tuple[float, float] = (FACING_RATE, FACING_TIME),
-    ) -> None:
-        self.robot, self.planner = robot, planner
-        self._feet, self._references, self._reach = feet, references, reach
-        self._stood: Array = planner.data["stood"][0]
-        # Speed to the left [m/s], rates of the trunk: in the world, and from its course [rad/s].
-        self._now: Array = np.zeros(3)
-        self._ramps, self._facing = ramps, facing
-        self._turns = 0.0  # of the trunk from the course, in the present stride [rad]
-
-    @classmethod
-    def of(
-        cls,
         robot: FloatingBaseBiped,
         parameters: SlipParameters,
         options: FreeOptions,
         feet: Feet,
         references: References,
         data: Any,
-    ) -> LateralMotion:
-        """Lateral motion of a controller; ``options`` are not scaled.
-
-        ``data`` (1,) are of :data:`~.lateral.LATERAL`, which ticks read and write.
-        """
+    ) -> None:
         ready(LATERAL)
         scale = Scale.of(parameters)
         wish = LateralWish(scaled(options, scale).step_width)
         rolling = robot.foot_radius / parameters.rest_length if robot.paired else 0.0
-        planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway, rolling)
+        self.robot, self._feet, self._references = robot, feet, references
+        self.planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway, rolling)
         data["bank_rate"] = BANK_RATE / scale.time
         data["unit"], data["pressure"] = scale.time, np.nan
         data["half_width"] = robot.half_width
+        self._stood: Array = data["stood"][0]
+        # Speed to the left [m/s], rates of the trunk: in the world, and from its course [rad/s].
+        self._now: Array = np.zeros(3)
+        self._turns = 0.0  # of the trunk from the course, in the present stride [rad]
+        self._reach = BEYOND * scale.length
         turns = TURN_RAMP / scale.time**2, RUN_RAMP / scale.time**2
-        ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
-        facing = FACING_RATE / scale.time, FACING_TIME * scale.time
-        return cls(robot, planner, feet, references, BEYOND * scale.length, ramps, facing)
+        self._ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
+        self._facing = FACING_RATE / scale.time, FACING_TIME * scale.time
 
     def begin(self, gaits: Iterable[Gait], course: Course, in_flight: bool) -> None:
         """Begin a run with the first gait that has steps; nothing is learnt yet.
@@ -285,6 +266,6 @@ class LateralMotion:
         speed = float(self.robot.data[0]["foot_velocity"][foot, _SIDE])
         self._references.side[foot] = self.side(foot), speed, 0.0
 
-    def arrays(self, supervisor: StrideSupervisor) -> tuple[Any, ...]:
-        """Arrays of the supervisor's path that :func:`.lateral_foothold` reads."""
+    def plan(self, supervisor: StrideSupervisor) -> tuple[LateralPath, LateralAim]:
+        """Plan of :func:`.lateral_foothold` on the supervisor's path."""
         return self.planner.follow(supervisor.path, supervisor.feet)

@@ -278,15 +278,11 @@ def test_the_com_falls_away_from_the_pivot_of_a_foot_that_rolls():
 
 def test_a_foothold_that_is_not_known_is_neither_kept_nor_learnt_from():
     planner = LateralPlanner(P, OPTIONS, LateralWish(0.2), np.zeros(1, MEMORY))
-    data = planner.data
-    for name in ("gravity", "longest", "touchdown", "stance", "ratio"):
-        data[name] = getattr(PATH, name)
-    data["steps"], data["reach"], data["stretch"], data["step_cost"] = (-1.0, 1.0), 1.0, 1.0, 1.0
-    arrays = PATH.coefficients, PATH.meta, PATH.footholds
+    com, feet, (to, _) = np.array([0.05, 0.0]), np.array([0.1, 0.0]), aim(Side.LEFT)
 
     def foothold(section):
-        data["section"] = section
-        return lateral_foothold(data[0], arrays, 0.0, np.array([0.05, 0.0]), np.array([0.1, 0.0]))
+        plan = PATH._replace(section=section), to
+        return lateral_foothold(planner.data[0], plan, 0.0, com, feet)
 
     assert np.isnan(foothold(np.inf))
     assert planner.placed is None
