@@ -113,17 +113,17 @@ class ContactMonitor:
     air, or is due to land, where either flag is expected. Any other flag is believed after
     ``ContactOptions.doubt``. A foot pressed against a wall does not stand; one of several contacts
     stands on one of them. ``weight`` is the robot's [N], ``groups`` are the contacts of either
-    foot; ``data`` (1,) are of ``CONTACTS``, own memory if not given.
+    foot; ``data`` (1,) are of ``CONTACTS``.
     """
 
     def __init__(
         self,
         options: ContactOptions,
         weight: float,
-        data: Any = None,
+        data: Any,
         groups: Sequence[Sequence[int]] = SINGLE,
     ) -> None:
-        self.data = np.zeros(1, CONTACTS) if data is None else data
+        self.data = data
         now = self.data[0]
         now["contacts"] = sum(map(len, groups))
         for foot, group in enumerate(groups):
@@ -136,21 +136,3 @@ class ContactMonitor:
         """Forget an earlier run; no foot is said to stand yet."""
         for name in ("standing", "touching", "wall", "flags", "held"):
             self.data[name] = 0
-
-    def blocked(self, foot: int) -> bool:
-        """True if a wall is in front of a foot."""
-        return bool(self.data["wall"][0, foot] > 0.0)
-
-    def update(
-        self,
-        flags: NDArray[np.bool_],
-        force: Array | None,
-        expected: Sequence[bool | None],
-        dt: float,
-    ) -> None:
-        """Take in the flags of a tick; see :func:`update_contacts`.
-
-        ``expected`` is whether each foot is to touch the ground now; None: it is due to land.
-        """
-        self.data["expected"] = [DUE if due is None else int(due) for due in expected]
-        update_contacts(self.data[0], flags, NO_FORCE if force is None else force, dt)

@@ -24,7 +24,7 @@ from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.trot import default_options
 from template_control.embedding.ground import SlopeEstimate, SlopeFrame
 from template_control.embedding.learners.learners import Learners
-from template_control.embedding.modes import PLACED, PathClock, RobotGuards, check_legs, modes
+from template_control.embedding.modes import PLACED, PathClock, check_legs, modes, set_guards
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Cause, Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
@@ -148,7 +148,7 @@ class EmbeddingController:
         self.contacts = ContactMonitor(o.contacts, weight, tick["contacts"], robot.groups)
         standing = self.contacts.standing
         self.observer = StateObserver(robot, self.feet, standing, com[4:], tick["sensed"])
-        self._guards = RobotGuards(self.parameters, o.guards, tick["guards"])
+        set_guards(tick["guards"], self.parameters, o.guards)
         check_legs(automaton, robot)
         self._modes = modes(automaton, robot.nv, o.phases)
         for mode in self._modes.values():

@@ -131,7 +131,7 @@ class SlopeFrame:
     """Turns states into axes that lean with the ground, and results back into the world's.
 
     The robot's gravity is turned as well; a free robot stays in the world's axes. ``angle`` is the
-    ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``, own memory if not given. The
+    ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``. The
     axes' x points where a planar robot goes. Of its state only the sagittal terms are turned round
     for that, by its model (``facing``), whose coordinates stay those of a trunk that faces uphill
     or downhill as it does. ``raw_state`` is q and v in the world, as they entered last.
@@ -139,10 +139,9 @@ class SlopeFrame:
 
     raw_state: tuple[Array, Array]
 
-    def __init__(self, robot: Biped, data: Any = None) -> None:
-        self._robot = robot
+    def __init__(self, robot: Biped, data: Any) -> None:
+        self._robot, self.data = robot, data
         self._planar = robot if isinstance(robot, PlanarBiped) else None
-        self.data = np.zeros(1, FRAME) if data is None else data
         self._turn: Array = self.data["turn"][0]
         self._shift: Array = self.data["shift"][0]
         self.reset()

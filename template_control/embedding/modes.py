@@ -26,9 +26,8 @@ from template_control.embedding.com_path import at_direction, at_time
 from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.phases import Clock, PhaseControl, Phases, phase_control
 from template_control.embedding.rollout import ReplanOptions
-from template_control.embedding.state import SENSED, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
-from template_control.embedding.swing import FEET, SwingOptions
+from template_control.embedding.swing import SwingOptions
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -152,29 +151,14 @@ def first_fired(g: Any, mode: Any, path: Any, s: Any, f: Any, c: Any) -> int:
     return -1
 
 
-class RobotGuards:
-    """The automaton's guards on the robot's measured state.
-
-    ``data`` (1,) are of ``GUARDS``, own memory if not given.
-    """
-
-    def __init__(self, parameters: SlipParameters, options: GuardOptions, data: Any = None) -> None:
-        p, angle = parameters, options.liftoff_angle
-        self.data = np.zeros(1, GUARDS) if data is None else data
-        now = self.data[0]
-        now["rest_length"] = p.rest_length
-        now["liftoff_angle"] = np.nan if angle is None else angle
-        now["shortest_swing"] = _SHORTEST_SWING * np.sqrt(p.rest_length / p.gravity)
-        now["earliest"] = _EARLIEST * Scale.of(p).time
-        now["overstretch"] = _OVERSTRETCH * p.rest_length
-
-    def fired(self, edge: Edge, sensed: TemplateState, time_to_go: float) -> bool:
-        """True if the edge's event has happened; see :func:`fired`."""
-        state, feet = np.zeros(1, SENSED), np.zeros(1, FEET)
-        state["state"], state["toes"] = sensed.state, sensed.toes
-        feet["roles"], feet["swing_time"] = sensed.feet, sensed.swing_time
-        number, contact = _numbered(edge), sensed.contact.astype(np.uint8)
-        return bool(fired(self.data[0], number, state[0], feet[0], contact, time_to_go))
+def set_guards(data: Any, parameters: SlipParameters, options: GuardOptions) -> None:
+    """Write the constants of the guards of a template's robot into ``data``, of ``GUARDS``."""
+    p, angle = parameters, options.liftoff_angle
+    data["rest_length"] = p.rest_length
+    data["liftoff_angle"] = np.nan if angle is None else angle
+    data["shortest_swing"] = _SHORTEST_SWING * np.sqrt(p.rest_length / p.gravity)
+    data["earliest"] = _EARLIEST * Scale.of(p).time
+    data["overstretch"] = _OVERSTRETCH * p.rest_length
 
 
 def _numbered(edge: Edge) -> tuple[int, int]:

@@ -133,7 +133,7 @@ class StateObserver:
 
     Every tick updates the robot's model. Others write ``contact`` (2,), whether each foot touches
     the ground, and ``acceleration`` (2,) wanted of the CoM [m/s^2]; ``data`` (1,) are of
-    ``SENSED``, own memory if not given. ``now`` was read last; ``ground`` is the height of the
+    ``SENSED``. ``now`` was read last; ``ground`` is the height of the
     template's ground [m], ``pre_impact_velocity`` (2,) dx/dt and dy/dt of this tick if nothing has
     hit the robot since the last one.
     """
@@ -147,10 +147,9 @@ class StateObserver:
         feet: Feet,
         contact: NDArray[np.bool_],
         acceleration: Array,
-        data: Any = None,
+        data: Any,
     ) -> None:
-        self._robot, self._feet = robot, feet
-        self.data = np.zeros(1, SENSED) if data is None else data
+        self._robot, self._feet, self.data = robot, feet, data
         self.now = TemplateState(
             state=self.data["state"][0],
             toes=self.data["toes"][0],

@@ -5,7 +5,7 @@ Compiled formulas write their rows (:mod:`~template_control.whole_body.task_rows
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, fields
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,6 +27,8 @@ from template_control.slip.similarity import (
 from template_control.whole_body import task_rows
 from template_control.whole_body.task import References, Rows
 from template_control.whole_body.task_rows import TASK, write_rows
+
+_NO_GAINS = ("leg", "contact", "weight")
 
 
 class CompiledTask(Checked):
@@ -50,8 +52,9 @@ class CompiledTask(Checked):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Gains, as the formula reads them."""
-        return self.gains  # type: ignore[attr-defined]
+        """Gains, as the formula reads them: all numbers but the weights, in the fields' order."""
+        names = (f.name for f in fields(self) if f.name not in _NO_GAINS)  # type: ignore[arg-type]
+        return tuple(float(number) for name in names for number in np.ravel(getattr(self, name)))
 
     def compiled(self, first: int) -> Any:
         """(1,) of ``TASK``.
@@ -139,11 +142,6 @@ class ComTask(CompiledTask):
 
     kind = task_rows.COM
 
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """See :attr:`CompiledTask.numbers`."""
-        return *self.gains, float(self.on_point), self.falling
-
 
 @dataclass(frozen=True)
 class FootTask(CompiledTask):
@@ -174,11 +172,6 @@ class FootTask(CompiledTask):
 
     kind = task_rows.FOOT
 
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """See :attr:`CompiledTask.numbers`."""
-        return *self.gains, *self.hold_gains
-
 
 @dataclass(frozen=True)
 class MomentumTask(CompiledTask):
@@ -202,11 +195,6 @@ class MomentumTask(CompiledTask):
     turning: NotNegative = tuned(1.35, RATE)
 
     kind = task_rows.MOMENTUM
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """See :attr:`CompiledTask.numbers`."""
-        return self.bandwidth, self.turning
 
 
 @dataclass(frozen=True)
@@ -253,11 +241,6 @@ class OrientationTask(CompiledTask):
     kind = task_rows.ORIENTATION
     in_space = True
 
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """See :attr:`CompiledTask.numbers`."""
-        return *self.gains, *self.yaw_gains
-
 
 @dataclass(frozen=True)
 class SpinTask(CompiledTask):
@@ -285,11 +268,6 @@ class SpinTask(CompiledTask):
 
     kind = task_rows.SPIN
     in_space = True
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """See :attr:`CompiledTask.numbers`."""
-        return self.bandwidth, *self.turning
 
 
 @dataclass(frozen=True)
@@ -383,8 +361,3 @@ class SwayTask(CompiledTask):
 
     kind = task_rows.SWAY
     in_space = True
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """See :attr:`CompiledTask.numbers`."""
-        return ()

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import template_control as tc
-from template_control.embedding.ground import SlopeEstimate, SlopeFrame
+from template_control.embedding.ground import FRAME, SlopeEstimate, SlopeFrame
 from template_control.embedding.learners.momentum import uncontrolled
 from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.planner import Context
@@ -169,7 +169,7 @@ def test_axes_turn_about_a_place_and_back():
     com, hinges = robot.com.copy(), robot.nonlinear_effects[3:].copy()
     energy = 0.5 * v @ robot.mass_matrix @ v
     place = robot.foot_position[0].copy()
-    frame = SlopeFrame(robot)
+    frame = SlopeFrame(robot, np.zeros(1, FRAME))
     frame.tilt(0.1, place)
     inside, speed = frame.enter(q, v)
     robot.update(inside, speed)
@@ -193,7 +193,7 @@ def test_axes_turn_about_a_place_and_back():
 def test_a_robot_that_goes_backward_is_seen_from_behind():
     robot = tc.load_robot("five-link")
     q, v = np.array([0.3, 0.9, 0.1, 0.4, -0.5, -0.2, -0.3]), np.linspace(-1.0, 1.0, 7)
-    frame = SlopeFrame(robot)
+    frame = SlopeFrame(robot, np.zeros(1, FRAME))
     frame.tilt(0.1, np.zeros(2))
     robot.update(*frame.enter(q, v))
     names = ("com", "com_velocity", "com_bias", "foot_position", "foot_velocity", "foot_bias")

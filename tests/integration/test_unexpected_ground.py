@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robot_guards import RobotGuards
 
 import template_control as tc
 from template_control.embedding import HIGH_SWING, GuardOptions, SwingOptions
-from template_control.embedding.modes import RobotGuards
 from template_control.embedding.planners.planner import Decision
 from template_control.embedding.replanning import (
     END_TOLERANCE,

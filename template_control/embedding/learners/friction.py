@@ -14,7 +14,6 @@ from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.robot.terms import MOST_CONTACTS
 from template_control.slip.similarity import TIME, Scale, tuned
-from template_control.structured import Number
 
 Array = NDArray[np.float64]
 
@@ -68,6 +67,10 @@ SLIDES = np.dtype(
 @compiled
 def feel_slides(s: Any, standing: NDArray[np.uint8], force: Array, speed: Array, dt: float) -> bool:
     """Estimate friction from the motion of the feet and their forces; True if the estimate changed.
+
+    The force on a foot that slides lies on the friction cone, whatever was asked for. So its mean
+    ratio while the foot slides is Coulomb's coefficient. It is only ever lowered: nothing shows how
+    far a foot that stands is from sliding; and ground that was slippery once may be so again.
 
     Args:
         s: of ``SLIDES``, overwritten.
@@ -125,34 +128,14 @@ def _end(s: Any, foot: int) -> None:
     s.time[foot] = s.along[foot] = s.normal[foot] = 0.0
 
 
-class FrictionEstimate:
-    """Coulomb coefficient of the ground.
+def set_friction(
+    data: Any, options: FrictionOptions, before: float, weight: float, scale: Scale
+) -> None:
+    """Begin the estimate with the coefficient ``before`` anything is learnt.
 
-    The force on a foot that slides lies on the friction cone, whatever was asked for. So its mean
-    ratio while the foot slides is the coefficient. It is only ever lowered: nothing shows how far a
-    foot that stands is from sliding; and ground that was slippery once may be so again. ``before``
-    is the coefficient before anything is learnt, ``weight`` the robot's [N]; ``data`` (1,) are of
-    ``SLIDES``, own memory if not given.
+    ``data`` (1,), of ``SLIDES``, is overwritten; ``weight`` is the robot's [N].
     """
-
-    coefficient = Number("coefficient")
-
-    def __init__(
-        self,
-        options: FrictionOptions,
-        before: float,
-        weight: float,
-        scale: Scale,
-        *,
-        data: Any = None,
-    ) -> None:
-        self.data = np.zeros(1, SLIDES) if data is None else data
-        now = self.data[0]
-        now["least"], now["speed"] = _LOAD * weight, SLIDING_SPEED * scale.speed
-        for name in ("duration", "settling", "lowest"):
-            now[name] = getattr(options, name)
-        now["coefficient"] = before
-
-    def update(self, standing: NDArray[np.bool_], force: Array, speed: Array, dt: float) -> bool:
-        """As :func:`feel_slides`."""
-        return bool(feel_slides(self.data[0], standing.view(np.uint8), force, speed, dt))
+    data["least"], data["speed"] = _LOAD * weight, SLIDING_SPEED * scale.speed
+    for name in ("duration", "settling", "lowest"):
+        data[name] = getattr(options, name)
+    data["coefficient"] = before

@@ -138,18 +138,15 @@ class TrunkLean:
 
     ``upright`` is the reference of strides without a lean of their own, ``mean`` the mean pitch
     that is wanted now, ``correction`` what the reference adds to it [rad]. ``data`` (1,) are of
-    ``LEAN``, own memory if not given.
+    ``LEAN``.
     """
 
     mean, correction, _goal, _sum, _time = (
         Number(name) for name in ("mean", "correction", "goal", "sum", "time")
     )
 
-    def __init__(
-        self, options: LeanOptions, upright: float, scale: Scale, data: Any = None
-    ) -> None:
-        self.data = np.zeros(1, LEAN) if data is None else data
-        self.options = options
+    def __init__(self, options: LeanOptions, upright: float, scale: Scale, data: Any) -> None:
+        self.options, self.data = options, data
         self._upright = upright
         self.data["rate"] = LEAN_RATE * scale.factor(RATE)
         self.reset()
@@ -175,10 +172,6 @@ class TrunkLean:
             self._lean = lean
         if not self._begun:
             self.mean, self._begun = self._goal, True
-
-    def advance(self, pitch: float, dt: float) -> float:
-        """Reference of the pitch at this tick of ``dt`` [s], from the trunk's pitch [rad]."""
-        return float(advance_lean(self.data[0], pitch, dt))
 
     def end_stride(self, nominal: bool) -> None:
         """Learn from the stride that has just ended, if it went near the gait."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.learners.friction import FrictionEstimate
+from template_control.embedding.learners.friction import set_friction
 from template_control.embedding.learners.lean import TrunkLean
 from template_control.embedding.learners.momentum import LoadEstimate, MomentumTrim
 from template_control.embedding.options import EmbeddingOptions
@@ -38,9 +38,7 @@ class Learners:
         self.load = LoadEstimate(robot.gravity, tick["load"])
         self.trim = MomentumTrim(parameters)
         self.lean = TrunkLean(options.lean, options.trunk_pitch, scale, tick["lean"])
-        self.friction = FrictionEstimate(
-            options.slides, options.friction, weight, scale, data=tick["slides"]
-        )
+        set_friction(tick["slides"], options.slides, options.friction, weight, scale)
 
     @property
     def state(self) -> EstimatorState:

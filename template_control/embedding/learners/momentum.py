@@ -76,24 +76,16 @@ class LoadEstimate:
     Over a whole step the feedback part of the CoM's vertical acceleration averages to
     nothing, unless forces computed with the model's mass do not carry the robot. All joint
     torques are then scaled by the factor learnt here; the model itself stays nominal.
-    Feedback is measured in units of the model's ``gravity`` [m/s^2]; ``data`` (1,) are of ``LOAD``,
-    own memory if not given.
+    Feedback is measured in units of the model's ``gravity`` [m/s^2]; ``data`` (1,) are of ``LOAD``.
     """
 
     _sum, _time = Number("sum"), Number("time")
 
-    def __init__(self, gravity: float, data: Any = None) -> None:
-        self.data = np.zeros(1, LOAD) if data is None else data
+    def __init__(self, gravity: float, data: Any) -> None:
+        self.data = data
         self.factor = 1.0
         self._last = (0.0,) * _AGREE  # mean feedback of the last strides, over g
         self._gravity = gravity
-
-    def observe(self, feedback: float, dt: float) -> None:
-        """Add the feedback of one tick of ``dt`` [s] to the mean over the present stride.
-
-        It is that part of the CoM's vertical acceleration, up positive [m/s^2].
-        """
-        observe_load(self.data[0], feedback, dt)
 
     def end_stride(self, nominal: bool) -> None:
         """Learn from the stride that has just ended.

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robot_guards import RobotGuards
 
 from template_control.embedding.com_path import at_direction, at_time, join, sample
-from template_control.embedding.learners.momentum import LoadEstimate
+from template_control.embedding.learners.momentum import LOAD, LoadEstimate, observe_load
 from template_control.embedding.leg_forces import leg_forces
-from template_control.embedding.modes import GuardOptions, RobotGuards
+from template_control.embedding.modes import GuardOptions
 from template_control.embedding.state import TemplateState
 from template_control.errors import GaitError, RobotError
 from template_control.robot.start import state_at_vlo
@@ -140,34 +141,34 @@ def test_touchdown_is_the_placed_leg_s():
 
 
 def test_load_learns_a_constant_and_ignores_the_gait():
-    load = LoadEstimate(9.81)
+    load = LoadEstimate(9.81, np.zeros(1, LOAD))
     load.end_stride(True)
     for _ in range(10):
-        load.observe(0.15, 0.5)  # within the dead zone
+        observe_load(load.data[0], 0.15, 0.5)  # within the dead zone
         load.end_stride(True)
-        load.observe(5.0, 0.5)  # a push
+        observe_load(load.data[0], 5.0, 0.5)  # a push
         load.end_stride(False)
     assert load.factor == 1.0
     for _ in range(20):
-        load.observe(9.81 * (1.1 - load.factor), 0.5)
+        observe_load(load.data[0], 9.81 * (1.1 - load.factor), 0.5)
         load.end_stride(True)
     # At the edge of the dead zone, less what is forgotten of it there.
     assert 1.07 < load.factor < 1.09
     for _ in range(60):
-        load.observe(0.0, 0.5)
+        observe_load(load.data[0], 0.0, 0.5)
         load.end_stride(True)
     assert load.factor == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_load_is_learnt_from_strides_off_the_gait_that_agree():
     """A push is over by the next stride; a load that leads the robot off its gait is not."""
-    load = LoadEstimate(9.81)
+    load = LoadEstimate(9.81, np.zeros(1, LOAD))
     for feedback in (-1.5, 1.2, -0.9):
-        load.observe(feedback, 0.5)
+        observe_load(load.data[0], feedback, 0.5)
         load.end_stride(False)
     assert load.factor == 1.0
     for _ in range(12):
-        load.observe(9.81 * (0.9 - load.factor), 0.5)
+        observe_load(load.data[0], 9.81 * (0.9 - load.factor), 0.5)
         load.end_stride(False)
     assert 0.88 < load.factor < 0.93
 

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_flags import take_in
 
-from template_control.embedding.contacts import ContactMonitor, ContactOptions
+from template_control.embedding.contacts import CONTACTS, ContactMonitor, ContactOptions
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.free.trot import TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
@@ -24,18 +25,18 @@ def flags(*touching):
 
 
 def test_a_foot_stands_on_one_of_its_contacts():
-    monitor = ContactMonitor(ContactOptions(doubt=0.004), 100.0, groups=PAIRS)
-    monitor.update(flags(3), None, (None, False), DT)
+    monitor = ContactMonitor(ContactOptions(doubt=0.004), 100.0, np.zeros(1, CONTACTS), PAIRS)
+    take_in(monitor, flags(3), None, (None, False), DT)
     assert monitor.standing.tolist() == [True, False]
     assert monitor.data["touching"][0, :4].tolist() == [0, 0, 0, 1]
-    monitor.update(flags(0, 3), None, (True, False), DT)
+    take_in(monitor, flags(0, 3), None, (True, False), DT)
     assert monitor.data["touching"][0, :4].tolist() == [1, 0, 0, 1]
     # One that nobody expects is doubted; a foot that leaves has to leave with all of them.
-    monitor.update(flags(0, 2, 3), None, (True, False), DT)
+    take_in(monitor, flags(0, 2, 3), None, (True, False), DT)
     assert monitor.standing.tolist() == [True, False]
-    monitor.update(flags(3), None, (False, False), DT)
+    take_in(monitor, flags(3), None, (False, False), DT)
     assert monitor.standing.tolist() == [True, False]
-    monitor.update(flags(), None, (False, False), DT)
+    take_in(monitor, flags(), None, (False, False), DT)
     assert monitor.standing.tolist() == [False, False]
 
 

@@ -6,10 +6,12 @@ import pytest
 from template_control.embedding.learners.lean import (
     ERROR_BOUND,
     GAIN,
+    LEAN,
     LEAN_RATE,
     Lean,
     LeanOptions,
     TrunkLean,
+    advance_lean,
 )
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal
@@ -35,25 +37,25 @@ def test_a_stride_before_another_kind_prepares_its_lean():
 
 
 def test_a_run_begins_with_its_lean_and_changes_it_slowly():
-    lean = TrunkLean(OPTIONS, 0.0, SCALE)
+    lean = TrunkLean(OPTIONS, 0.0, SCALE, np.zeros(1, LEAN))
     lean.aim(goal("r", 2.0))
-    assert lean.advance(0.2, DT) == pytest.approx(0.3), "mean and excess"
+    assert advance_lean(lean.data[0], 0.2, DT) == pytest.approx(0.3), "mean and excess"
     lean.aim(goal("r", 4.0))
     for _ in range(1000):
-        lean.advance(0.2, DT)
+        advance_lean(lean.data[0], 0.2, DT)
     assert lean.mean == pytest.approx(0.2 + LEAN_RATE)
     for _ in range(2000):
-        lean.advance(0.2, DT)
+        advance_lean(lean.data[0], 0.2, DT)
     assert lean.mean == pytest.approx(0.4)
 
 
 def test_the_mean_pitch_becomes_the_wanted_one():
-    lean = TrunkLean(OPTIONS, 0.0, SCALE)
+    lean = TrunkLean(OPTIONS, 0.0, SCALE, np.zeros(1, LEAN))
     lean.aim(goal("r", 2.0))
     for _ in range(60):
         pitch = 0.0
         for _ in range(250):
-            pitch = lean.advance(pitch, DT) - 0.15
+            pitch = advance_lean(lean.data[0], pitch, DT) - 0.15
         lean.end_stride(True)
     assert pitch == pytest.approx(0.2, abs=1e-3)
     assert lean.correction == pytest.approx(0.15, abs=1e-3)
@@ -62,20 +64,20 @@ def test_the_mean_pitch_becomes_the_wanted_one():
 
 
 def test_a_disturbed_stride_teaches_nothing():
-    lean = TrunkLean(OPTIONS, 0.0, SCALE)
+    lean = TrunkLean(OPTIONS, 0.0, SCALE, np.zeros(1, LEAN))
     lean.aim(goal("r", 2.0))
-    lean.advance(-0.5, DT)
+    advance_lean(lean.data[0], -0.5, DT)
     lean.end_stride(False)
     assert lean.correction == 0.1
-    lean.advance(-0.5, DT)
+    advance_lean(lean.data[0], -0.5, DT)
     lean.end_stride(True)
     assert lean.correction == pytest.approx(0.1 + GAIN * ERROR_BOUND)
 
 
 def test_a_stride_without_a_lean_keeps_the_trunk_s_pitch():
-    lean = TrunkLean(OPTIONS, 0.05, SCALE)
+    lean = TrunkLean(OPTIONS, 0.05, SCALE, np.zeros(1, LEAN))
     lean.aim(goal("w", 1.0))
     for _ in range(10):
-        assert lean.advance(0.3, DT) == 0.05
+        assert advance_lean(lean.data[0], 0.3, DT) == 0.05
     lean.end_stride(True)
-    assert lean.advance(0.3, DT) == 0.05
+    assert advance_lean(lean.data[0], 0.3, DT) == 0.05

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_flags import take_in
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import template_control as tc
 from template_control.embedding import ContactOptions, EmbeddingOptions
-from template_control.embedding.contacts import ContactMonitor
+from template_control.embedding.contacts import CONTACTS, ContactMonitor
 from template_control.robot.library import load_floating_robot
 from template_control.robot.start import state_at_vlo
 
@@ -20,9 +21,9 @@ STANDS, IN_THE_AIR, DUE = True, False, None
 
 
 def monitor(standing=(False, False), options=OPTIONS):
-    found = ContactMonitor(options, WEIGHT)
+    found = ContactMonitor(options, WEIGHT, np.zeros(1, CONTACTS))
     for _ in range(DOUBT):
-        found.update(np.array(standing), None, standing, DT)
+        take_in(found, np.array(standing), None, standing, DT)
     return found
 
 
@@ -32,7 +33,7 @@ def test_what_the_path_expects_is_believed_at_once_and_nothing_else(expected, st
     """The other foot, of which nothing is said, keeps its state."""
     contacts = monitor((stood, stood))
     for tick in range(1, DOUBT + 1):
-        contacts.update(np.array([not stood, stood]), None, (expected, stood), DT)
+        take_in(contacts, np.array([not stood, stood]), None, (expected, stood), DT)
         at_once = expected in (DUE, not stood)
         assert contacts.standing[0] == (not stood if at_once or tick == DOUBT else stood)
         assert contacts.standing[1] == stood
@@ -46,7 +47,7 @@ def test_what_the_path_expects_is_believed_at_once_and_nothing_else(expected, st
 def test_only_a_flag_that_lasts_moves_a_foot_against_the_path(flags, expected):
     contacts = monitor((expected, False))
     for tick in range(len(flags)):
-        contacts.update(np.array([flags[tick], False]), None, (expected, False), DT)
+        take_in(contacts, np.array([flags[tick], False]), None, (expected, False), DT)
         last = flags[max(tick + 1 - DOUBT, 0) : tick + 1]
         against = len(last) == DOUBT and expected not in last
         assert contacts.standing[0] == (expected is not against)
@@ -55,29 +56,29 @@ def test_only_a_flag_that_lasts_moves_a_foot_against_the_path(flags, expected):
 def test_a_false_flag_becomes_no_touchdown_by_coming_due():
     """A foot that is due is asked anew: what was said of it before does not count."""
     contacts = monitor()
-    contacts.update(np.array([True, False]), None, (IN_THE_AIR, STANDS), DT)
-    contacts.update(np.array([False, False]), None, (DUE, STANDS), DT)
+    take_in(contacts, np.array([True, False]), None, (IN_THE_AIR, STANDS), DT)
+    take_in(contacts, np.array([False, False]), None, (DUE, STANDS), DT)
     assert not contacts.standing[0]
-    contacts.update(np.array([True, False]), None, (DUE, STANDS), DT)
+    take_in(contacts, np.array([True, False]), None, (DUE, STANDS), DT)
     assert contacts.standing[0]
 
 
 def test_a_wall_is_told_from_ground_by_the_direction_of_its_force():
     contacts, both = monitor(), np.ones(2, dtype=bool)
-    contacts.update(both, np.array([[-60.0, 100.0], [-100.0, 60.0]]), (DUE, DUE), DT)
+    take_in(contacts, both, np.array([[-60.0, 100.0], [-100.0, 60.0]]), (DUE, DUE), DT)
     np.testing.assert_array_equal(contacts.standing, [True, False])
-    assert [contacts.blocked(foot) for foot in (0, 1)] == [False, True]
-    contacts.update(both, np.array([[100.0, 0.0], [-10.0, 0.0]]), (DUE, DUE), DT)
+    assert (contacts.data["wall"][0] > 0.0).tolist() == [False, True]
+    take_in(contacts, both, np.array([[100.0, 0.0], [-10.0, 0.0]]), (DUE, DUE), DT)
     np.testing.assert_array_equal(contacts.standing, [False, True])
-    assert not contacts.blocked(0), "a wall behind the foot is not in its way"
+    assert contacts.data["wall"][0, 0] <= 0.0, "a wall behind the foot is not in its way"
 
 
 def test_a_wall_counts_for_a_while_after_its_last_force():
     contacts, none = monitor(options=replace(OPTIONS, linger=0.01)), np.zeros(2, dtype=bool)
-    contacts.update(none, np.array([[-100.0, 0.0], [0.0, 0.0]]), (DUE, DUE), DT)
+    take_in(contacts, none, np.array([[-100.0, 0.0], [0.0, 0.0]]), (DUE, DUE), DT)
     after = 0
-    while contacts.blocked(0):
-        contacts.update(none, np.zeros((2, 2)), (DUE, DUE), DT)
+    while contacts.data["wall"][0, 0] > 0.0:
+        take_in(contacts, none, np.zeros((2, 2)), (DUE, DUE), DT)
         after += 1
     assert after == pytest.approx(10, abs=1)
 

@@ -4,8 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from robot_guards import RobotGuards
 
-from template_control.embedding.modes import GuardOptions, RobotGuards
+from template_control.embedding.modes import GuardOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.state import TemplateState
