@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Range
 from template_control.compiled import compiled, unfused
-from template_control.embedding.com_path import at_direction, at_time
-from template_control.embedding.leg_forces import leg_forces
+from template_control.embedding.com_path import at_direction, at_time, leg_forces
 from template_control.embedding.phases import Clock, PhaseControl, Phases, phase_control
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.supervisor import StrideSupervisor

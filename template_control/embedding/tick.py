@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
+from template_control.embedding.com_path import unload_cap
 from template_control.embedding.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
 from template_control.embedding.free.sway import closing_foothold, side_speed, sway
@@ -25,7 +26,6 @@ from template_control.embedding.ground import FRAME, to_world, vector_to_world
 from template_control.embedding.learners.friction import SLIDES, feel_slides
 from template_control.embedding.learners.lean import LEAN, advance_lean
 from template_control.embedding.learners.momentum import LOAD, observe_load
-from template_control.embedding.leg_forces import unload_cap
 from template_control.embedding.modes import (
     GUARDS,
     MODE,

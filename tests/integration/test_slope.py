@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import template_control as tc
+from template_control.embedding.com_path import leg_forces
 from template_control.embedding.ground import FRAME, SlopeEstimate, SlopeFrame
 from template_control.embedding.learners.momentum import uncontrolled
-from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.state import TemplateState
 from template_control.errors import GaitError

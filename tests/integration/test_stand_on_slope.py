@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import template_control as tc
+from template_control.embedding.com_path import leg_forces
 from template_control.embedding.ground import SlopeEstimate
-from template_control.embedding.leg_forces import leg_forces
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.robot_template import startable_slopes
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose

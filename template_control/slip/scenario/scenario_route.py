@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
+from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import StrideKind, WalkingStride
-from template_control.slip.maps.section import APEX, REST, VLO, Section
+from template_control.slip.maps.section import APEX, REST, VLO, Section, section_of
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segment
 
@@ -32,27 +33,15 @@ _STRIDES: dict[tuple[Section, Gait], str] = {
     (REST, "walk"): StrideKind.STAND_TO_WALK,
     (VLO, "stand"): StrideKind.WALK_TO_STAND,
 }
-_TRANSITIONS = (
-    StrideKind.WALK_TO_RUN,
-    StrideKind.RUN_TO_WALK,
-    StrideKind.STAND_TO_WALK,
-    StrideKind.WALK_TO_STAND,
-    StrideKind.STEP_FORWARD,
-    StrideKind.CHANGE_SPEED,
-)
-_LEADS_TO: dict[str, tuple[Section, Gait]] = {
-    StrideKind.WALK: (VLO, "walk"),
-    StrideKind.WALK_TO_RUN: (APEX, "run"),
-    StrideKind.RUN: (APEX, "run"),
-    StrideKind.RUN_TO_WALK: (VLO, "walk"),
-    StrideKind.STAND: (REST, "stand"),
-    StrideKind.STAND_TO_WALK: (VLO, "walk"),
-    StrideKind.WALK_TO_STAND: (REST, "stand"),
-    StrideKind.STEP_FORWARD: (REST, "stand"),
-    StrideKind.CHANGE_SPEED: (VLO, "walk"),
-}
+_KEPT = (StrideKind.WALK, StrideKind.RUN, StrideKind.STAND)  # all others are transitions
+_GAITS: dict[Section, Gait] = {VLO: "walk", APEX: "run", REST: "stand"}  # that sections are of
 _FIRST_DURATION = 1.6  # of sqrt(l0/g): guess of a stride's duration before one was made
 _LONGEST = 2.0  # of that guess: what took longer was no stride alone, but one that a run caught
+
+
+def _leads_to(kind: str) -> Section:
+    """The section that a kind of stride ends at."""
+    return section_of(AUTOMATON.sections(AUTOMATON.starts[kind])[1])
 
 
 @dataclass(frozen=True)
@@ -93,7 +82,7 @@ class _Progress:
         kind, left = self.last
         took = now - left if self.took is None else self.took
         here = replace(self, duration={**self.duration, kind: took}, last=None, took=None)
-        if kind in _TRANSITIONS and not (kind == StrideKind.CHANGE_SPEED and self.walking):
+        if kind not in _KEPT and not (kind == StrideKind.CHANGE_SPEED and self.walking):
             # The transition leads to where the segment's profile begins.
             return replace(here, began=now)
         return replace(here, strides=self.strides + 1)
@@ -208,7 +197,7 @@ class ScenarioRoute:
         if kind in (StrideKind.WALK_TO_STAND, StrideKind.WALK):
             here, kind = self._reached(here, kind, float(z[0]), now)
         # A transition aims at where the profile begins, the others at where they will end.
-        aims = kind not in _TRANSITIONS or (kind == StrideKind.CHANGE_SPEED and here.walking)
+        aims = kind in _KEPT or (kind == StrideKind.CHANGE_SPEED and here.walking)
         took = min(here.duration.get(kind, self._guess), _LONGEST * self._guess)
         ahead = took if aims else 0.0
         speed = here.wanted(segment, now + ahead)
@@ -220,7 +209,7 @@ class ScenarioRoute:
             if runs
             else (speed, self._vlo_height(speed), s.vlo[1])
         )
-        if _LEADS_TO[kind][0] is REST:
+        if _leads_to(kind) is REST:
             target = (0.0, s.stand_height, 0.0)
         then = self._then(kind, here.index)
         goal = StrideGoal(self._named(kind), np.array(target), speed, here.index, then)
@@ -246,8 +235,9 @@ class ScenarioRoute:
 
     def _then(self, kind: str, index: int) -> str | None:
         """The next kind of stride after those of ``kind`` in segment ``index``."""
-        section, gait = _LEADS_TO[kind]
-        if kind in _TRANSITIONS:
+        section = _leads_to(kind)
+        gait = _GAITS[section]
+        if kind not in _KEPT:
             return self._named(_STRIDES[section, gait])
         later = (segment.gait for segment in self.scenario.segments[index:])
         return next(

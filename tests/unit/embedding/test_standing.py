@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.com_path import derivatives, quintics
-from template_control.embedding.leg_forces import leg_forces
+from template_control.embedding.com_path import derivatives, leg_forces, quintics
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
